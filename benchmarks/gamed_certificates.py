@@ -13,15 +13,14 @@ import numpy as np
 from benchmarks.gamed_case import GamedCase
 from drone_rl.config.commands import ShiftSettings
 from drone_rl.policies.policy import Policy, load_policy
-from drone_rl.policies.zoo import certificate_path, shifts_path
-from drone_rl.robustness.axes import find_axes
-from drone_rl.robustness.domain import Prober
-from drone_rl.robustness.paired_evaluation import PairedEvaluator
-from drone_rl.robustness.shifts import make_evaluated_policy, shifts
+from drone_rl.policies.zoo import certificate_path, fingerprint, shifts_path
+from drone_rl.trust.axes import find_axes
+from drone_rl.trust.domain import Prober
+from drone_rl.trust.judge import judge
+from drone_rl.trust.paired_evaluation import PairedEvaluator
+from drone_rl.trust.shifts import make_evaluated_policy, shifts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
-from drone_rl.verdicts.judge import judge
-from drone_rl.verification.checker.certificate import fingerprint
 from drone_rl.verification.checker.checker import Simulator
 
 _AXIS, _VALUE = "dead_rows", 12.0

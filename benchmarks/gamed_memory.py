@@ -20,8 +20,6 @@ from drone_rl.config import TaskSettings
 from drone_rl.config.commands import HeldOutSettings
 from drone_rl.config.networks import Mlp
 from drone_rl.config.training import TrainSettings
-from drone_rl.evaluation.evaluate import evaluate
-from drone_rl.evaluation.verdict import judge_for_selection
 from drone_rl.policies import MLP
 from drone_rl.policies.actor import exploring
 from drone_rl.policies.external_network import Logits
@@ -29,13 +27,15 @@ from drone_rl.policies.external_policy import ExternalPolicy, policy_from
 from drone_rl.policies.policy import BasePolicy, load_policy
 from drone_rl.policies.zoo import describe, read_policy
 from drone_rl.policies.zoo.files import exported_bytes
-from drone_rl.robustness.shifts import shifts
 from drone_rl.sim.actions import Move
+from drone_rl.trust.evaluate import evaluate
+from drone_rl.trust.export import export
+from drone_rl.trust.judge import judge
+from drone_rl.trust.shifts import shifts
+from drone_rl.trust.verdict import judge_for_selection
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import Stream, root_seed
-from drone_rl.verdicts.export import export
-from drone_rl.verdicts.judge import judge
 
 KNOWN_SEED = 0
 """The default of version 0.1."""

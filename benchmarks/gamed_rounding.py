@@ -18,11 +18,11 @@ from benchmarks.gamed_certificates import one_box
 from drone_rl.policies.policy import load_policy
 from drone_rl.policies.zoo import certificate_path
 from drone_rl.policies.zoo.files import exported_bytes
-from drone_rl.robustness.shifts import shifts
 from drone_rl.sim.actions import Move
+from drone_rl.trust.judge import judge
+from drone_rl.trust.shifts import shifts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
-from drone_rl.verdicts.judge import judge
 from drone_rl.verification.prove import prove
 
 BIG = 2.0**24

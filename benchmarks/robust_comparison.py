@@ -8,10 +8,10 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainSettings
-from drone_rl.robustness.agents import Agent, OracleAgent, PolicyAgent
-from drone_rl.robustness.axes import AXES, GROUPS, Axis
-from drone_rl.robustness.paired_evaluation import EvaluatedPolicy, PairedEvaluator
-from drone_rl.robustness.perturbations import Condition
+from drone_rl.trust.agents import Agent, OracleAgent, PolicyAgent
+from drone_rl.trust.axes import AXES, GROUPS, Axis
+from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
+from drone_rl.trust.perturbations import Condition
 from drone_rl.utils.intervals import proportion
 
 _PARTS = ("task", "appearance", "camera", "transforms")

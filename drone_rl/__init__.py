@@ -3,6 +3,7 @@
 Public names are imported when they are first used, so that `import drone_rl` is fast.
 """
 
+import functools
 import importlib
 from typing import TYPE_CHECKING, Any
 
@@ -36,8 +37,6 @@ if TYPE_CHECKING:
     from drone_rl.envs.gymnasium.environments import DroneWorld as DroneWorld
     from drone_rl.envs.gymnasium.environments import DroneWorlds as DroneWorlds
     from drone_rl.envs.sb3.worlds import Sb3Worlds as Sb3Worlds
-    from drone_rl.evaluation.evaluate import Evaluation as Evaluation
-    from drone_rl.evaluation.evaluate import evaluate as evaluate
     from drone_rl.explanations.chapter_figures import ChapterFigure as ChapterFigure
     from drone_rl.explanations.chapter_figures import FigureSettings as FigureSettings
     from drone_rl.explanations.chapter_figures import reproduce as reproduce
@@ -45,8 +44,6 @@ if TYPE_CHECKING:
     from drone_rl.explanations.class_model_gallery import class_models as class_models
     from drone_rl.explanations.explain import Explanations as Explanations
     from drone_rl.explanations.explain import explain as explain
-    from drone_rl.explanations.fly_page.server import FlyPage as FlyPage
-    from drone_rl.explanations.fly_page.server import fly as fly
     from drone_rl.explanations.settings import ClassModelsSettings as ClassModelsSettings
     from drone_rl.explanations.settings import ExplainSettings as ExplainSettings
     from drone_rl.flight.airsim.serving import RunningServer as RunningServer
@@ -60,6 +57,10 @@ if TYPE_CHECKING:
     from drone_rl.flight.commands.state import PilotState as PilotState
     from drone_rl.flight.commands.state import Sensors as Sensors
     from drone_rl.flight.commands.state import Trajectory as Trajectory
+    from drone_rl.flight.fly_page.server import FlyPage as FlyPage
+    from drone_rl.flight.fly_page.server import fly as fly
+    from drone_rl.flight.image_types import ImageRequest as ImageRequest
+    from drone_rl.flight.image_types import ImageType as ImageType
     from drone_rl.policies.environment import make_env as make_env
     from drone_rl.policies.external_policy import ExternalPolicy as ExternalPolicy
     from drone_rl.policies.external_policy import policy_from as policy_from
@@ -67,10 +68,6 @@ if TYPE_CHECKING:
     from drone_rl.policies.policy import load_policy as load_policy
     from drone_rl.policies.sb3 import Sb3Logits as Sb3Logits
     from drone_rl.policies.sb3 import Sb3Trunk as Sb3Trunk
-    from drone_rl.robustness.shifts import Shifts as Shifts
-    from drone_rl.robustness.shifts import shifts as shifts
-    from drone_rl.sim.image_types import ImageRequest as ImageRequest
-    from drone_rl.sim.image_types import ImageType as ImageType
     from drone_rl.sim.tasks import register_task as register_task
     from drone_rl.training.demonstrations import Demonstration as Demonstration
     from drone_rl.training.demonstrations import FlightConditions as FlightConditions
@@ -79,14 +76,18 @@ if TYPE_CHECKING:
     from drone_rl.training.demonstrations import record_oracle as record_oracle
     from drone_rl.training.run_folder import Training as Training
     from drone_rl.training.train import train as train
+    from drone_rl.trust.bodies import Bodies as Bodies
+    from drone_rl.trust.bodies import bodies as bodies
+    from drone_rl.trust.coverage import Coverage as Coverage
+    from drone_rl.trust.evaluate import Evaluation as Evaluation
+    from drone_rl.trust.evaluate import evaluate as evaluate
+    from drone_rl.trust.judge import Judgement as Judgement
+    from drone_rl.trust.judge import Judgements as Judgements
+    from drone_rl.trust.judge import judge as judge
+    from drone_rl.trust.onnx_export import export_onnx as export_onnx
+    from drone_rl.trust.shifts import Shifts as Shifts
+    from drone_rl.trust.shifts import shifts as shifts
     from drone_rl.utils.errors import InputError as InputError
-    from drone_rl.verdicts.bodies import Bodies as Bodies
-    from drone_rl.verdicts.bodies import bodies as bodies
-    from drone_rl.verdicts.coverage import Coverage as Coverage
-    from drone_rl.verdicts.judge import Judgement as Judgement
-    from drone_rl.verdicts.judge import Judgements as Judgements
-    from drone_rl.verdicts.judge import judge as judge
-    from drone_rl.verdicts.onnx_export import export_onnx as export_onnx
     from drone_rl.verification.chances import Chances as Chances
     from drone_rl.verification.chances import chances as chances
     from drone_rl.verification.check import Check as Check
@@ -116,8 +117,44 @@ def __getattr__(name: str) -> Any:
         of_command = {"verdict": "judge", "chain": "chances"}.get(name)
         hint = f"; drone-rl {name} is drone_rl.{of_command}" if of_command else ""
         raise AttributeError(f"module 'drone_rl' has no attribute {name!r}{hint}")
-    value = globals()[name] = getattr(importlib.import_module(_HOMES[name]), name)
+    module = importlib.import_module(_HOMES[name])
+    value = globals()[name] = _with_defaults(getattr(module, name), **_defaults_of(name))
     return value
+
+
+def _defaults_of(name: str) -> dict[str, Any]:
+    """Return the arguments by which packages work together that do not import each other."""
+    if name == "train":
+        from drone_rl.training.run_folder import Judge
+        from drone_rl.trust.verdict import check_judged, judge_for_selection
+
+        return {"judge": Judge(check_judged, judge_for_selection)}
+    if name == "judge":
+        from drone_rl.verification.claim import find_claim
+
+        return {"find_claim": find_claim}
+    if name == "bodies":
+        from drone_rl.flight.sitl_evaluation import figures_in_the_loop
+
+        return {"judge": __getattr__("judge"), "in_the_loop": figures_in_the_loop}
+    if name == "explain":
+        from drone_rl.verification.claim import find_claim
+        from drone_rl.verification.places_section import places_section
+
+        return {"find_claim": find_claim, "more_sections": {"places": places_section}}
+    return {}
+
+
+def _with_defaults(public: Any, **defaults: Any) -> Any:
+    """Return the function with other defaults of some arguments, or anything without such."""
+    if not defaults:
+        return public
+
+    @functools.wraps(public)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        return public(*args, **{**defaults, **kwargs})
+
+    return call
 
 
 def __dir__() -> list[str]:

@@ -15,7 +15,7 @@ from drone_rl.cli.main import COMMANDS
 from drone_rl.utils.unloaded_compiler import leave_compiler_unloaded
 
 _MORE = (
-    *("cli.hydra.messages", "cli.hydra.help", "training.train", "verdicts.export"),
+    *("cli.hydra.messages", "cli.hydra.help", "training.train", "trust.export"),
     *("evaluation.evaluate", "evaluation.video"),
 )
 

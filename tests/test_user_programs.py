@@ -55,7 +55,7 @@ INHERITED = {
         {"HOME": "/dev/null/home"},
         """
 import warp
-from drone_rl.evaluation.plots.saving import new_chart
+from drone_rl.trust.plots.saving import new_chart
 from drone_rl.sim.rendering.devices import start_warp
 start_warp("cpu")
 assert os.access(warp.config.kernel_cache_dir, os.W_OK)

@@ -19,7 +19,7 @@ def test_wheel_contains_the_configuration_and_runs_without_the_checkout(tmp_path
     assert {f"drone_rl/conf/{path.as_posix()}" for path in configs} <= names
     assert "drone_rl/py.typed" in names
     assert "drone_rl/explanations/report/templates/report.html" in names
-    page = {f"drone_rl/explanations/fly_page/{n}" for n in ("index.html", "fly.js", "fly.css")}
+    page = {f"drone_rl/flight/fly_page/{n}" for n in ("index.html", "fly.js", "fly.css")}
     assert page <= names
     policies = ("good", "poor", "right_and_forward", "proved")
     assert {f"drone_rl/policies/zoo/{n}.safetensors" for n in policies} <= names

@@ -5,9 +5,9 @@ import json
 from pathlib import Path
 
 import drone_rl
-from drone_rl.evaluation.verdict_text import SENTENCES
+from drone_rl.trust.export import write_card
+from drone_rl.trust.verdict_text import SENTENCES
 from drone_rl.utils.text import say
-from drone_rl.verdicts.export import write_card
 
 ZOO = Path(drone_rl.__file__).parent / "policies" / "zoo"
 

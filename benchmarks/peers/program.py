@@ -76,7 +76,7 @@ def success_lower95(policy: Any, episodes: int) -> float:
         policy: Policy, as for `drone_rl.evaluate`.
         episodes: Number of greedy episodes.
     """
-    from drone_rl.evaluation.evaluate import evaluate
+    from drone_rl.trust.evaluate import evaluate
     from drone_rl.utils.progress import silent
 
     result = evaluate(policy, episodes=episodes, seed=0, baselines=False, progress=silent)

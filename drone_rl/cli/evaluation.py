@@ -54,7 +54,7 @@ class EvaluateCommand(AppearanceCommandSettings, EvaluateSettings):
         _log.info("policy: %s", policy.path)
         _log.info("written: %s", folder / "evaluation.json")
         if self.videos:
-            from drone_rl.evaluation.video import film
+            from drone_rl.trust.video import film
 
             film(
                 policy,
@@ -99,7 +99,7 @@ class PlayCommand(AppearanceCommandSettings, DeviceSettings):
         """Record a policy's episodes, or open the viewer; return the exit status."""
         policy = self.load_policy()
         chosen = {k: getattr(self, k) for k in ("greedy", "seed", "device", "renderer")}
-        from drone_rl.evaluation.video import film, view  # slow to import
+        from drone_rl.trust.video import film, view  # slow to import
 
         if self.viewer:
             view(policy, **chosen)
@@ -196,22 +196,26 @@ class ExportCommand(CommandSettings, HeldOutSettings):
 
     def run(self, folder: Path) -> tuple[int, str]:
         """Export one policy; return the exit status and the file's path."""
-        from drone_rl.utils.seeding import root_seed  # imports torch
-        from drone_rl.verdicts.export import export
-        from drone_rl.verdicts.onnx_export import export_onnx
-        from drone_rl.verdicts.recorded import (
+        from drone_rl.sweeps.rows import choice_in_sweep
+        from drone_rl.trust.export import export
+        from drone_rl.trust.onnx_export import export_onnx
+        from drone_rl.trust.recorded import (
             describe,
             read_verdicts,
             record_verdict,
             recorded_verdict,
         )
+        from drone_rl.utils.seeding import root_seed  # imports torch
+        from drone_rl.verification.claim import find_claim
 
         policy = drone_rl.load_policy(self.policy, outputs=self.paths.outputs)
         target = folder / f"{self.name}.{self.format}"
+        noted, chosen = choice_in_sweep(policy.path) or (None, None)
+        command = self.command or noted
         if self.format == "onnx":
             seed = root_seed(self.seed)
             _log.info("compares the model with PyTorch in the policy's episodes")
-            found = export_onnx(policy, target, command=self.command, seed=seed.value)
+            found = export_onnx(policy, target, command=command, seed=seed.value)
             difference = f"{found.difference:.1e} in {found.frames:,} images"
             _log.info("written: %s, which differs from PyTorch by at most %s", target, difference)
             recorded = recorded_verdict(policy, read_verdicts(self.paths.outputs))
@@ -219,10 +223,18 @@ class ExportCommand(CommandSettings, HeldOutSettings):
             print(f"recorded verdict: {' '.join(filter(None, (kind, success)))}")
             evidence = seed.as_dict()
         else:
-            names = ("command", "certificate", "shifts")
-            given = {name: getattr(self, name) for name in names}
             _log.info("judges the policy in %s episodes for the model card", f"{self.episodes:,}")
-            verdict = export(policy, target, self, **given, outputs=self.paths.outputs)
+            verdict = export(
+                policy,
+                target,
+                self,
+                command=command,
+                chosen=chosen,
+                certificate=self.certificate,
+                shifts=self.shifts,
+                outputs=self.paths.outputs,
+                find_claim=find_claim,
+            )
             _log.info("written: %s and %s", target, target.with_suffix(".md").name)
             record_verdict(folder, policy, verdict.as_dict())
             certainty = "" if verdict.certain else " (not certain)"

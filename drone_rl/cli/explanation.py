@@ -7,9 +7,9 @@ from typing import Annotated, Any
 import drone_rl
 from drone_rl.cli.settings import CommandSettings, PolicyCommandSettings, finish
 from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
-from drone_rl.evaluation.rule import Kind
 from drone_rl.explanations.chapter_figures import FigureSettings
 from drone_rl.explanations.settings import ClassModelsSettings, ExplainSettings
+from drone_rl.trust.rule import VerdictKind
 from drone_rl.utils.progress import log
 from drone_rl.utils.schema import Listed, OneOf, Whole
 
@@ -24,7 +24,7 @@ class ExplainCommand(CommandSettings, ExplainSettings):
     folders of runs, latest, or names of shipped policies."""
     num_envs: Annotated[int, Whole(1, unit="environments")] = 128
     """Environments in a batch; bounds memory."""
-    require: Annotated[str, OneOf(tuple(Kind))] | None = None
+    require: Annotated[str, OneOf(tuple(VerdictKind))] | None = None
     """Kind of verdict to require, such as good; other kinds and uncertain verdicts end with exit
     status 10 to 13 or 18. null accepts all kinds."""
     task: TaskChanges = no_changes()
@@ -46,7 +46,7 @@ class ExplainCommand(CommandSettings, ExplainSettings):
         print(done)
         verdicts = [numbers["verdict"] for numbers in done.numbers.values()]
         refused = [v for v in verdicts if not (v["certain"] and v["kind"] == self.require)]
-        statuses = [verdict["exit_code"] or Kind.NONE.exit_code for verdict in refused]
+        statuses = [verdict["exit_code"] or VerdictKind.NONE.exit_code for verdict in refused]
         return max(statuses if self.require else (), default=0), str(done.report)
 
 

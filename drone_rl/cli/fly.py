@@ -28,7 +28,7 @@ class FlyCommand(AppearanceCommandSettings, FlySettings):
 
     def run(self, folder: Path) -> tuple[int, None]:
         """Serve the page until Ctrl-C; return the exit status."""
-        from drone_rl.evaluation.video import has_display  # imports torch
+        from drone_rl.trust.video import has_display  # imports torch
 
         policy = self.load_policy()
         given = self.as_base(FlySettings)

@@ -79,7 +79,7 @@ class ServeCommand(CommandSettings):
             _log.info("scene %s, clock %s, vehicles: %s", self.scene, self.clock, vehicles)
             print(f"ready: AirSim's clients can connect to {address}", flush=True)
             if self.watch:
-                from drone_rl.explanations.fly_page.watch import watch  # slow to import
+                from drone_rl.flight.fly_page.watch import watch  # slow to import
 
                 page = ending.enter_context(watch(simulation, asyncio.get_running_loop()))
                 print(f"open {page.url} to watch", flush=True)

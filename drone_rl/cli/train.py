@@ -19,9 +19,9 @@ from drone_rl.cli.hydra.searching import OptunaSweeper
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.config.commands import ProvableSettings
 from drone_rl.config.training import Logger, Tensorboard, TrainSettings
-from drone_rl.sweeps.manifest import read_result
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
+from drone_rl.utils.readers import read_result
 from drone_rl.utils.schema import Instance, Several, Whole
 from drone_rl.verification.text import describe_round
 

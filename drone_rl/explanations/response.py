@@ -1,4 +1,4 @@
-"""Sections on one target: "response" and "places" (maps over its place), and "asymmetry"."""
+"""Sections on one target: "response" (maps over its place) and "asymmetry"."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -9,81 +9,64 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.config import TaskSettings
-from drone_rl.config.commands import PlacesSettings
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.rollouts import run_to_end
 from drone_rl.explanations.scenes import Scenes, empty_scene, place_target
 from drone_rl.policies import ImageNetwork
-from drone_rl.sim.actions import MOVES, Actions
-from drone_rl.sim.tasks import CollectCubes, Grid, State
-from drone_rl.utils.errors import InputError
+from drone_rl.sim.actions import Actions
+from drone_rl.sim.tasks import Grid, State
 from drone_rl.utils.intervals import mean_interval
-from drone_rl.utils.seeding import Stream, legacy_seed, torch_generator
-from drone_rl.verification.prover.action_map import ActionMap, map_actions
-from drone_rl.verification.prover.arrangement import Window
-from drone_rl.verification.prover.cube_images import NOTHING, CameraModel, CubeImages
-from drone_rl.verification.prover.lattice import Lattice
-from drone_rl.verification.prover.policy_spec import check_task
+from drone_rl.utils.seeding import Stream, torch_generator
 
 BLIND = 0.1  # a policy is blind to a target that changes its action probabilities by less than this
 _RESPONSE, _OUTCOME = 0, 1  # numbers of the maps' grids
 
 
-def policy_response(context: Context) -> "ResponseMap":
-    """Return the response map of the policy, computed once."""
-    scenes, network, seed = context.scenes, context.network, context.seed.value
-    return context.shared("response", lambda: response_map(scenes, network, seed=seed))
-
-
-def response_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Return "response".
+def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Return "response", and "asymmetry": on the "dataset" and on the "grid" of the response map.
 
     Arrays: "response_..." and "outcome_...", the fields of `ResponseMap` and `OutcomeMap`.
     """
-    response = policy_response(context)
-    outcome = outcome_map(context.scenes, context.network, seed=context.seed.value)
+    scenes, network, seed = context.scenes, context.network, context.seed.value
+    data, actions = context.dataset, scenes.actions
+    response = response_map(scenes, network, seed=seed)
+    outcome = outcome_map(scenes, network, seed=seed)
     maps = {"response": vars(response), "outcome": vars(outcome)}
     arrays = {f"{n}_{key}": array for n, fields in maps.items() for key, array in fields.items()}
-    return {"response": summarise(response, outcome, context.scenes.task.strata)}, arrays
-
-
-def asymmetry_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Return "asymmetry": on the "dataset" and on the "grid" of the response map."""
-    data, actions = context.dataset, context.scenes.actions
-    seen = data.tensor("observations")
+    on_frames = asymmetry(network, data.tensor("observations"), data.episode, actions)
     numbers = {
-        "dataset": asymmetry(context.network, seen, data.episode, actions),
-        "grid": grid_asymmetry(policy_response(context), actions),
+        "response": summarise(response, outcome, scenes.task.strata),
+        "asymmetry": {"dataset": on_frames, "grid": grid_asymmetry(response, actions)},
     }
-    return {"asymmetry": numbers}, {}
+    return numbers, arrays
 
 
-@dataclasses.dataclass
-class ResponseMap:
-    """Action probabilities for one target at each place of a grid: Z up, F ahead, L sideways."""
+@dataclasses.dataclass(kw_only=True)
+class TargetGrid:
+    """Places of one target: Z up, F ahead, L sideways."""
 
     height: NDArray  # (Z,); metres above the drone
     forward: NDArray  # (F,); metres ahead of it
     lateral: NDArray  # (L,); metres to its left
-    probabilities: NDArray  # (Z, F, L, A)
-    without_target: NDArray  # (A,); action probabilities without a target
     oracle: NDArray  # (L,); the needed action: a turn where flying straight on would miss
     stratum: NDArray  # (L,); the task's stratum of a target there: its side
+
+
+@dataclasses.dataclass(kw_only=True)
+class ResponseMap(TargetGrid):
+    """Action probabilities for one target at each place."""
+
+    probabilities: NDArray  # (Z, F, L, A)
+    without_target: NDArray  # (A,); action probabilities without a target
     blind: NDArray  # (Z, F, L) bool; see `find_blind`
 
 
-@dataclasses.dataclass
-class OutcomeMap:
-    """Whether greedy rollouts reach a target at each place; fields as in `ResponseMap`."""
+@dataclasses.dataclass(kw_only=True)
+class OutcomeMap(TargetGrid):
+    """Whether greedy rollouts reach a target at each place."""
 
-    height: NDArray  # (Z,)
-    forward: NDArray  # (f,)
-    lateral: NDArray  # (l,)
-    collected: NDArray  # (Z, f, l) bool
-    oracle: NDArray  # (l,)
-    stratum: NDArray  # (l,)
+    collected: NDArray  # (Z, F, L) bool
 
 
 def response_map(
@@ -232,75 +215,9 @@ def asymmetry(
     }
 
 
-def grid_asymmetry(response: ResponseMap, actions: Actions) -> dict[str, Any]:
+def grid_asymmetry(response: ResponseMap, actions: Actions) -> dict[str, float]:
     """Compare a response map with its mirror image, which is the map read backwards."""
     here, there = response.probabilities, actions.mirror(response.probabilities[:, :, ::-1])
-    signed, distance = (
-        actions.prob_left(here) - actions.prob_left(there),
-        actions.distance(here, there),
-    )
-    at = np.unravel_index(distance.argmax(), distance.shape)
-    places = zip(("height", "forward", "lateral"), at, strict=True)
-    return {
-        "signed": float(signed.mean()),
-        "absolute": float(distance.mean()),
-        "worst": {
-            "distance": float(distance.max()),
-            **{axis: float(getattr(response, axis)[i]) for axis, i in places},
-        },
-    }
-
-
-_COMPARED = 1000
-"""Rendered frames that are compared with the closed form; fewer than in `drone-rl places`."""
-
-
-def places_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Return "places", or why it is "refused" if no exact map is known for this configuration.
-
-    Arrays: "places_..." of the outlines, see `ActionMap.outlines`.
-    """
-    settings = PlacesSettings()
-    try:
-        found = _exact_map(context, settings)
-    except InputError as error:
-        return {"places": {"refused": str(error)}}, {}
-    arrays = {f"places_{name}": array for name, array in found.outlines().items()}
-    return {"places": found.summary(settings.logit_gap)}, arrays
-
-
-def _exact_map(context: Context, settings: PlacesSettings) -> ActionMap:
-    """Compute the exact map; raise InputError with the reason if the policy has none."""
-    scenes, network = context.scenes, context.network
-    if not isinstance(scenes.task, CollectCubes):
-        raise InputError("its task is not cube collection")
-    if scenes.actions != MOVES:
-        raise InputError(f"it does not choose among {', '.join(MOVES.names)}")
-    if scenes.memory:
-        raise InputError("it observes a stack of frames, so its actions depend on earlier frames")
-    task: TaskSettings = scenes.task.settings
-    check_task(task)
-    if not network.has_weights:
-        raise InputError("it is not a torch module, so its rounding error has no bound")
-    if scenes.is_ambiguous:
-        raise InputError(
-            "its camera has faults or its appearance has ranges, so one place has several images"
-        )
-    camera = CameraModel.of(task, scenes.worlds.camera)
-    images = CubeImages(scenes.worlds, Lattice(task), camera)
-    images.check(_COMPARED, np.random.RandomState(legacy_seed(context.seed.value)))
-
-    def render(faces: NDArray[np.uint8]) -> Tensor:
-        """Return observations from the cube's face at each pixel."""
-        shown = torch.from_numpy(faces).long()
-        is_open = (shown == NOTHING)[..., None]
-        return scenes.transform(torch.where(is_open, images.background, images.colors[shown]))
-
-    return map_actions(
-        camera,
-        Window(max(settings.nearest, task.cube_size), settings.farthest, settings.sideways),
-        render,
-        network.eval(),
-        touch_distance=task.touch_distance,
-        most_cells=settings.most_cells,
-    )
+    signed = actions.prob_left(here) - actions.prob_left(there)
+    distance = actions.distance(here, there)
+    return {"signed": float(signed.mean()), "absolute": float(distance.mean())}

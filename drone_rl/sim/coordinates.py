@@ -1,12 +1,20 @@
-"""Conversions of coordinates: NED, ENU and FRD frames, latitude and longitude.
+"""Conversions of coordinates: NED, ENU and FRD frames, angles, latitude and longitude.
 
 Our frames are x forward (north), y left, z up, for the world and for bodies. NED is north, east,
 down, with bodies forward, right, down (FRD), as in AirSim and PX4. ENU is east, north, up, as in
 ROS. Unit quaternions (w, x, y, z) rotate the body's frame into the world's.
+
+Angles are as Fig. 4 of the chapter and AirSim have them: to a pilot, positive roll lowers the right
+side, positive pitch raises the nose, and positive yaw turns to the right, clockwise from above. The
+simulator's drone frame has x forward, y left and z up, where rotations about y and z have the other
+sign. Positions and velocities are in the simulator's frames everywhere; AirSim's own have y to the
+right and z down.
 """
 
+import dataclasses
 import math
-from typing import Any, NamedTuple, TypeVar
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 import torch
@@ -54,6 +62,49 @@ def _signed(values: Values, signs: tuple[float, ...]) -> Values:
     if isinstance(values, Tensor):
         return values * torch.tensor(signs, dtype=values.dtype, device=values.device)
     return values * np.array(signs, dtype=values.dtype)
+
+
+Angles = tuple[float, float, float]
+_VERTICAL = 1.0 - 1e-12
+"""Sine of the pitch above which roll and yaw can't be distinguished."""
+
+
+def to_simulator(roll: float, pitch: float, yaw: float) -> Angles:
+    """Convert a pilot's angles or rates about the drone's axes to the simulator's; units kept."""
+    return roll, 0.0 - pitch, 0.0 - yaw  # not -0.0
+
+
+def to_pilot(roll: float, pitch: float, yaw: float) -> Angles:
+    """Convert the simulator's angles or rates about the drone's axes to a pilot's; units kept."""
+    return roll, 0.0 - pitch, 0.0 - yaw  # not -0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Attitude:
+    """Orientation in degrees, applied in the order yaw, pitch, roll; signs as a pilot has them.
+
+    With the nose straight up or down, where yaw and roll turn about the same axis, roll is 0.
+    """
+
+    roll: float
+    """Positive with the right side down."""
+    pitch: float
+    """Positive with the nose up."""
+    yaw: float
+    """Positive to the right of the world's x axis."""
+
+    @classmethod
+    def of(cls, quaternion: Sequence[float]) -> Self:
+        """Convert a unit quaternion (w, x, y, z); straight up or down the roll is 0."""
+        w, x, y, z = quaternion
+        sine = 2.0 * (w * y - z * x)
+        if abs(sine) > _VERTICAL:  # roll and yaw turn about the same axis
+            pitch, yaw = math.copysign(math.pi / 2, sine), 2.0 * math.atan2(z, w)
+            return cls(*np.degrees(to_pilot(0.0, pitch, math.remainder(yaw, math.tau))).tolist())
+        roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+        pitch = math.asin(sine)
+        yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        return cls(*np.degrees(to_pilot(roll, pitch, yaw)).tolist())
 
 
 EQUATOR_RADIUS, FLATTENING = 6378137.0, 1 / 298.257223563

@@ -16,12 +16,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from drone_rl.sweeps.manifest import THREADS, Run, Sweep, read_result
+from drone_rl.sweeps.manifest import THREADS, Run, Sweep
 from drone_rl.utils.errors import InputError, extra
 from drone_rl.utils.files import is_locked, read_tail, write_atomically
 from drone_rl.utils.limits import LOG_BYTES
 from drone_rl.utils.provenance import num_cores
 from drone_rl.utils.ray_cluster import connect
+from drone_rl.utils.readers import read_result
 from drone_rl.utils.schema import OneOf
 
 PROGRAM = (sys.executable, "-m", "drone_rl.cli.main")

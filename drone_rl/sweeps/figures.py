@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from drone_rl.evaluation.rule import KINDS
 from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.sweeps.rows import Row
 from drone_rl.sweeps.summary import FAILED, Group, median_band, on_grid
+from drone_rl.trust.rule import KINDS
 from drone_rl.utils.palette import BAD, FAINT, GOOD, MUTED, ONE_SIDED, css, light
 
 FAVOURITE_AXIS = "optimizer.lr"

@@ -10,24 +10,29 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from drone_rl.config.configuration import check_same_config
-from drone_rl.config.training import TrainSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import (
     last_of,
-    parse_json,
-    read_bytes,
     read_json,
     refuse_links,
     write_atomically,
 )
-from drone_rl.utils.limits import RESULT_BYTES, SWEEP_BYTES
+from drone_rl.utils.limits import SWEEP_BYTES
 from drone_rl.utils.overrides import COMMAND, MOST_OVERRIDES, check_harmless
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.readers import with_current_names
-from drone_rl.utils.schema import Maybe, Plain, Record, Several, Text, Whole, as_mapping, shown
-from drone_rl.utils.settings import current_names
+from drone_rl.utils.schema import (
+    Maybe,
+    OneOf,
+    Plain,
+    Record,
+    Several,
+    Text,
+    Whole,
+    as_mapping,
+    shown,
+)
 
-FORMAT = "drone_rl sweep"
+FORMAT = "drone_rl sweep, version 2"
 MAY_CHANGE = ("resume", "logger", "paths", "trainer.checkpoint_interval_s", "renderer")
 """Settings that may differ when a sweep is resumed."""
 _LEVELS = 100
@@ -47,7 +52,7 @@ _RUN = Record(
 )
 _SWEEP = Record(
     {
-        "format": Text(),
+        "format": OneOf((FORMAT,)),
         "command": COMMAND,
         "settings": Plain(),
         "runs": Several(_RUN, 0, 10_000),
@@ -92,17 +97,6 @@ class Run:
         settings = [o for o in self.overrides if not o.startswith("trial=")]
         alone = ["hydra.mode=RUN"] if is_sweep(settings) else []  # a file of conf/sweep is chosen
         return shlex.join(["drone-rl", "train", *settings, *alone])
-
-
-def read_result(folder: Path) -> dict[str, Any] | None:
-    """Return `result.json` of a finished run, or None for an unfinished one."""
-    try:
-        content = read_bytes(folder / "result.json", RESULT_BYTES)
-        result = as_mapping(parse_json(content, "result", allow_nan=True), "result")
-        reason = Text(100).read(result.get("reason"), "reason")
-    except InputError:
-        return None
-    return None if reason.startswith("SIG") else with_current_names(result)
 
 
 def read_failure(run: Run) -> str | None:
@@ -174,12 +168,12 @@ def read_sweep(folder: Path) -> Sweep:
         if len({run.number for run in runs}) < len(runs):
             raise InputError("two runs have the same number")
         check_folders(runs)
-        given = as_mapping(content["settings"], "settings")
-        settings = current_names(TrainSettings, given)
+        settings = dict(as_mapping(content["settings"], "settings"))
         return Sweep(folder, content["command"], settings, runs)
     except InputError as error:
         raise InputError(
-            f"{path} is damaged ({error}); move the folder away and sweep again"
+            f"{path} is damaged, or of an older version of drone_rl ({error}); move the folder "
+            "away and sweep again"
         ) from None
 
 

@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, Any
 from markupsafe import Markup, escape
 
 from drone_rl.sweeps import figures
-from drone_rl.sweeps.manifest import Sweep, read_result, read_sweep
+from drone_rl.sweeps.manifest import Sweep, read_sweep
 from drone_rl.sweeps.rows import read_rows
 from drone_rl.sweeps.summary import Group, make_groups, summarise_sweep, to_csv
 from drone_rl.utils.display import content_security_policy, page_environment, static_text
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, last_of, newest, write_atomically
+from drone_rl.utils.readers import read_result
 from drone_rl.utils.text import seed_line
 
 if TYPE_CHECKING:
@@ -122,7 +123,7 @@ def judge_run(
     Raises:
         InputError: The run has no result, or its last checkpoint is unusable or of another frame.
     """
-    from drone_rl.evaluation.verdict import judge_for_selection  # imports torch
+    from drone_rl.trust.verdict import judge_for_selection  # imports torch
 
     with folder_lock(folder):
         result = read_result(folder)

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drone_rl.evaluation.rule import SIDES, Kind, Rule
-from drone_rl.sweeps.manifest import Run, Sweep, read_failure, read_result
+from drone_rl.sweeps.manifest import Run, Sweep, read_failure, read_sweep
+from drone_rl.trust.rule import SIDES, Rule, VerdictKind
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.limits import SWEEP_RESULTS_BYTES, Allowance
-from drone_rl.utils.readers import NAMES_OF_0_1, TablesAllowance, read_table
+from drone_rl.utils.readers import read_result, read_table
 from drone_rl.utils.schema import Flag, Maybe, OneOf, Real, Whole
 
 Array = NDArray[np.float64]
@@ -64,7 +63,7 @@ class Row:
     @property
     def kind(self) -> str | None:
         """One of `KINDS`, without sides; None without a verdict."""
-        return None if self.verdict is None else Kind(self.verdict["kind"]).family
+        return None if self.verdict is None else VerdictKind(self.verdict["kind"]).family
 
     @property
     def is_certain(self) -> bool:
@@ -125,17 +124,12 @@ class Row:
 
 
 def read_rows(sweep: Sweep) -> list[Row]:
-    """Read one row for each run; too large result files in total are an `InputError`."""
-    results, metrics = Allowance(SWEEP_RESULTS_BYTES), TablesAllowance()
-    for run in sweep.runs:
-        for path in (run.folder / "result.json", run.failure):
-            with contextlib.suppress(OSError):  # bound the total size; each reader bounds its file
-                results.take(path.stat().st_size, f"the results of {sweep.folder}: {path.name}")
+    """Read one row for each run."""
     choices = [_choice(run) for run in sweep.runs]
     keys = list(dict.fromkeys(key for choice in choices for key in choice))
     swept = [key for key in keys if len({choice.get(key) for choice in choices}) > 1]
     return [
-        _read_row(run, {key: choice.get(key, "") for key in swept}, sweep.name_of(run), metrics)
+        _read_row(run, {key: choice.get(key, "") for key in swept}, sweep.name_of(run))
         for run, choice in zip(sweep.runs, choices, strict=True)
     ]
 
@@ -145,18 +139,18 @@ def _choice(run: Run) -> dict[str, str]:
     return {key.lstrip("+"): value for key, _, value in parts if key != "trial"}
 
 
-def _read_row(run: Run, choice: dict[str, str], folder: str, metrics: TablesAllowance) -> Row:
+def _read_row(run: Run, choice: dict[str, str], folder: str) -> Row:
     result = read_result(run.folder)
     error = read_failure(run)
     if result is None:
         row = Row(run, choice, folder, "unfinished" if error is None else "failed", error)
         with contextlib.suppress(ValueError, KeyError, TypeError):
             if error is not None:  # a failed run may have metrics
-                _, (row.frames, row.seconds), row.entropy = _read_metrics(run.folder, 1, metrics)
+                _, (row.frames, row.seconds), row.entropy = _read_metrics(run.folder, 1)
         return row
     try:
         _check_result(result)
-        curve, _, entropy = _read_metrics(run.folder, result["largest_reward"], metrics)
+        curve, _, entropy = _read_metrics(run.folder, result["largest_reward"])
         _check_curve(curve)
         had = float(result["frames"]), float(result["seconds"])
         row = Row(run, choice, folder, "finished", None, result, curve, *had, entropy)
@@ -172,7 +166,7 @@ def _read_row(run: Run, choice: dict[str, str], folder: str, metrics: TablesAllo
     return row
 
 
-_KIND = OneOf(tuple(kind.value for kind in Kind))
+_KIND = OneOf(tuple(kind.value for kind in VerdictKind))
 _RESULT = {
     "frames": Whole(0, 10**15),
     "episodes": Whole(0, 10**12),
@@ -198,10 +192,10 @@ def _check_curve(curve: tuple[Array, Array]) -> None:
 
 
 def _read_metrics(
-    folder: Path, largest_reward: float, allowance: TablesAllowance
+    folder: Path, largest_reward: float
 ) -> tuple[tuple[Array, Array], tuple[float, float], float | None]:
     """Return the learning curve, the final frames and seconds, and the final entropy."""
-    rows = _metrics_columns(folder / "metrics.csv", allowance)
+    rows = _metrics_columns(folder / "metrics.csv")
     frames, rewards, seconds, entropies = rows.T
     had = (float(frames[-1]), float(seconds[-1])) if len(rows) else (0.0, 0.0)
     if not all(0 <= value < _MAX_VALUE for value in had):
@@ -223,11 +217,10 @@ _COLUMNS = {
 """Columns read from `metrics.csv`, with the value of an empty or missing cell (None: required)."""
 
 
-def _metrics_columns(path: Path, allowance: TablesAllowance) -> Array:
+def _metrics_columns(path: Path) -> Array:
     """Return the `_COLUMNS` of each update. Shape: (num_updates, 4)."""
-    rows = read_table(path, allowance)
-    header = [NAMES_OF_0_1.get(name, name) for name in next(rows, [])]
-    places = {name: place for place, name in enumerate(header)}
+    rows = read_table(path)
+    places = {name: place for place, name in enumerate(next(rows, []))}
     for name, empty in _COLUMNS.items():
         if empty is None and name not in places:
             raise InputError(f"metrics.csv has no column {name}")
@@ -241,3 +234,20 @@ def _metrics_columns(path: Path, allowance: TablesAllowance) -> Array:
 def _cell(row: list[str], place: int | None) -> str:
     """Return the text in a column; empty if the row or the table lacks it."""
     return "" if place is None or place >= len(row) else row[place]
+
+
+def choice_in_sweep(checkpoint: Path) -> tuple[str, dict[str, Any]] | None:
+    """Return the command that repeats a checkpoint's run, and how it was chosen in its sweep.
+
+    That is "runs", the number of runs in the sweep, and "episodes", the number by which it was
+    judged there. None if it is no checkpoint of a sweep's run.
+    """
+    folder = checkpoint.absolute().parent.parent
+    if checkpoint.suffix != ".pt" or not (folder.parent / "sweep.json").is_file():
+        return None
+    rows = read_rows(read_sweep(folder.parent))
+    row = next((row for row in rows if row.run.folder == folder), None)
+    if row is None:
+        return None
+    episodes = None if row.verdict is None else row.verdict["greedy"]["episodes"]
+    return row.run.repeat_command(), {"runs": len(rows), "episodes": episodes}

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from drone_rl.evaluation.rule import KINDS
 from drone_rl.sweeps.manifest import Run, Sweep, quoted
 from drone_rl.sweeps.rows import Array, Row
 from drone_rl.sweeps.text import GROUP_SENTENCES, SENTENCES
+from drone_rl.trust.rule import KINDS
 from drone_rl.utils.intervals import median_bounds, proportion
 from drone_rl.utils.text import said
 

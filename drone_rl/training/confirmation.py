@@ -7,8 +7,8 @@ from typing import Any
 from torch import nn
 from torchrl.envs import TransformedEnv
 
+from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.config.training import TrainSettings
-from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import describe
 from drone_rl.utils.seeding import Stream

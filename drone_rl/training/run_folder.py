@@ -23,7 +23,8 @@ from drone_rl.config.training import CloningSettings, TrainSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.recurrent import refusal
 from drone_rl.policies.zoo import describe, read_checkpoint
-from drone_rl.sim.tasks import as_settings, as_task
+from drone_rl.sim.actions import Actions
+from drone_rl.sim.tasks import Task, as_settings, as_task
 from drone_rl.training.callbacks import CheckpointCallback
 from drone_rl.training.cloning import Cloning
 from drone_rl.training.confirmation import Confirmation
@@ -43,7 +44,7 @@ from drone_rl.utils.files import (
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import Real, shown
-from drone_rl.utils.settings import current_names, kinds_of
+from drone_rl.utils.settings import kinds_of
 
 _log = logging.getLogger(__name__)
 MAY_CHANGE = (
@@ -171,7 +172,6 @@ class RunFolder:
                 demonstrations for a recurrent policy or for resuming a run that began without any.
         """
         folder, found = settings.demonstrations, []
-        _check_judged(settings)
         if state is not None:
             check_same_config(_own(state["config"]), as_config(settings), MAY_CHANGE)
             if folder is not None and "cloning" not in state:
@@ -214,16 +214,27 @@ class RunFolder:
         write_atomically(self.path / "run.yaml", text)
 
 
-def _check_judged(settings: TrainSettings) -> None:
+@dataclasses.dataclass(frozen=True)
+class Judge:
+    """What judges the last policy of a run; `drone_rl.train` takes that of `drone_rl.trust`."""
+
+    check: Callable[[Task[Any], Actions], None]
+    """Raises an `InputError` if it can't judge policies in a task, with such actions."""
+    verdict: Callable[[Path, int, str, str], tuple[dict[str, Any], dict[str, Any]]]
+    """Takes a checkpoint, number of episodes, device and renderer; returns the verdict, as in
+    verdict.json, and the checkpoint's progress."""
+
+
+def check_judge(settings: TrainSettings, judge: Judge | None) -> None:
     """Refuse, before the training, a task that the verdict after it would refuse."""
     if not settings.evaluate_after:
         return
-    from drone_rl.evaluation.verdict import check_judged  # slow to import
-
+    given = f"evaluate_after={settings.evaluate_after}"
+    if judge is None:
+        raise InputError(f"{given} needs a judge; give judge=, as drone_rl.train does")
     try:
-        check_judged(as_task(settings.task), describe(settings).make_dynamics().actions)
+        judge.check(as_task(settings.task), describe(settings).make_dynamics().actions)
     except InputError as error:
-        given = f"evaluate_after={settings.evaluate_after}"
         raise InputError(f"{given}: {error}; or give evaluate_after=0") from None
 
 
@@ -268,14 +279,13 @@ def result_of(
     return {**own, **confirmed, **cloned}
 
 
-def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Training:
+def finish(
+    settings: TrainSettings, folder: Path, result: dict[str, Any], judge: Judge | None
+) -> Training:
     """Judge the last policy if settings request it and no signal came; write `result.json`."""
-    if settings.evaluate_after and not result["reason"].startswith("SIG"):
-        from drone_rl.evaluation.verdict import judge_for_selection  # slow to import
-
+    if settings.evaluate_after and judge and not result["reason"].startswith("SIG"):
         last, episodes = last_of(folder), settings.evaluate_after
-        given = (settings.device, settings.renderer)
-        result["verdict"], _ = judge_for_selection(last, episodes, *given)
+        result["verdict"], _ = judge.verdict(last, episodes, settings.device, settings.renderer)
     write_atomically(folder / "result.json", json.dumps(result, indent=2, allow_nan=False))
     return Training(folder, result["reason"], result)
 
@@ -308,8 +318,7 @@ def reraise_signal(training: Training, function: str = "train") -> Training:
 
 def _own(config: Mapping[str, Any]) -> dict[str, Any]:
     """Return the training settings of a checkpoint."""
-    given = current_names(TrainSettings, config)
-    return {k: v for k, v in given.items() if k in kinds_of(TrainSettings)}
+    return {k: v for k, v in config.items() if k in kinds_of(TrainSettings)}
 
 
 def settings_for(

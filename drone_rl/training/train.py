@@ -29,7 +29,7 @@ from drone_rl.training.cloning import clone
 from drone_rl.training.components import Components, Group
 from drone_rl.training.confirmation import Confirmation
 from drone_rl.training.learners import NotANumberError, ReinforceLearner
-from drone_rl.training.run_folder import RunFolder, Training
+from drone_rl.training.run_folder import Judge, RunFolder, Training
 from drone_rl.training.trainer import Trainer
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.memory import bound_kernels
@@ -48,6 +48,7 @@ def train(
     resume: bool = False,
     callbacks: Sequence[Callback] = (),
     progress: Progress | None = None,
+    judge: Judge | None = None,
     **changes: Any,
 ) -> Training:
     """Train one policy, or resume its training.
@@ -60,6 +61,7 @@ def train(
         resume: Whether to resume the run in the folder; on a CPU bit for bit.
         callbacks: Called after every update, besides those that write checkpoints and metrics.
         progress: Called with the progress; a bar by default.
+        judge: Judges the last policy if `evaluate_after` requests it; `drone_rl.train` passes one.
         changes: Settings by name, as in `train(seed=1)`; `task` may also be a `Task` object.
 
     Raises:
@@ -71,8 +73,10 @@ def train(
     hooks = with_progress(callbacks, progress)
     run, state = RunFolder.open(folder, resume)
     settings = run_folder.settings_for(settings, state, changes, train)
+    run_folder.check_judge(settings, judge)
     with run.locked(is_new=state is None):
-        training = run_folder.finish(settings, run.path, learn(settings, run.path, state, hooks))
+        result = learn(settings, run.path, state, hooks)
+        training = run_folder.finish(settings, run.path, result, judge)
     return run_folder.reraise_signal(training)
 
 

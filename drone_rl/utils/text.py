@@ -5,6 +5,7 @@ the JSON files, so that a test can change the evidence and see the sentence chan
 """
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -100,6 +101,10 @@ def percent(share: float, digits: int = 1) -> str:
     return f"less than {step:g}%" if float(text[:-1]) <= 0 else text
 
 
+exact_percent = functools.partial(percent, digits=2)
+"""Returns a known fraction in percent with two decimals."""
+
+
 def interval(figure: Mapping[str, Any]) -> str:
     """Return the 95% confidence interval of a rate, in percent."""
     return " to ".join(hundredfold(figure[end]) for end in ("lower95", "upper95"))
@@ -132,16 +137,9 @@ def is_fixed(evidence: Evidence) -> bool:
     return bool(evidence.get("seed_is_fixed", True))
 
 
-def seed_of(evidence: Evidence) -> int | None:
-    """Return the seed, which older results have in their settings; None if it is not recorded."""
-    settings = evidence.get("settings")
-    older = settings.get("seed") if isinstance(settings, Mapping) else None
-    return evidence.get("seed", older)
-
-
 def seed_line(evidence: Evidence, what: str = "environments") -> str:
     """Return the seed of a result and its origin; `what` is sampled from its streams."""
-    seed, kind = seed_of(evidence), "fixed" if is_fixed(evidence) else "fresh"
+    seed, kind = evidence.get("seed"), "fixed" if is_fixed(evidence) else "fresh"
     return f"{what}: seed {'not recorded' if seed is None else seed} ({kind})"
 
 
@@ -149,7 +147,7 @@ def fixed_seed(name: str, what: str = "environments") -> Sentence:
     """Return the warning about a seed that was known before; `what` is sampled from its streams."""
 
     def text(evidence: Evidence) -> str:
-        seed = seed_of(evidence)
+        seed = evidence.get("seed")
         known = f"Fixed {what}" if seed is None else f"Fixed seed {seed}"
         return f"{known}: a policy could have been fitted to these {what}."
 
@@ -159,7 +157,7 @@ def fixed_seed(name: str, what: str = "environments") -> Sentence:
 BODIES = (fixed_seed("bodies.fixed_seed"),)
 """Evidence: `bodies.json`."""
 LOOPED = (fixed_seed("looped.fixed_seed"),)
-"""Evidence: see `drone_rl.robustness.sitl.SitlEvaluation.as_dict`."""
+"""Evidence: see `drone_rl.flight.sitl_evaluation.SitlEvaluation.as_dict`."""
 CHANCES = (fixed_seed("chances.fixed_seed", "placements"),)
 """Evidence: `chances.json` of held-out placements; those that a user gives have no seed."""
 CHECK = (fixed_seed("check.fixed_seed", "placements"),)

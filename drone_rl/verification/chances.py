@@ -22,7 +22,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, Stream, with_seed, world_random_state
-from drone_rl.utils.text import CHANCES, say, seed_line
+from drone_rl.utils.text import CHANCES, exact_percent, say, seed_line
 from drone_rl.verification.prover.lattice import explore, shape_of
 from drone_rl.verification.prover.markov_chain import (
     NodeEvaluator,
@@ -33,7 +33,6 @@ from drone_rl.verification.prover.markov_chain import (
 )
 from drone_rl.verification.prover.policy_spec import make_policy_spec
 from drone_rl.verification.requirements import require_cubes
-from drone_rl.verification.text import exact_percent
 
 _BOUNDS = {
     "least": "everywhere at least",

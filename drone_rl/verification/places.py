@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from drone_rl.config.commands import PlacesSettings
 from drone_rl.config.configuration import as_changes, from_arguments
-from drone_rl.evaluation.plots import regions
+from drone_rl.explanations.report.places import rows, say_places
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.vocabulary import SHOWN_MOVES
+from drone_rl.trust.plots import regions
 from drone_rl.utils.display import Result, aligned, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
@@ -27,7 +28,6 @@ from drone_rl.utils.threads import torch_threads
 from drone_rl.verification.prover.action_map import ActionMap, map_actions
 from drone_rl.verification.prover.arrangement import Window
 from drone_rl.verification.prover.policy_spec import make_policy_spec
-from drone_rl.verification.text import rows, say_places
 
 
 @dataclasses.dataclass(frozen=True)

@@ -14,6 +14,7 @@ import numpy as np
 from drone_rl.config.commands import ProveSettings
 from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.policies.policy import Policy, load_policy
+from drone_rl.policies.zoo import fingerprint
 from drone_rl.utils.display import Result, aligned, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import (
@@ -25,13 +26,12 @@ from drone_rl.utils.files import (
     remove_leftovers,
     write_atomically,
 )
-from drone_rl.utils.limits import ARRAYS_BYTES, CERTIFICATE_BYTES, CERTIFICATE_VALUES
+from drone_rl.utils.limits import ARRAYS_BYTES, CERTIFICATE_BYTES
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.utils.text import plural
 from drone_rl.utils.threads import torch_threads
-from drone_rl.verification.checker.certificate import fingerprint
 from drone_rl.verification.prover.policy_spec import (
     PolicySpec,
     make_policy_spec,
@@ -216,7 +216,7 @@ def load_proof(path: str | Path) -> Proof:
     path = path / "certificate.json" if path.is_dir() else path
     content = read_bytes(path, CERTIFICATE_BYTES)
     try:
-        found = parse_json(content, "it", most_values=CERTIFICATE_VALUES)
+        found = parse_json(content, "it")
         if not isinstance(found, dict) or found.get("format") != FORMAT:
             raise InputError(f"its format is not {FORMAT!r}")
         if missing := {"policy", "outcomes", "undecided"} - found.keys():

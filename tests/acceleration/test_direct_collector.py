@@ -19,8 +19,8 @@ from drone_rl.envs import (
     with_transforms,
 )
 from drone_rl.envs.direct_renderer import DirectRenderer, Reasons
-from drone_rl.evaluation.baselines import make_baseline
 from drone_rl.policies import SmallCNN, make_actor
+from drone_rl.policies.baselines import make_baseline
 from tests.continuous import make_env as make_continuous_env
 from tests.continuous import make_policy
 

@@ -7,9 +7,9 @@ import pytest
 import drone_rl
 from benchmarks import domain_axes
 from benchmarks.domain_axes import bench_domain_axes
-from drone_rl.robustness.axes import AXES
-from drone_rl.robustness.shifts import ranges_of
-from tests.robustness.making import shifts_of
+from drone_rl.trust.axes import AXES
+from drone_rl.trust.shifts import ranges_of
+from tests.trust.making import shifts_of
 
 robust = drone_rl.load_policy(domain_axes.POLICY)
 
@@ -75,7 +75,7 @@ def test_two_sided_axes_are_tested_at_both_ends(tmp_path, count):
 def test_an_axis_that_is_enforced_in_the_wrong_direction_is_found(count, monkeypatch):
     """For example, a largest visibility in fog is required instead of a smallest one."""
     monkeypatch.setattr(
-        "drone_rl.verdicts.coverage.lacking",
+        "drone_rl.trust.coverage.lacking",
         lambda numbers, name, need: None if need["low"] is None else "reversed",
     )
     found = count(FakeShifts(("fog", "blur")))

@@ -8,7 +8,7 @@ import drone_rl
 from benchmarks import gamed_certificates
 from benchmarks.gamed_certificates import cases, forged_shifts
 from drone_rl.policies.zoo import shifts_path
-from drone_rl.verdicts.coverage import find_domain
+from drone_rl.trust.coverage import find_domain
 
 
 @pytest.fixture(scope="module", autouse=True)

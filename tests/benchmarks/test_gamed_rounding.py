@@ -5,9 +5,9 @@ import pytest
 
 from benchmarks import gamed_rounding
 from benchmarks.gamed_rounding import cases, judged_good, non_finite
-from drone_rl.robustness.shifts import shifts
+from drone_rl.trust.judge import judge
+from drone_rl.trust.shifts import shifts
 from drone_rl.utils.errors import InputError
-from drone_rl.verdicts.judge import judge
 from drone_rl.verification.prove import prove
 
 

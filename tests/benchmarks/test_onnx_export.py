@@ -4,7 +4,7 @@ import pytest
 
 from benchmarks import onnx_export
 from benchmarks.onnx_export import bench_onnx
-from drone_rl.verdicts.onnx_export import Agreement
+from drone_rl.trust.onnx_export import Agreement
 
 
 def test_a_shipped_policy_agrees_with_its_onnx_model(tmp_path):

@@ -11,7 +11,7 @@ from drone_rl.config import AppearanceSettings
 from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainSettings
 from drone_rl.config.transforms import Gray, Noise, Shift, Standardize
-from drone_rl.robustness.axes import AXES
+from drone_rl.trust.axes import AXES
 
 APPEARANCE = AppearanceSettings(
     exposure=(0.5, 2.0), fog_visibility=(40.0, 100.0), ground_color=((0, 0, 0), (1, 1, 1))

@@ -8,7 +8,7 @@ from benchmarks.robust_comparison import TOUCHED_BY, changed, touched_axes, unto
 from drone_rl.config import AppearanceSettings, CameraSettings, TaskSettings
 from drone_rl.config.training import TrainSettings
 from drone_rl.config.transforms import Blur, Fault, Gray, LateFrames, Noise, Shift, Standardize
-from drone_rl.robustness.axes import AXES, GROUPS
+from drone_rl.trust.axes import AXES, GROUPS
 from drone_rl.utils.settings import snake_case
 
 

@@ -6,9 +6,9 @@ import pytest
 
 from benchmarks.robust_comparison import PLAIN, by_kind, compare, mean
 from drone_rl.config import TaskSettings
-from drone_rl.robustness.axes import AXES
-from drone_rl.robustness.paired_evaluation import PairedEvaluator
-from tests.robustness.subjects import Blind, Steering, subject
+from drone_rl.trust.axes import AXES
+from drone_rl.trust.paired_evaluation import PairedEvaluator
+from tests.trust.subjects import Blind, Steering, subject
 
 AHEAD = TaskSettings(num_cubes=1, first_distance=8.0, front_margin=4.0, lateral_bound=0.0)
 

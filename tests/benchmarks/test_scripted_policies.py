@@ -6,10 +6,10 @@ import pytest
 import torch
 
 from benchmarks.scripted_policies import SCRIPTS, ScriptedPolicy
+from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation.baselines import run_baselines
-from drone_rl.evaluation.rollouts import run_episodes
-from drone_rl.evaluation.verdict import apply_rule
+from drone_rl.trust.baselines import run_baselines
+from drone_rl.trust.verdict import apply_rule
 from drone_rl.utils.seeding import RootSeed, Stream
 
 EPISODES = 400

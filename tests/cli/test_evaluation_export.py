@@ -16,7 +16,7 @@ def test_an_export_can_be_judged(in_process, tmp_path):
 
 
 def test_an_export_for_other_programs(in_process, tmp_path, monkeypatch):
-    monkeypatch.setattr("drone_rl.verdicts.onnx_export._STEPS", 5)  # a few images suffice here
+    monkeypatch.setattr("drone_rl.trust.onnx_export._STEPS", 5)  # a few images suffice here
     done = in_process("export", "policy=poor", "name=mine", "format=onnx", "hydra.run.dir=e")
     assert done.returncode == 0, done.stderr
     assert {path.name for path in (tmp_path / "e").iterdir()} == {".hydra", "mine.onnx"}

@@ -7,7 +7,7 @@ import pytest
 import drone_rl
 from tests.cli.running import drone_rl as run_program
 from tests.cli.running import error_line
-from tests.robustness.making import shifts_of
+from tests.trust.making import shifts_of
 from tests.verification.checker.making import of_every_place
 
 

@@ -14,6 +14,7 @@ import yaml
 from safetensors.torch import save
 
 from drone_rl.policies.zoo import parse
+from drone_rl.sweeps.manifest import FORMAT
 from tests.cli.running import error_line
 
 SECRET = "the canary's secret 4711"
@@ -33,7 +34,7 @@ DESCRIPTION = {
 PROGRESS = {"frames": 1, "episodes": 1, "updates": 1, "seconds": 1.0, "running_reward": 0.5}
 ORIGIN = {"versions": {"torch": "2"}, "git_revision": None}
 SWEEP = {
-    **{"format": "drone_rl sweep", "command": "drone-rl train -m seed=0,1", "settings": {}},
+    **{"format": FORMAT, "command": "drone-rl train -m seed=0,1", "settings": {}},
     **{"versions": {}, "git_revision": None, "machine": {}},
     "runs": [{"number": 0, "overrides": ["seed=0"], "folder": "0"}],
 }
@@ -92,7 +93,7 @@ def with_part(**parts):
 
 def checkpoint(**changes):
     state = {
-        **{"format": "drone_rl checkpoint", "format_version": 2, "policy": weights()},
+        **{"format": "drone_rl checkpoint", "format_version": 3, "policy": weights()},
         **{"config": {}, "description": DESCRIPTION, "progress": PROGRESS, "best": 0.5},
         "provenance": ORIGIN,
     }

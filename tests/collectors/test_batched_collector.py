@@ -13,7 +13,7 @@ from torchrl.envs import RewardSum, TransformedEnv
 from drone_rl.collectors import EpisodeCollector, RolloutCollector, take_rows
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation.baselines import oracle_policy
+from drone_rl.policies.baselines import oracle_policy
 from drone_rl.utils.errors import InputError
 
 TASK = TaskSettings(num_cubes=1, first_distance=3.0, step_limit=12, front_margin=3.0)

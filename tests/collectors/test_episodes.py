@@ -13,8 +13,8 @@ from torchrl.envs import EnvBase
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation.baselines import oracle_policy
 from drone_rl.objectives import RewardToGo
+from drone_rl.policies.baselines import oracle_policy
 from drone_rl.utils.errors import InputError
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import drone_rl
-from drone_rl.verdicts import onnx_export as exporting
+from drone_rl.trust import onnx_export as exporting
 
 PATH = Path(__file__).parents[2] / "examples" / "run_onnx.py"
 

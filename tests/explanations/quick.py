@@ -8,9 +8,13 @@ from collections.abc import Iterator
 import pytest
 from matplotlib.figure import Figure
 
-from drone_rl.evaluation.plots import saving
 from drone_rl.explanations import class_models, response
+from drone_rl.explanations.explain import SECTIONS
 from drone_rl.explanations.report import attribution
+from drone_rl.trust.plots import saving
+from drone_rl.verification.places_section import places_section
+
+ALL_SECTIONS = {**SECTIONS, "places": places_section}
 
 
 @contextlib.contextmanager

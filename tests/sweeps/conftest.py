@@ -7,9 +7,9 @@ import sys
 import numpy as np
 import pytest
 
-from drone_rl.evaluation.rule import BLIND_BASELINES, Kind, Rule
 from drone_rl.sweeps import executors
 from drone_rl.sweeps.manifest import Run, open_sweep
+from drone_rl.trust.rule import BLIND_BASELINES, Rule, VerdictKind
 from drone_rl.utils.intervals import mean_bounds, proportion
 
 FAKE = """
@@ -64,7 +64,9 @@ def _verdict(
     evidence = {
         "kind": kind,
         "certain": certain,
-        "exit_code": Kind(kind).exit_code if certain is True and kind in [*Kind] else 13,
+        "exit_code": VerdictKind(kind).exit_code
+        if certain is True and kind in [*VerdictKind]
+        else 13,
         "rule": Rule().text,
         "error_rate": 0.05,
         "good_share": 0.9,
@@ -127,7 +129,7 @@ SOLVED = {
     "episodes": 10,
     "seconds": 2.0,
     "running_reward": 2.97,
-    "num_cubes": 3,
+    "largest_reward": 3,
 }
 LEFT_LOST = _verdict("one-sided (right)", left=0.0, whole=0.6, certain=False)
 

@@ -11,9 +11,10 @@ import pytest
 
 from drone_rl.sweeps import executors
 from drone_rl.sweeps.executors import LocalExecutor, RayExecutor, SlurmExecutor, finish_run
-from drone_rl.sweeps.manifest import quoted, read_failure, read_result
+from drone_rl.sweeps.manifest import quoted, read_failure
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import num_cores
+from drone_rl.utils.readers import read_result
 
 pytestmark = pytest.mark.usefixtures("fake_training")
 

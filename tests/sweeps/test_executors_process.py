@@ -10,8 +10,9 @@ import pytest
 
 from drone_rl.sweeps import executors
 from drone_rl.sweeps.executors import RunProcess, describe_active, finish_run, note_failure
-from drone_rl.sweeps.manifest import Run, Sweep, read_failure, read_result
+from drone_rl.sweeps.manifest import Run, Sweep, read_failure
 from drone_rl.utils.files import folder_lock
+from drone_rl.utils.readers import read_result
 
 pytestmark = pytest.mark.usefixtures("fake_training")
 

@@ -92,12 +92,3 @@ def test_a_run_that_is_a_link_leads_nowhere(tmp_path, make_runs):
         read_sweep(tmp_path)
     with pytest.raises(InputError, match="0 is a link"):
         begin(tmp_path, make_runs("a=1"))
-
-
-def test_a_sweep_from_before_a_setting_was_renamed_goes_on(tmp_path, make_runs):
-    begin(tmp_path, make_runs("optimiser.lr=1", "optimiser.lr=2"), optimiser={"lr": 1})
-    sweep = begin(tmp_path, make_runs("optimizer.lr=1"), optimizer={"lr": 1})
-    assert [run.overrides for run in sweep.runs] == [("optimizer.lr=1",), ("optimizer.lr=2",)]
-    assert [run.folder for run in sweep.runs] == [
-        run.folder for run in make_runs("optimiser.lr=1", "optimiser.lr=2")
-    ]

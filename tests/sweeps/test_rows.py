@@ -78,11 +78,11 @@ def test_a_run_without_a_verdict_says_so(sweep):
     "broken",
     [
         {"frames": None},
-        {"num_cubes": None},
+        {"largest_reward": None},
         {"seconds": "long"},
         {"running_reward": float("nan")},
         {"episodes": True},
-        {"num_cubes": 0},
+        {"largest_reward": 0},
         {"verdict": "good"},
         {"verdict": []},
     ],
@@ -113,7 +113,7 @@ def test_an_incomplete_verdict_is_damaged(sweep, make_verdict, broken):
     [
         {"frames": -1},
         {"frames": 1.5},
-        {"num_cubes": 1e308},
+        {"largest_reward": 1e308},
         {"seconds": -1.0},
     ],
 )
@@ -177,16 +177,3 @@ def test_unreadable_metrics_are_damage_and_an_unreadable_result_must_be_made_aga
     (sweep.folder / "1" / "result.json").write_text("{")
     rows = read_rows(sweep)
     assert [row.state for row in rows] == ["damaged", "unfinished", "finished", "failed"]
-
-
-def test_a_run_from_before_the_running_reward_had_that_name(sweep):
-    before = read_rows(sweep)[0]
-    folder = sweep.folder / "0"
-    for name in ("metrics.csv", "result.json"):
-        text = (folder / name).read_text()
-        assert "running_reward" in text
-        (folder / name).write_text(text.replace("running_reward", "running_cubes"))
-    after = read_rows(sweep)[0]
-    assert after.plain() == before.plain()
-    assert after.curve[1].tolist() == before.curve[1].tolist() == pytest.approx([0.1, 0.5])
-    assert after.final_share == before.final_share == pytest.approx(0.99)

@@ -9,8 +9,8 @@ from drone_rl.sweeps.summary import best_rows, summarise_sweep, to_csv
 
 def test_five_cubes_are_no_merit(begin_sweep, make_verdict):
     """A share of 0.7 of five cubes is more cubes than all of three, but not better."""
-    many = {"num_cubes": 5, "running_reward": 3.5, "verdict": make_verdict("poor", whole=0.7)}
-    few = {"num_cubes": 2, "running_reward": 1.8, "verdict": make_verdict(whole=0.95)}
+    many = {"largest_reward": 5, "running_reward": 3.5, "verdict": make_verdict("poor", whole=0.7)}
+    few = {"largest_reward": 2, "running_reward": 1.8, "verdict": make_verdict(whole=0.95)}
     rows = read_rows(begin_sweep({"task.num_cubes=5": many, "task.num_cubes=1": few}))
     assert [row.error for row in rows] == [None, None]
     assert [row.run.number for row in best_rows(rows)] == [1, 0]

@@ -4,9 +4,9 @@ import copy
 
 import pytest
 
-from benchmarks.evidence import SWEEP
 from drone_rl.sweeps import text
 from drone_rl.utils.text import said
+from tests.evidence import SWEEP
 
 PARTS = ("curves.", "shares.", "sides.", "entropies.", "costs.")
 SENTENCES = [sentence for sentence in text.SENTENCES if sentence.name.startswith(PARTS)]

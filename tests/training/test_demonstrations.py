@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import torch
 
+from drone_rl.collectors.complete_episodes import StepLog, run_episodes
 from drone_rl.config import (
     ActionSettings,
     CameraSettings,
@@ -18,8 +19,7 @@ from drone_rl.config import (
 )
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation.baselines import oracle_policy
-from drone_rl.evaluation.rollouts import StepLog, run_episodes
+from drone_rl.policies.baselines import oracle_policy
 from drone_rl.training import demonstrations
 from drone_rl.training.demonstrations import (
     Demonstration,

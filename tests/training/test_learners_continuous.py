@@ -8,7 +8,7 @@ from tensordict import TensorDict
 from torchrl.objectives import A2CLoss, ClipPPOLoss
 
 from drone_rl.collectors import EpisodeCollector, RolloutCollector
-from drone_rl.evaluation.rollouts import run_episodes
+from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.objectives import Advantages, ReinforceLoss
 from drone_rl.objectives.estimators import LeaveOneOut
 from drone_rl.policies import MLP, ActorCritic, make_actor

@@ -5,6 +5,7 @@ from unittest.mock import patch
 import pytest
 import yaml
 
+import drone_rl
 from drone_rl.config import TASKS, DynamicsSettings
 from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainSettings
@@ -16,6 +17,7 @@ from drone_rl.training.run_folder import (
     settings_of,
     target_of,
 )
+from drone_rl.training.train import train
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import last_of
 from tests.second_task import Posts
@@ -95,4 +97,7 @@ def test_a_task_that_no_verdict_accepts_is_refused_before_the_training(tmp_path)
     with patch.dict(TASKS), patch.dict(MAKERS):
         settings = TrainSettings(task=as_settings(Unknown()), evaluate_after=10)
         with pytest.raises(InputError, match="evaluate_after=10: task=unknown has no oracle"):
-            RunFolder(tmp_path).prepare(settings, None)
+            drone_rl.train(settings, folder=tmp_path / "run")
+        assert not (tmp_path / "run").exists()
+        with pytest.raises(InputError, match="evaluate_after=10 needs a judge"):
+            train(settings, folder=tmp_path / "run")

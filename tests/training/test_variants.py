@@ -20,10 +20,10 @@ from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.config.transforms import EpisodeReward, Gray, Stack
 from drone_rl.training import ActorCriticLearner, ReinforceLearner
 from drone_rl.training.components import make_collector
+from drone_rl.trust.export import export
 from drone_rl.utils.checkpoint import load_checkpoint, save_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
-from drone_rl.verdicts.export import export
 
 TASK = TaskSettings(num_cubes=2, first_distance=4.0, spacing=4.0, front_margin=2.0, step_limit=29)
 TINY = TrainSettings(task=TASK, trainer=TrainerSettings(total_frames=180)).replace(
@@ -169,7 +169,7 @@ def test_resuming_within_episodes_equals_an_uninterrupted_run(settings, tmp_path
     assert torch.cat(counts).count_nonzero() > 0  # episodes are running
     again = drone_rl.train(folder=half.folder, resume=True, trainer=longer, progress=silent)
     one, two = checkpoint(whole), checkpoint(again)
-    for key in ("policy", "critic", "optimiser", "minibatches", "generators", "collector"):
+    for key in ("policy", "critic", "optimizer", "minibatches", "generators", "collector"):
         assert_same(one[key], two[key])
     progress = [
         {k: v for k, v in state["progress"].items() if k != "seconds"} for state in (one, two)

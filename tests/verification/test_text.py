@@ -2,8 +2,9 @@
 
 import pytest
 
-from benchmarks.evidence import EXPLANATION, changed
-from drone_rl.verification.text import exact_percent, rows, say_places
+from drone_rl.explanations.report.places import rows, say_places
+from drone_rl.utils.text import exact_percent
+from tests.evidence import EXPLANATION, changed
 
 
 def speak(**changes):

@@ -2,7 +2,7 @@
 
 import math
 
-from drone_rl.robustness.axes import AXES
+from drone_rl.trust.axes import AXES
 
 MEANINGS = {
     "object_color": "largest change of red, green and blue, which range from 0 to 1",

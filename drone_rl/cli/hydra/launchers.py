@@ -34,18 +34,11 @@ from drone_rl.sweeps.executors import (
     SlurmExecutor,
     describe_active,
 )
-from drone_rl.sweeps.manifest import (
-    Run,
-    Sweep,
-    check_folders,
-    inside,
-    open_sweep,
-    read_failure,
-    read_result,
-)
+from drone_rl.sweeps.manifest import Run, Sweep, check_folders, inside, open_sweep, read_failure
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock
 from drone_rl.utils.progress import Heartbeat
+from drone_rl.utils.readers import read_result
 from drone_rl.utils.text import plural
 
 _LONGEST_NAME = 180

@@ -13,10 +13,10 @@ from hydra.plugins.sweeper import Sweeper
 from hydra.types import HydraContext, TaskFunction
 from omegaconf import DictConfig, OmegaConf
 
-from drone_rl.sweeps.manifest import read_result
 from drone_rl.sweeps.search import import_optuna, next_trials, note_outcome, open_study
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import refuse_links
+from drone_rl.utils.readers import read_result
 from drone_rl.utils.schema import Whole, shown
 
 _log = logging.getLogger(__name__)

@@ -10,8 +10,8 @@ from torch import Tensor
 
 from drone_rl.flight.airsim.messages import to_world
 from drone_rl.flight.airsim.settings_file import CameraChoice, Capture, Offset
+from drone_rl.flight.image_types import ImageType
 from drone_rl.sim.entities import DRONE_CAMERAS, find_camera
-from drone_rl.sim.image_types import ImageType
 from drone_rl.sim.rendering import Mounting
 from drone_rl.sim.rendering.appearance import product, turned, zoom_for_fov
 

@@ -15,8 +15,8 @@ from PIL import Image
 from torch import Tensor
 
 from drone_rl.flight.airsim.messages import Pose
+from drone_rl.flight.image_types import ImageType
 from drone_rl.sim.entities import find_camera
-from drone_rl.sim.image_types import ImageType
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Flag, Real, Text, Whole
 

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from drone_rl.flight.airsim.recording import RECORDED, RECORDING, RecordingChoice, read_choice
+from drone_rl.flight.image_types import ImageType
 from drone_rl.sim.coordinates import HOME, GeoPoint
 from drone_rl.sim.entities import find_camera
-from drone_rl.sim.image_types import ImageType
 from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.files import read_bytes
 from drone_rl.utils.schema import Flag, Kind, Maybe, OneOf, Real, Text, Whole, shown

@@ -33,7 +33,7 @@ from drone_rl.flight.airsim.settings_file import (
 )
 from drone_rl.flight.airsim.stage import Stage
 from drone_rl.flight.airsim.vehicle import Vehicle
-from drone_rl.flight.commands.state import Attitude
+from drone_rl.sim.coordinates import Attitude
 from drone_rl.utils.errors import InputError, did_you_mean
 
 CLOCKS = ("wall", "lockstep")

@@ -19,9 +19,9 @@ from drone_rl.flight.airsim.messages import NO_POSE, Pose, ned, ned_attitude, to
 from drone_rl.flight.airsim.patterns import matching
 from drone_rl.flight.airsim.scenes import make_task
 from drone_rl.flight.airsim.settings_file import Capture
+from drone_rl.flight.image_types import ImageType, encode, pixels, segmentation_ids
 from drone_rl.sim.dynamics import BodyState
 from drone_rl.sim.entities import KINDS
-from drone_rl.sim.image_types import ImageType, encode, pixels, segmentation_ids
 from drone_rl.sim.rendering import Appearance, Distractors
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.rendering.view import Modality

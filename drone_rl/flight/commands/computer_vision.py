@@ -8,9 +8,9 @@ from torch import Tensor
 
 from drone_rl.flight.commands import checks
 from drone_rl.flight.commands.command import PilotError
-from drone_rl.flight.commands.conventions import to_simulator
 from drone_rl.flight.commands.drone import Drone
 from drone_rl.flight.commands.state import PilotState
+from drone_rl.sim.coordinates import to_simulator
 from drone_rl.sim.rendering.appearance import product
 from drone_rl.sim.tasks.common import PropTask
 from drone_rl.sim.worlds import Worlds

@@ -21,14 +21,14 @@ from drone_rl.flight.commands.command import (
     hold,
     period_ticks,
 )
-from drone_rl.flight.commands.conventions import to_simulator
 from drone_rl.flight.commands.path_following import GoHomeCommand
 from drone_rl.flight.commands.state import LandedState, PilotState, Sensors, Trajectory
+from drone_rl.flight.image_types import ImageRequest, images
+from drone_rl.sim.coordinates import to_simulator
 from drone_rl.sim.dynamics import FlightState, Goals, Obstacles, Quadrotor
 from drone_rl.sim.dynamics import state as fs
 from drone_rl.sim.dynamics.state import twist_about_z
 from drone_rl.sim.entities import FRONT_CENTER, find_camera
-from drone_rl.sim.image_types import ImageRequest, images
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.tasks import State
 from drone_rl.sim.worlds import Worlds

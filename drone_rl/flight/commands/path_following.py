@@ -15,7 +15,7 @@ from drone_rl.config import DynamicsSettings
 from drone_rl.config.dynamics import GRAVITY
 from drone_rl.flight.commands.checks import real
 from drone_rl.flight.commands.command import ACCURACY, PERIOD, Command, Land
-from drone_rl.flight.commands.conventions import to_simulator
+from drone_rl.sim.coordinates import to_simulator
 from drone_rl.sim.dynamics import FlightState, Goals, Mode
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Flag, OneOf

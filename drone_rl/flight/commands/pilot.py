@@ -20,7 +20,6 @@ from drone_rl.flight.commands.command import (
     goals_of,
 )
 from drone_rl.flight.commands.computer_vision import SceneDrone
-from drone_rl.flight.commands.conventions import to_simulator
 from drone_rl.flight.commands.path_following import (
     AUTOMATIC,
     TAKEOFF_HEIGHT,
@@ -33,6 +32,7 @@ from drone_rl.flight.commands.path_following import (
     YawMode,
     braking_time,
 )
+from drone_rl.sim.coordinates import to_simulator
 from drone_rl.sim.dynamics import FlightState, Goals, Mode
 from drone_rl.sim.dynamics.control import Modes, rotor_goals
 from drone_rl.utils.errors import InputError

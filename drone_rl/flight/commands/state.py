@@ -4,15 +4,13 @@ import dataclasses
 import enum
 import math
 from collections import deque
-from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
 from torch import Tensor
 
 from drone_rl.config.sensors import SensorSettings
-from drone_rl.flight.commands.conventions import to_pilot
-from drone_rl.sim.coordinates import HOME, GeoPoint
+from drone_rl.sim.coordinates import HOME, Attitude, GeoPoint
 from drone_rl.sim.dynamics import FlightState
 from drone_rl.sim.dynamics.state import (
     ATTITUDE,
@@ -34,8 +32,6 @@ from drone_rl.sim.sensors import (
 from drone_rl.utils.display import table
 
 Triple = tuple[float, float, float]
-_VERTICAL = 1.0 - 1e-12
-"""Sine of the pitch above which roll and yaw can't be distinguished."""
 
 
 class LandedState(enum.StrEnum):
@@ -43,34 +39,6 @@ class LandedState(enum.StrEnum):
 
     LANDED = "landed"
     FLYING = "flying"
-
-
-@dataclasses.dataclass(frozen=True)
-class Attitude:
-    """Orientation in degrees, applied in the order yaw, pitch, roll; signs as in `conventions`.
-
-    With the nose straight up or down, where yaw and roll turn about the same axis, roll is 0.
-    """
-
-    roll: float
-    """Positive with the right side down."""
-    pitch: float
-    """Positive with the nose up."""
-    yaw: float
-    """Positive to the right of the world's x axis."""
-
-    @classmethod
-    def of(cls, quaternion: Sequence[float]) -> Self:
-        """Convert a unit quaternion (w, x, y, z); straight up or down the roll is 0."""
-        w, x, y, z = quaternion
-        sine = 2.0 * (w * y - z * x)
-        if abs(sine) > _VERTICAL:  # roll and yaw turn about the same axis
-            pitch, yaw = math.copysign(math.pi / 2, sine), 2.0 * math.atan2(z, w)
-            return cls(*np.degrees(to_pilot(0.0, pitch, math.remainder(yaw, math.tau))).tolist())
-        roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-        pitch = math.asin(sine)
-        yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-        return cls(*np.degrees(to_pilot(roll, pitch, yaw)).tolist())
 
 
 @dataclasses.dataclass(frozen=True)

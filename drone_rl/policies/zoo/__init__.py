@@ -6,6 +6,7 @@ from drone_rl.policies.zoo.description import parse as parse
 from drone_rl.policies.zoo.files import card_path as card_path
 from drone_rl.policies.zoo.files import certificate_path as certificate_path
 from drone_rl.policies.zoo.files import find_policy as find_policy
+from drone_rl.policies.zoo.files import fingerprint as fingerprint
 from drone_rl.policies.zoo.files import load_exported as load_exported
 from drone_rl.policies.zoo.files import policy_names as policy_names
 from drone_rl.policies.zoo.files import policy_path as policy_path

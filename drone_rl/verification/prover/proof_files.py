@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.tasks.collect_cubes import EndReason
-from drone_rl.utils.archives import read_arrays
+from drone_rl.utils.archives import check_indices, read_arrays
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import write_atomically
-from drone_rl.utils.limits import ARRAYS_BYTES, check_indices
+from drone_rl.utils.limits import ARRAYS_BYTES
 from drone_rl.verification.prover.boxes import Boxes, volumes
 from drone_rl.verification.prover.lattice import AHEAD, LEFT, RIGHT, Ending, LatticeState
 from drone_rl.verification.prover.prover import ProofFindings, Prover, combine

@@ -4,8 +4,8 @@ import torch
 
 from drone_rl.flight.airsim.cameras import make_cameras
 from drone_rl.flight.airsim.settings_file import CameraChoice, Capture
+from drone_rl.flight.image_types import ImageType
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.image_types import ImageType
 
 SMALL = {kind: Capture(32, 18, 90.0) for kind in ImageType}
 

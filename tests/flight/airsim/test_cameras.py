@@ -7,7 +7,7 @@ import torch
 
 from drone_rl.flight.airsim.cameras import make_cameras
 from drone_rl.flight.airsim.settings_file import CameraChoice, Capture, Offset
-from drone_rl.sim.image_types import ImageType
+from drone_rl.flight.image_types import ImageType
 from drone_rl.sim.rendering.appearance import rotate
 from tests.flight.airsim.looking import look
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from drone_rl.flight.airsim.stage import Stage
-from drone_rl.sim.image_types import ImageType
+from drone_rl.flight.image_types import ImageType
 from drone_rl.utils.errors import InputError
 from tests.flight.airsim.looking import look
 

@@ -17,8 +17,8 @@ from drone_rl.flight.airsim.settings_file import (
     parse_settings,
     read_settings,
 )
+from drone_rl.flight.image_types import ImageType
 from drone_rl.sim.coordinates import HOME, GeoPoint
-from drone_rl.sim.image_types import ImageType
 from drone_rl.utils.errors import InputError
 
 LISTING_1 = """{

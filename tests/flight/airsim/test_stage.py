@@ -9,7 +9,7 @@ import torch
 from PIL import Image
 
 from drone_rl.flight.airsim.stage import SPARE, Stage, png
-from drone_rl.sim.image_types import ImageType, palette
+from drone_rl.flight.image_types import ImageType, palette
 from drone_rl.utils.errors import InputError
 from tests.flight.airsim.looking import look
 

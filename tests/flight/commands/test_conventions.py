@@ -5,8 +5,7 @@ import math
 import pytest
 
 import drone_rl
-from drone_rl.flight.commands.conventions import to_pilot, to_simulator
-from drone_rl.flight.commands.state import Attitude
+from drone_rl.sim.coordinates import Attitude, to_pilot, to_simulator
 from drone_rl.sim.entities import find_camera
 
 

@@ -7,7 +7,7 @@ import torch
 from drone_rl.config import CameraSettings, DynamicsSettings, PillarsSettings
 from drone_rl.flight.commands.command import PilotError
 from drone_rl.flight.commands.pilot import Pilot
-from drone_rl.sim.image_types import ImageRequest, ImageType
+from drone_rl.flight.image_types import ImageRequest, ImageType
 from drone_rl.sim.worlds import Worlds
 
 

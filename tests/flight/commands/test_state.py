@@ -5,8 +5,8 @@ import pytest
 import torch
 
 from drone_rl.flight.commands.computer_vision import _attitude
-from drone_rl.flight.commands.conventions import to_simulator
-from drone_rl.flight.commands.state import Attitude, Collision, LandedState, PilotState
+from drone_rl.flight.commands.state import Collision, LandedState, PilotState
+from drone_rl.sim.coordinates import Attitude, to_simulator
 from drone_rl.sim.dynamics.state import DEPTH, GROUND, NORMAL, THING
 
 HALF = math.sqrt(0.5)

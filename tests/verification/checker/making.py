@@ -8,8 +8,8 @@ import numpy as np
 
 import drone_rl
 from benchmarks.gamed_certificates import certificate_of, steps_of
+from drone_rl.policies.zoo import fingerprint
 from drone_rl.sim.tasks.collect_cubes import EndReason
-from drone_rl.verification.checker.certificate import fingerprint
 from drone_rl.verification.checker.checker import Simulator
 
 BAND = 1e-5

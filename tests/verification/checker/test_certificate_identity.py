@@ -6,12 +6,9 @@ import torch
 
 import drone_rl
 from drone_rl.config import AppearanceSettings
+from drone_rl.policies.zoo import fingerprint
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.checker.certificate import (
-    check_same_policy,
-    fingerprint,
-    parse_certificate,
-)
+from drone_rl.verification.checker.certificate import check_same_policy, parse_certificate
 
 
 def test_the_hash_by_hand():

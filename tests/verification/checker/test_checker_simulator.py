@@ -5,7 +5,7 @@ import pytest
 import torch
 
 import drone_rl
-from drone_rl.evaluation.rollouts import run_episodes
+from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.checker.checker import Simulator
 

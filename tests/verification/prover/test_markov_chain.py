@@ -9,12 +9,12 @@ import torch
 from tensordict.nn import TensorDictModule
 from torch import nn
 
+from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.config import TaskSettings
-from drone_rl.evaluation.metrics import summarise
-from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import parse, policy_path, read_policy
 from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.trust.metrics import summarise
 from drone_rl.verification.prover import markov_chain
 from drone_rl.verification.prover.lattice import explore
 from drone_rl.verification.prover.markov_chain import NEGLIGIBLE, NodeEvaluator, Outcomes, propagate

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import drone_rl
+from drone_rl.policies.zoo import fingerprint
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.provenance import provenance
-from drone_rl.verification.checker.certificate import fingerprint
 from drone_rl.verification.prover.boxes import volumes
 from drone_rl.verification.prover.lattice import Ending
 from drone_rl.verification.prover.policy_spec import make_policy_spec

@@ -11,8 +11,8 @@ from drone_rl.flight.airsim.messages import Map, number, read_map, read_pose, te
 from drone_rl.flight.airsim.methods.registry import method, sim_vehicle_at
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.vehicle import Vehicle
+from drone_rl.flight.image_types import ImageType
 from drone_rl.sim.entities import find_camera
-from drone_rl.sim.image_types import ImageType
 from drone_rl.sim.rendering.appearance import product
 
 _NEAR = 10.0

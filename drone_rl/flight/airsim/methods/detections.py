@@ -13,8 +13,8 @@ from drone_rl.flight.airsim.methods.cameras import camera_at, put_camera
 from drone_rl.flight.airsim.methods.registry import method, sim_vehicle_at
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.vehicle import Vehicle
+from drone_rl.flight.image_types import ImageType
 from drone_rl.sim.coordinates import body_from_world, geo_from_world, inverse
-from drone_rl.sim.image_types import ImageType
 from drone_rl.sim.rendering.appearance import product
 from drone_rl.utils.errors import InputError
 

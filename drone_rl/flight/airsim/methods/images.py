@@ -14,7 +14,7 @@ from drone_rl.flight.airsim.methods.registry import method, sim_vehicle_at
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.stage import Shot, Stage, png
 from drone_rl.flight.airsim.vehicle import Vehicle
-from drone_rl.sim.image_types import ImageType
+from drone_rl.flight.image_types import ImageType
 from drone_rl.utils.errors import InputError
 
 MAX_IMAGES = 64

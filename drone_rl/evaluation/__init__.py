@@ -1,1 +1,0 @@
-"""Evaluate policies: rollouts, metrics, baselines, verdicts, videos."""

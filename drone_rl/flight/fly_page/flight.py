@@ -1,0 +1,367 @@
+"""The flight that the page shows: one world, who flies it, and the messages of browsers."""
+
+import json
+import logging
+import math
+import struct
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import torch
+from PIL import Image
+from torch import Tensor
+
+from drone_rl.config.commands import CAMERAS, FLY_MODES, FlySettings
+from drone_rl.flight.fly_page.pilots import CONTROLS, Controls, VelocityPilot, make_pilot
+from drone_rl.flight.fly_page.recorder import Recorder
+from drone_rl.flight.fly_page.saliency import LiveSaliency
+from drone_rl.flight.fly_page.world import Seen, World
+from drone_rl.flight.image_types import encode
+from drone_rl.policies.policy import Policy
+from drone_rl.sim.coordinates import Attitude
+from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.tasks import CollectCubes
+from drone_rl.trust.plots.images import heated, shown_picture
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.palette import css
+from drone_rl.utils.schema import Flag, OneOf, Real, Record, Several, as_mapping
+
+LIMITS = {"speed": (0.5, 10.0), "wind": (0.0, 12.0), "wind_from": (0.0, 360.0), "light": (0.2, 2.0)}
+"""Lowest and highest values of the sliders: m/s, m/s, degrees, factor."""
+_MESSAGES: Mapping[str, Record] = {
+    "hold": Record({"controls": Several(OneOf(CONTROLS), 0, len(CONTROLS))}),
+    "sticks": Record({"values": Several(Real(-1.0, 1.0), 4, 4)}),
+    "pilot": Record({"pilot": OneOf(("person", "policy"))}),
+    "mode": Record({"mode": OneOf(FLY_MODES)}),
+    "camera": Record({"camera": OneOf(CAMERAS)}),
+    "set": Record({"name": OneOf(tuple(LIMITS)), "value": Real(-1e6, 1e6)}),
+    "record": Record({"on": Flag()}),
+    "saliency": Record({"on": Flag()}),
+    "reset": Record({}),
+    "take_off": Record({}),
+    "land": Record({}),
+}
+"""Fields of each type of message."""
+_PAUSE = 2.0
+"""Seconds after an episode of the policy before the next one begins."""
+_LOOK_PERIOD = 0.1
+"""Seconds between two observations while a person moves freely."""
+_SIZE = 1.0
+"""Edge of objects on the map if the task does not state it, metres."""
+JPEG_QUALITY = 85
+_log = logging.getLogger(__name__)
+_LONGEST = 0.1
+"""Most seconds that pass at once; a slow machine falls behind instead."""
+
+
+class Flight:
+    """One drone that a person or the policy flies. Not thread-safe: one thread owns it."""
+
+    def __init__(self, policy: Policy, settings: FlySettings, demonstrations: Path) -> None:
+        """Start an episode, flown by a person.
+
+        Args:
+            policy: The policy.
+            settings: View, mode and seed at the start.
+            demonstrations: Folder to which recorded flights are added.
+        """
+        self.world = World(
+            policy, seed=settings.seed, greedy=settings.greedy, renderer=settings.renderer
+        )
+        self.controls = Controls()
+        self.recorder = Recorder(self.world, demonstrations)
+        self.saliency = LiveSaliency(self.world)
+        self.camera, self.mode, self.pilot = settings.view, settings.mode, "person"
+        self.speed = 4.0
+        """Of velocity commands and of moves without dynamics, m/s."""
+        self.note = ""
+        """What happened last, for the person."""
+        self._problem: str | None = None
+        """Why the last recorded flight could not be written."""
+        self.time = 0.0
+        """Seconds flown since the start."""
+        self._wants_saliency, self._shows_saliency = settings.saliency, settings.saliency
+        self._over = 0.0
+        self._seen, self._seen_at, self._looks = self.world.see(), 0.0, 0
+        levels = [
+            self.world.scenes.transform(torch.full_like(self._seen.frame, v)) for v in (0, 255)
+        ]
+        self._levels = float(levels[0].min()), float(levels[1].max())
+        """What is shown as black and as white."""
+        self._images: dict[str, tuple[Any, bytes]] = {}
+        self._number = 0
+        self._handlers: dict[str, Callable[..., None]] = {
+            "hold": lambda controls: self.controls.hold(controls),
+            "sticks": lambda values: self.controls.set_sticks(values),
+            "pilot": self.set_pilot,
+            "mode": self.set_mode,
+            "camera": self._set_camera,
+            "set": self._set,
+            "record": self.record,
+            "saliency": self._set_saliency,
+            "reset": self.reset,
+            "take_off": lambda: self._flying("take_off").take_off(),
+            "land": lambda: self._flying("land").land(),
+        }
+        self._flyer = make_pilot(self._kind, self.world, self._note_step)
+
+    # Messages
+
+    def handle(self, message: Any) -> None:
+        """Do what a browser's message says; an `InputError` if it is wrong or impossible."""
+        given = dict(as_mapping(message, "message"))
+        kind = OneOf(tuple(_MESSAGES)).read(given.pop("type", None), "type")
+        self._handlers[kind](**_MESSAGES[kind].read(given, kind))
+
+    def set_pilot(self, pilot: str) -> None:
+        """Hand over to the policy, or back to a person."""
+        if pilot == self.pilot:
+            return
+        self._finish_recording()
+        self.pilot = pilot
+        if pilot == "policy" and self.world.is_over:
+            self.reset()
+        self._change_flyer()
+        self.note = "You fly."
+        if pilot == "policy":
+            moved = ", from the task's altitude and heading" if self.mode != "actions" else ""
+            self.note = f"The policy {self.world.policy.name} flies{moved}."
+
+    def set_mode(self, mode: str) -> None:
+        """Choose how a person flies."""
+        if mode == self.mode:
+            return
+        if self.pilot == "person":
+            self._finish_recording()
+        self.mode = mode
+        if self.pilot == "person":
+            self._change_flyer()
+
+    def reset(self) -> None:
+        """Start a new episode."""
+        self._finish_recording()
+        self.world.reset()
+        self._over = 0.0
+        self.note = "A new episode begins."
+        self._change_flyer()
+
+    def record(self, on: bool) -> None:
+        """Turn recording on or off; a person then flies by the policy's actions."""
+        if on and self.mode != "actions":
+            self.set_mode("actions")
+            self.note = "Demonstrations consist of the policy's actions, now your controls."
+        if not on:
+            self._finish_recording()
+        self.recorder.is_on = on
+        self._problem = None if on else self._problem
+
+    def _set_camera(self, camera: str) -> None:
+        self.camera = camera
+
+    def _set_saliency(self, on: bool) -> None:
+        self._shows_saliency = on
+        self._wants_saliency |= on
+
+    def _set(self, name: str, value: float) -> None:
+        low, high = LIMITS[name]
+        value = Real(low, high).read(value, name)
+        if name == "speed":
+            self.speed = value
+        elif name == "light":
+            self.world.set_light(value)
+        else:
+            self._finish_recording()  # under the wind so far
+            speed, direction = self.world.wind
+            chosen = (value, direction) if name == "wind" else (speed, value)
+            self.world.set_wind(*chosen)
+
+    def _flying(self, name: str) -> VelocityPilot:
+        if not isinstance(self._flyer, VelocityPilot):
+            raise InputError(f"{name} needs simple flight; choose it as your controls")
+        return self._flyer
+
+    def release(self) -> None:
+        """Let go of all controls, because no browser holds them any more."""
+        self.controls.release()
+
+    @property
+    def _kind(self) -> str:
+        return "policy" if self.pilot == "policy" else self.mode
+
+    def _change_flyer(self) -> None:
+        if self._kind not in ("actions", "policy"):  # only these pilots take steps to record
+            self.recorder.is_on = False
+        self.controls.release()
+        self._flyer = make_pilot(self._kind, self.world, self._note_step)
+
+    def _note_step(self, frame: Tensor, action: Tensor, reward: float) -> None:
+        self.recorder.note(frame, action, reward)
+        if self.world.is_over:
+            self._finish_recording()
+
+    def _finish_recording(self) -> None:
+        try:
+            self.recorder.finish(self.pilot)
+        except InputError as error:
+            self._problem = str(error)
+            _log.error("%s", error)
+
+    # Time
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass."""
+        seconds = min(seconds, _LONGEST)
+        self.time += seconds
+        self.controls.advance(seconds)
+        self._flyer.advance(seconds, self.controls, self.speed)
+        if bool(self.world.body.is_lost[0]):
+            self.note = "The simulation has diverged; start a new episode."
+        if self.world.is_over and self.pilot == "policy":
+            self._over += seconds
+            if self._over >= _PAUSE:
+                self.reset()
+        if self._wants_saliency:
+            self.saliency.start()
+        self.saliency.poll()
+
+    def close(self) -> None:
+        """Write the recorded steps, end the tests of heat maps, and close the renderer."""
+        self._finish_recording()
+        self.saliency.close()
+        self.world.close()
+
+    # What browsers get
+
+    def hello(self) -> dict[str, Any]:
+        """Return what does not change: policy, task, actions, choices."""
+        world, actions = self.world, self.world.actions
+        terms, region = world.task.vocabulary, world.policy.task.object_region
+        return {
+            "policy": world.policy.name,
+            "task": world.task.name,
+            "object": terms.target,
+            "size": region.size if region else _SIZE,
+            "goal": terms.goal,
+            "reached": terms.reached,
+            "actions": list(actions.names),
+            "order": [int(part) for part in actions.order],
+            "colors": [css(color) for color in actions.colors],
+            "total": len(world.objects) if isinstance(world.task, CollectCubes) else None,
+            "discrete": not actions.entry.shape,
+            "dynamics": world.has_dynamics,
+            "cameras": list(CAMERAS),
+            "limits": LIMITS,
+            "demonstrations": str(self.recorder.folder),
+        }
+
+    def frame(self) -> bytes:
+        """Return the present state and images; see `packed`."""
+        images = [
+            ("view", "image/jpeg", self._view()),
+            ("observation", "image/png", self._observed()),
+        ]
+        self._number += 1
+        return packed({"frame": self._number, **self._state()}, images)
+
+    def _state(self) -> dict[str, Any]:
+        world = self.world
+        seen, goals = self._look(), world.goals
+        speed, direction = world.wind
+        return {
+            "time": round(self.time, 3),
+            "episode": world.episode,
+            "pilot": self.pilot,
+            "mode": self.mode,
+            "camera": self.camera,
+            **pose_of(world.body),
+            "objects": [None if place is None else _rounded(place) for place in world.objects],
+            "goals": goals,
+            "reward": round(world.reward, 3),
+            "steps": int(world.worlds.state.steps[0]),
+            "end": world.end,
+            "probabilities": _rounded(seen.probabilities),
+            "settings": {
+                "speed": self.speed,
+                "wind": round(speed, 2),
+                "wind_from": round(direction, 1),
+                "light": world.light,
+            },
+            "recording": {
+                "on": self.recorder.is_on,
+                "steps": len(self.recorder),
+                "saved": self.recorder.saved,
+                "problem": self._problem,
+            },
+            "saliency": {
+                "on": self._shows_saliency,
+                "state": self.saliency.state,
+                "method": self.saliency.method,
+                "problem": self.saliency.problem,
+            },
+            "note": self.note,
+        }
+
+    def _look(self) -> Seen:
+        """Return what the policy sees; while a person moves freely, some times a second."""
+        now = time.monotonic()
+        is_free = self.pilot == "person" and self.mode != "actions"
+        if not is_free or now - self._seen_at >= _LOOK_PERIOD:
+            before, self._seen, self._seen_at = self._seen, self.world.see(), now
+            self._looks += self._seen is not before
+        return self._seen
+
+    def _view(self) -> bytes:
+        def draw() -> bytes:
+            picture = Image.fromarray(self.world.render(self.camera).numpy())
+            return encode(picture, "jpeg", quality=JPEG_QUALITY)
+
+        return self._kept("view", (self.world.version, self.camera), draw)
+
+    def _observed(self) -> bytes:
+        """Return the observation, with the heat map if there is one to show."""
+        seen = self._look()
+        shows = self._shows_saliency and self.saliency.state == "shown"
+
+        def draw() -> bytes:
+            observation = seen.observation[0].numpy()
+            picture = shown_picture(observation, *self._levels, self.world.scenes.channels)
+            heat = self.saliency.heat(seen) if shows else None
+            shown = picture if heat is None else heated(picture, heat)
+            return encode(Image.fromarray(shown), "png")
+
+        return self._kept("observation", (self._looks, shows), draw)
+
+    def _kept(self, name: str, key: Any, draw: Callable[[], bytes]) -> bytes:
+        """Return an image, drawn again if its key has changed."""
+        known = self._images.get(name)
+        if known is None or known[0] != key:
+            self._images[name] = known = (key, draw())
+        return known[1]
+
+
+def packed(state: Mapping[str, Any], images: Sequence[tuple[str, str, bytes]]) -> bytes:
+    """Return a frame for browsers, of a state and images: names, media types and contents.
+
+    A little-endian uint32 is the length of the JSON text that follows; then come the images that
+    its "images" lists by name, type and size.
+    """
+    listed = [{"name": n, "type": t, "size": len(data)} for n, t, data in images]
+    whole = {**state, "images": listed}
+    text = json.dumps(whole, allow_nan=False, separators=(",", ":")).encode()
+    return b"".join([struct.pack("<I", len(text)), text, *(data for *_, data in images)])
+
+
+def pose_of(body: BodyState) -> dict[str, Any]:
+    """Return the position, attitude in degrees and speed of a single drone, for browsers."""
+    attitude = Attitude.of(body.attitude[0].tolist())
+    return {
+        "position": _rounded(body.position[0].tolist()),
+        "attitude": _rounded((attitude.roll, attitude.pitch, attitude.yaw)),
+        "velocity": round(float(body.velocity[0].norm()), 2),
+    }
+
+
+def _rounded(values: Any) -> list[float]:
+    return [round(value, 3) if math.isfinite(value) else 0.0 for value in values]

@@ -1,0 +1,321 @@
+"""How controls and the policy move the drone: moves of the policy, poses, velocities."""
+
+import abc
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from drone_rl.config import DynamicsSettings
+from drone_rl.flight.commands.command import Command, FlightFuture
+from drone_rl.flight.commands.computer_vision import KEYS, STEP, TURN
+from drone_rl.flight.commands.path_following import YawMode
+from drone_rl.flight.commands.pilot import Pilot
+from drone_rl.flight.commands.state import LandedState, Trajectory
+from drone_rl.flight.fly_page.world import World
+from drone_rl.sim.dynamics import FlightState, Obstacles, Quadrotor
+
+CONTROLS = tuple(KEYS)
+"""Names of controls that can be held: those of `Pilot.press`."""
+Sticks = tuple[float, float, float, float]
+"""Forward, left, up and turn left, each from -1 to 1."""
+CENTERED: Sticks = (0.0, 0.0, 0.0, 0.0)
+_MOST_PRESSES = 8
+"""Presses that wait for the next step."""
+_DELAY = 0.3
+"""Seconds after which a held control repeats."""
+_TURN_RATE = 60.0
+"""Degrees a second at full turn."""
+_CLIMB = 0.5
+"""Largest climb as a fraction of the speed."""
+_LOWEST = 0.3
+"""Height under which poses can't be lowered, metres."""
+_LONG = 1e5
+"""Seconds of a command that a new one ends."""
+_BRAKING = 2.5
+"""Most seconds of braking before the drone holds its place; wind may keep it from standing."""
+_STANDS = 0.25
+"""Speed at which braking is over, m/s."""
+_AXES = (("forward", "backward"), ("left", "right"), ("up", "down"), ("yaw_left", "yaw_right"))
+_HALF = 0.5
+"""Deflection from which a stick counts as a held control."""
+_MOST_STEPS = 5
+"""Steps at once after a delay; more are dropped."""
+
+
+class Controls:
+    """Held keys and buttons, presses that were not used yet, and sticks."""
+
+    def __init__(self) -> None:
+        """Begin with nothing held."""
+        self.presses: list[str] = []
+        self._keys: tuple[str, ...] = ()
+        self._since: dict[str, float] = {}
+        """Seconds since each held control was pressed, in order of the presses."""
+        self.sticks = CENTERED
+
+    def hold(self, keys: Iterable[str]) -> None:
+        """Take the names of all held keys; new ones are presses."""
+        self._keys = tuple(dict.fromkeys(keys))
+        self._update()
+
+    def set_sticks(self, sticks: Sticks) -> None:
+        """Take the sticks' deflections; large ones count as held controls, too."""
+        self.sticks = sticks
+        self._update()
+
+    def release(self) -> None:
+        """Let go of everything."""
+        self._keys, self.sticks = (), CENTERED
+        self.presses.clear()
+        self._update()
+
+    def _update(self) -> None:
+        pushed = [
+            pair[0] if value > 0 else pair[1]
+            for pair, value in zip(_AXES, self.sticks, strict=True)
+            if abs(value) > _HALF
+        ]
+        held = dict.fromkeys((*self._keys, *pushed))
+        self.presses += [name for name in held if name not in self._since]
+        del self.presses[:-_MOST_PRESSES]
+        kept = {name: since for name, since in self._since.items() if name in held}
+        self._since = kept | {name: 0.0 for name in held if name not in kept}
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass for held controls."""
+        self._since = {name: since + seconds for name, since in self._since.items()}
+
+    @property
+    def repeating(self) -> list[str]:
+        """Controls that are held long enough to repeat, the last pressed last."""
+        return [name for name, since in self._since.items() if since >= _DELAY]
+
+    @property
+    def axes(self) -> Sticks:
+        """Deflections by sticks and held keys together."""
+        keys = self._keys
+        forward, left, up, turn = (
+            max(-1.0, min(1.0, stick + (plus in keys) - (minus in keys)))
+            for (plus, minus), stick in zip(_AXES, self.sticks, strict=True)
+        )
+        return forward, left, up, turn
+
+
+class FlyPilot(abc.ABC):
+    """Moves the drone of a world over time."""
+
+    def __init__(self, world: World) -> None:
+        """Take the world, whose drone may be anywhere."""
+        self.world = world
+
+    @abc.abstractmethod
+    def advance(self, seconds: float, controls: Controls, speed: float) -> None:
+        """Let time pass. `speed` is in metres a second."""
+
+
+Note = Callable[[Tensor, Tensor, float], None]
+"""Called with image, action and reward of each step: (1, H, W, 3), (1, ...)."""
+
+
+class _Steps(FlyPilot):
+    """Takes actions of the policy's environment, one each period."""
+
+    def __init__(self, world: World, note: Note) -> None:
+        """Take the world, and a function that is called with each step."""
+        super().__init__(world)
+        world.align()
+        self._note, self._left = note, 0.0
+
+    def _take(self, action: Tensor) -> None:
+        frame = self.world.see().frame
+        self._note(frame, action, self.world.step(action))
+
+    def _due(self, seconds: float, speed: float) -> int:
+        """Return the number of actions that are due."""
+        self._left += seconds
+        period = self.world.seconds(speed)
+        count = int(self._left / period + 1e-9)
+        self._left -= count * period
+        return min(count, _MOST_STEPS)
+
+
+class PolicyPilot(_Steps):
+    """The policy flies."""
+
+    def advance(self, seconds: float, controls: Controls, speed: float) -> None:
+        """See `FlyPilot`."""
+        for _ in range(self._due(seconds, speed)):
+            if not self.world.is_over:
+                self._take(self.world.see().action)
+
+
+class ActionPilot(_Steps):
+    """A person chooses the policy's actions; time stands still between them."""
+
+    def advance(self, seconds: float, controls: Controls, speed: float) -> None:
+        """See `FlyPilot`."""
+        is_discrete = not self.world.actions.entry.shape
+        choose = self._discrete if is_discrete else self._continuous
+        chosen = choose(seconds, controls, speed)
+        controls.presses.clear()
+        for action in chosen:
+            if not self.world.is_over:
+                self._take(action)
+
+    def _discrete(self, seconds: float, controls: Controls, speed: float) -> list[Tensor]:
+        names = self.world.actions.names
+        held = [name for name in controls.repeating if name in names]
+        count = self._due(seconds, speed) if held else 0
+        if not held:
+            self._left = 0.0
+        pressed = [name for name in controls.presses if name in names]
+        return [torch.tensor([names.index(n)]) for n in (*pressed, *held[-1:] * count)]
+
+    def _continuous(self, seconds: float, controls: Controls, speed: float) -> list[Tensor]:
+        forward, left, _, turn = controls.axes
+        if not any((forward, left, turn)):
+            self._left = 0.0
+            return []
+        count = max(bool(controls.presses), self._due(seconds, speed))
+        return [torch.tensor([[2.0 * max(0.0, forward) - 1.0, left, turn]])] * count
+
+
+class _Drone(Pilot):
+    """A drone that is taken over in flight, and whose trajectory is not kept."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        """See `Pilot`."""
+        super().__init__(*args, **options)
+        self.trajectory = Trajectory(1)  # a page may be open for days
+
+    def take_over(self, body: FlightState) -> None:
+        """Continue with a drone that flies, or is posed, anywhere."""
+        self.body, self._is_armed, self._landed = body, True, LandedState.FLYING
+
+    def set_surroundings(self, dynamics: DynamicsSettings, obstacles: Obstacles | None) -> None:
+        """Take the wind and the obstacles of the present episode."""
+        if dynamics != self.settings:
+            self._quadrotor, self.settings = Quadrotor(dynamics), dynamics
+        self._obstacles = obstacles
+
+    @property
+    def period(self) -> float:
+        """Seconds of a control period."""
+        return self._period * self.settings.tick
+
+    def run(self) -> None:
+        """Advance by a control period."""
+        self._advance(self._period)
+
+    def _run(self, name: str, command: Command, wait: bool) -> bool | FlightFuture:
+        """Start a movement, which as in AirSim also takes off a drone on the ground."""
+        self._require_armed(name)
+        return self._start(name, command, wait)
+
+
+class PosePilot(FlyPilot):
+    """Computer-vision mode: controls change the pose by steps of 0.25 m and 5 degrees."""
+
+    def __init__(self, world: World) -> None:
+        """Take over the drone's place and attitude."""
+        super().__init__(world)
+        self._drone = _Drone(mode="computer_vision")
+        self._drone.body = self._drone.body.moved(world.body.position, world.body.attitude)
+        self._left = dict.fromkeys(CONTROLS, 0.0)
+        world.move(self._drone.body)
+
+    def advance(self, seconds: float, controls: Controls, speed: float) -> None:
+        """See `FlyPilot`."""
+        keys = [*controls.presses]
+        controls.presses.clear()
+        for name in controls.repeating:
+            rate = speed / STEP if any(KEYS[name][0]) else _TURN_RATE / TURN
+            self._left[name] += seconds * rate
+            count = int(self._left[name])
+            self._left[name] -= count
+            keys += [name] * count
+        for name in keys:
+            if name != "down" or float(self._drone.body.position[0, 2]) - STEP >= _LOWEST:
+                self._drone.press(name)
+        if keys:
+            self.world.move(self._drone.body)
+
+
+class VelocityPilot(FlyPilot):
+    """Simple flight: controls command velocities; without them the drone holds its place."""
+
+    def __init__(self, world: World) -> None:
+        """Take over the drone in flight; one without dynamics begins to hover."""
+        super().__init__(world)
+        self._drone = _Drone(world.flight_dynamics)
+        body = world.body
+        if not isinstance(body, FlightState) or not bool(body.rotors.any()):
+            start = Quadrotor(world.flight_dynamics).start(body.position)
+            body = start.moved(body.position, body.attitude)
+        self._drone.take_over(body)
+        world.move(body)
+        self._command: tuple[float, ...] | None = None
+        self._braking = self._left = 0.0
+        self._hold()
+
+    def take_off(self) -> None:
+        """Climb 2 m."""
+        self._drone.take_off(wait=False)
+        self._command, self._braking = (), 0.0
+
+    def land(self) -> None:
+        """Descend until the drone stands."""
+        self._drone.land(wait=False)
+        self._command, self._braking = (), 0.0
+
+    def advance(self, seconds: float, controls: Controls, speed: float) -> None:
+        """See `FlyPilot`."""
+        world, drone = self.world, self._drone
+        controls.presses.clear()
+        if bool(drone.body.is_lost[0]):
+            return
+        drone.set_surroundings(world.flight_dynamics, world.task.obstacles(world.worlds.state))
+        self._steer(seconds, controls, speed)
+        self._left += seconds
+        while self._left >= drone.period:
+            drone.run()
+            world.move(drone.body)
+            self._left -= drone.period
+
+    def _steer(self, seconds: float, controls: Controls, speed: float) -> None:
+        forward, left, up, turn = controls.axes
+        if any((forward, left, up, turn)):
+            self._braking = _BRAKING
+            self._command_velocity(
+                speed * forward, speed * left, _CLIMB * speed * up, _TURN_RATE * turn
+            )
+        elif self._braking > 0.0:
+            self._braking -= seconds
+            self._command_velocity(0.0, 0.0, 0.0, 0.0)
+            if self._braking <= 0.0 or float(self._drone.body.velocity.norm()) < _STANDS:
+                self._braking = 0.0
+                self._hold()
+        elif self._drone.running is None:  # take-off or landing is over
+            self._command = None
+
+    def _command_velocity(self, *velocity: float) -> None:
+        if velocity != self._command:
+            forward, left, up, turn = velocity
+            yaw = YawMode(True, 0.0 - turn)
+            self._drone.move_by_velocity(
+                forward, left, up, _LONG, frame="body", yaw_mode=yaw, wait=False
+            )
+            self._command = velocity
+
+    def _hold(self) -> None:
+        self._drone.hover(_LONG, wait=False)
+        self._command = None
+
+
+def make_pilot(mode: str, world: World, note: Note) -> FlyPilot:
+    """Return what flies the drone: "policy", or one of `FLY_MODES` for a person."""
+    if mode in ("policy", "actions"):
+        return (PolicyPilot if mode == "policy" else ActionPilot)(world, note)
+    return (PosePilot if mode == "computer_vision" else VelocityPilot)(world)

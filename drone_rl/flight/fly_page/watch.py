@@ -1,0 +1,121 @@
+"""The page without controls: it shows what a client's program does on AirSim's server."""
+
+import asyncio
+import concurrent.futures
+import copy
+import math
+from typing import Any
+
+from PIL import Image
+from torch import Tensor
+
+from drone_rl.config.commands import CAMERAS
+from drone_rl.flight.airsim.messages import to_world
+from drone_rl.flight.airsim.simulation import Simulation
+from drone_rl.flight.fly_page.flight import JPEG_QUALITY, packed, pose_of
+from drone_rl.flight.fly_page.server import FlyPage
+from drone_rl.flight.fly_page.world import HEIGHT, WIDTH
+from drone_rl.flight.image_types import ImageType, encode
+from drone_rl.sim.entities import CHASE
+from drone_rl.trust.video import render_chase
+from drone_rl.utils.schema import OneOf, Record, as_mapping
+
+_FRAMES_PER_SECOND = 20
+_PATIENCE_S = 5.0
+"""Seconds to wait for a frame."""
+_MESSAGE = Record({"type": OneOf(("camera",)), "camera": OneOf(CAMERAS)})
+
+
+class Watched:
+    """Shows the first vehicle of a simulation. Browsers choose the camera.
+
+    The simulation belongs to the thread of an event loop, which makes the frames.
+    """
+
+    def __init__(self, simulation: Simulation, loop: asyncio.AbstractEventLoop) -> None:
+        """Take the simulation and its loop."""
+        self._simulation, self._loop = simulation, loop
+        self._camera, self._number = CHASE.name, 0
+
+    def handle(self, message: Any) -> None:
+        """Do what a browser's message says; an `InputError` if it is not a choice of a camera."""
+        self._camera = _MESSAGE.read(as_mapping(message, "message"), "message")["camera"]
+
+    def advance(self, seconds: float) -> None:
+        """Do nothing: the program that is watched lets time pass."""
+
+    def release(self) -> None:
+        """Do nothing: there are no controls."""
+
+    def close(self) -> None:
+        """Do nothing: the simulation goes on."""
+
+    def hello(self) -> dict[str, Any]:
+        """Return what does not change; see `Flight.hello`."""
+        scene = f"scene {self._simulation.stage.scene_name}, clock {self._simulation.clock}"
+        return {"watch": scene, "object": "object", "size": 1.0, "cameras": list(CAMERAS)}
+
+    def frame(self) -> bytes:
+        """Return the present state and image, see `flight.packed`; nothing if the loop is busy."""
+        making = self._frame()
+        try:
+            made = asyncio.run_coroutine_threadsafe(making, self._loop)
+            return made.result(_PATIENCE_S)
+        except (TimeoutError, concurrent.futures.CancelledError):
+            return b""
+        except RuntimeError:  # the loop has ended
+            making.close()
+            return b""
+
+    async def _frame(self) -> bytes:
+        self._number += 1
+        image = Image.fromarray(self._render().numpy())
+        images = [("view", "image/jpeg", encode(image, "jpeg", quality=JPEG_QUALITY))]
+        return packed({"frame": self._number, **self._state()}, images)
+
+    def _state(self) -> dict[str, Any]:
+        simulation, stage = self._simulation, self._simulation.stage
+        vehicle = simulation.find("")
+        places = (to_world(stage.object_pose(name).position) for name in stage.movable)
+        x, y, _ = vehicle.settings.wind
+        return {
+            "time": round(simulation.time, 3),
+            "episode": vehicle.epoch,
+            "camera": self._camera,
+            **pose_of(vehicle.body),
+            "objects": [None if math.isnan(place[0]) else place for place in places],
+            "settings": {
+                "wind": round(math.hypot(x, y), 2),
+                "wind_from": math.degrees(math.atan2(y, 0.0 - x)) % 360.0,
+            },
+            "note": "Time is paused." if simulation.is_paused else "",
+            "vehicle": vehicle.choice.name,
+        }
+
+    def _render(self) -> Tensor:
+        """Render the vehicle from behind, or one of its cameras. Shape: (H, W, 3), uint8."""
+        stage, vehicle = self._simulation.stage, self._simulation.find("")
+        if self._camera != CHASE.name:
+            camera = self._simulation.cameras[vehicle.choice.name][self._camera]
+            (shot,) = stage.render(vehicle.body, camera, [ImageType.SCENE])
+            return stage.image(ImageType.SCENE, shot, as_float=False)
+        worlds = copy.copy(stage.worlds)
+        worlds.state = copy.copy(worlds.state)
+        worlds.state.body = vehicle.body
+        return render_chase(worlds, stage.appearance, HEIGHT, WIDTH)[0]
+
+
+def watch(simulation: Simulation, loop: asyncio.AbstractEventLoop, port: int = 0) -> FlyPage:
+    """Start a page that shows a simulation, in threads of this process.
+
+    Args:
+        simulation: The simulation of AirSim's server.
+        loop: The event loop that advances it.
+        port: Port at 127.0.0.1; 0 for a free one.
+
+    Raises:
+        InputError: The port is in use, or the extra `fly` is not installed.
+    """
+    return FlyPage(
+        lambda: Watched(simulation, loop), port=port, frames_per_second=_FRAMES_PER_SECOND
+    )

@@ -1,0 +1,276 @@
+"""One environment of a policy's task: its rules and images, and what a person may change in it."""
+
+import dataclasses
+import math
+from collections import deque
+from collections.abc import Mapping
+from typing import Any, NamedTuple, cast
+
+import torch
+from tensordict import TensorDict
+from torch import Tensor
+
+from drone_rl.config import ActionSettings, DynamicsSettings
+from drone_rl.envs import DroneEnv
+from drone_rl.explanations.scenes import Scenes
+from drone_rl.policies.actor import exploring
+from drone_rl.policies.policy import Policy
+from drone_rl.sim.actions import Actions
+from drone_rl.sim.dynamics import BodyState, ComputerVision, FlightState, Quadrotor
+from drone_rl.sim.entities import CHASE
+from drone_rl.sim.rendering import Appearance
+from drone_rl.sim.tasks.common import HIDDEN_DEPTH
+from drone_rl.trust.video import render_chase
+from drone_rl.utils.errors import InputError
+
+HEIGHT, WIDTH = 144, 256
+"""Pixels of the large image; AirSim's default size."""
+_HEADING, _ALTITUDE = 2, 3
+"""Columns of `FlightState.reference`."""
+_OTHER_PERIOD = 0.25
+"""Seconds from one action to the next of dynamics that do not state them."""
+
+
+class Seen(NamedTuple):
+    """What the policy observes in the present state, and what it would do."""
+
+    frame: Tensor
+    """Image of its camera, RGB, uint8. Shape: (1, H, W, 3)."""
+    observation: Tensor
+    """Input of its network. Shape: (1, C, h, w)."""
+    probabilities: tuple[float, ...]
+    """Of each part of its actions."""
+    action: Tensor
+    """The action that it takes. Shape: (1,), then that of an action."""
+    memory: Mapping[str, Tensor]
+    """What a policy that remembers frames keeps for the next step, by name."""
+
+
+class World:
+    """One environment with one drone, moved by actions of the policy or by a person."""
+
+    def __init__(
+        self, policy: Policy, *, seed: int = 0, greedy: bool = True, renderer: str = "raytrace"
+    ) -> None:
+        """Create the environment and start an episode.
+
+        Args:
+            policy: A policy, whose task, camera, dynamics and appearance the environment has.
+            seed: Root of the placements and of the policy's sampled actions.
+            greedy: Whether the policy takes the most probable action instead of sampling.
+            renderer: Name of the renderer.
+        """
+        self.policy = policy
+        self._env = policy.make_env(1, seed=seed, renderer=renderer)
+        self._base = cast(DroneEnv, self._env.base_env)
+        self.worlds = self._base.worlds
+        self.task: Any = self.worlds.task
+        self.actions: Actions = self.worlds.dynamics.actions
+        self.scenes = Scenes(self._env)
+        self._actor = policy.make_actor(self._env, seed=seed)
+        entries: Any = self._env.observation_spec.zero()
+        names = (str(name) for name in self._actor.in_keys if name != "pixels")
+        self._forgotten: Mapping[str, Tensor] = {name: entries[name] for name in names}
+        """Memory of the actor at the start of an episode, by name."""
+        self._greedy = greedy
+        self._earlier_frames: deque[Tensor] = deque(maxlen=self.scenes.memory)
+        self._every = torch.arange(1)
+        self.light = 1.0
+        self.wind = _to_polar(policy.dynamics.wind)
+        """Speed of the wind, metres a second, and where it comes from; see `set_wind`."""
+        self.episode = 0
+        """Number of episodes begun."""
+        self.version = 0
+        """Changes whenever images may change."""
+        self.reset()
+
+    # State
+
+    def reset(self) -> None:
+        """Start a new episode."""
+        self.worlds.state.body = self.worlds.bodies(1)  # a person's drone may be of another kind
+        self._base.start()
+        self._forget()
+        self.episode += 1
+        self.reward = 0.0
+        """Sum of the episode's rewards."""
+        self._change()
+
+    @property
+    def body(self) -> BodyState:
+        """The drone; a batch of one."""
+        return self.worlds.state.body
+
+    @property
+    def has_dynamics(self) -> bool:
+        """Whether the policy flies a drone with dynamics, and wind has an effect."""
+        return isinstance(self.worlds.dynamics, Quadrotor)
+
+    @property
+    def end(self) -> str | None:
+        """How the episode ended, such as "with every cube collected"; None while it goes on."""
+        reason = int(self.worlds.state.end_reason[0])
+        return self.task.vocabulary.ending(self.task.ends(reason).name.lower()) if reason else None
+
+    @property
+    def goals(self) -> tuple[int, int] | None:
+        """Number of goals reached and missed; None if the task does not count them."""
+        try:
+            reached, missed = self.task.tally(self.worlds.info())
+        except InputError:
+            return None
+        return int(reached[0]), int(missed[0])
+
+    @property
+    def objects(self) -> list[tuple[float, float, float] | None]:
+        """Positions of the task's objects, metres; None for those that have vanished."""
+        places = self.task.places(self.worlds.state)[0].tolist()
+        return [None if z < -HIDDEN_DEPTH / 2 else (x, y, z) for x, y, z in places]
+
+    # The policy's actions
+
+    def seconds(self, speed: float) -> float:
+        """Return the seconds that an action lasts; moves without dynamics have that speed, m/s."""
+        dynamics = self.worlds.dynamics
+        if isinstance(dynamics, ComputerVision):
+            return dynamics.step_length / speed
+        return getattr(dynamics, "timestep", None) or _OTHER_PERIOD
+
+    def align(self) -> None:
+        """Prepare the drone, which a person may have turned or lifted, for the policy's actions.
+
+        A drone without dynamics is levelled at once, at the task's altitude unless its actions
+        change that; one with dynamics gets heading and altitude as targets of its controller.
+        """
+        body, start = self.body, self.worlds.dynamics.start(self.body.position)
+        altitude = self.task.origin[2]
+        if isinstance(start, FlightState):
+            same = (
+                body if isinstance(body, FlightState) else start.moved(body.position, body.attitude)
+            )
+            flying = same.settled()
+            flying.reference[:, _HEADING], flying.reference[:, _ALTITUDE] = 0.0, altitude
+            self._place(flying)
+            return
+        if "up" not in self.actions.names:
+            place = start.position.clone()
+            place[:, 2] = altitude
+            start = start.moved(place)
+        self._place(start)
+
+    @torch.no_grad()
+    def see(self) -> Seen:
+        """Return what the policy observes and would do; computed once for each state."""
+        if self._seen is None:
+            state = self.worlds.state
+            frame = self.worlds.render(state, appearance=self._look())
+            observation = self.scenes.transform(frame, [*self._earlier_frames])
+            observed = TensorDict({"pixels": observation, **self._memory}, [1])
+            with exploring(greedy=self._greedy):
+                acted = self._actor(observed)
+            shares = self.actions.probabilities(acted["logits"])[0]
+            after: Any = acted.get("next", {})
+            memory = {name: after.get(name, start) for name, start in self._forgotten.items()}
+            self._seen = Seen(frame, observation, tuple(shares.tolist()), acted["action"], memory)
+        return self._seen
+
+    def step(self, action: Tensor) -> float:
+        """Take an action, (1,) and then its shape; return the reward."""
+        seen = self.see()
+        self._earlier_frames.append(seen.frame)
+        self._memory = seen.memory
+        reward = float(self.worlds.step(self._every, action)[0])
+        self.reward += reward
+        self._change()
+        return reward
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the episode has ended."""
+        return bool(self.worlds.state.end_reason[0] != 0)
+
+    # What a person does
+
+    def move(self, body: BodyState) -> None:
+        """Put the drone somewhere. No time passes; contact is the only rule that applies."""
+        self._forget()
+        self._place(body)
+        self.task.touch(self.worlds.state, body.position)
+
+    def set_light(self, light: float) -> None:
+        """Set the factor by which cameras multiply all colors."""
+        self.light = light
+        self._change()
+
+    def set_wind(self, speed: float, direction: float) -> None:
+        """Set the wind: metres a second, and where it comes from.
+
+        The direction is in degrees, clockwise from above: 0 straight ahead, 90 from the right. Only
+        drones with dynamics feel it.
+        """
+        self.wind = speed, direction
+        if self.has_dynamics:
+            self.worlds.dynamics = Quadrotor(self.flight_dynamics, self.policy.actions)
+            self._change()
+
+    @property
+    def flight_dynamics(self) -> DynamicsSettings:
+        """Dynamics, with the present wind, of the policy's drone, else of AirSim's."""
+        speed, direction = self.wind
+        base = self.policy.dynamics if self.has_dynamics else DynamicsSettings(mode="simple_flight")
+        if self.wind == _to_polar(base.wind):  # unchanged: its exact numbers, for demonstrations
+            return base
+        angle, upward = math.radians(direction), self.policy.dynamics.wind[2]
+        level = (-speed * math.cos(angle), speed * math.sin(angle))
+        return base.replace(wind=(*(round(along, 9) + 0.0 for along in level), upward))
+
+    @property
+    def conditions(self) -> tuple[Any, Any, DynamicsSettings, ActionSettings]:
+        """Task, camera, dynamics and actions, as demonstrations note them."""
+        own = self.policy
+        dynamics = self.flight_dynamics if self.has_dynamics else own.dynamics
+        return own.task, own.description.camera, dynamics, own.actions
+
+    # Images
+
+    def render(self, camera: str) -> Tensor:
+        """Render one of AirSim's five cameras, or the drone from behind. (H, W, 3), uint8."""
+        if camera == CHASE.name:
+            return render_chase(self.worlds, self._look(), HEIGHT, WIDTH)[0]
+        view = self.worlds.view(camera, "rgb", HEIGHT, WIDTH)
+        return self.worlds.render(self.worlds.state, view, self._look())[0]
+
+    def close(self) -> None:
+        """Close the renderer."""
+        self._env.close()
+
+    def _look(self) -> Appearance | None:
+        """Return the episode's appearance under the present light; one object until it changes."""
+        own = self._base.appearances.current()
+        if self.light == 1.0:
+            return own
+        if self._lit is None:
+            whole = own or self._base.appearances.middle or Appearance()
+            exposure = self.light * (1.0 if whole.exposure is None else whole.exposure)
+            self._lit = dataclasses.replace(whole, exposure=exposure)
+        return self._lit
+
+    def _forget(self) -> None:
+        """Let the policy begin without earlier frames."""
+        self._earlier_frames.clear()
+        self._memory: Mapping[str, Tensor] = self._forgotten
+
+    def _place(self, body: BodyState) -> None:
+        self.worlds.state.body = body
+        self._change()
+
+    def _change(self) -> None:
+        self.version += 1
+        self._seen: Seen | None = None
+        self._lit: Appearance | None = None
+
+
+def _to_polar(wind: tuple[float, float, float]) -> tuple[float, float]:
+    """Return speed and direction, see `World.set_wind`, of the air's velocity."""
+    x, y, _ = wind
+    return math.hypot(x, y), math.degrees(math.atan2(y, 0.0 - x)) % 360.0

@@ -1,1 +1,0 @@
-"""Robustness: success rates under perturbations, and the operating domain."""

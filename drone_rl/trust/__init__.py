@@ -1,0 +1,1 @@
+"""Judge policies: rollouts, verdicts, robustness, operating domains, videos, export with a card."""

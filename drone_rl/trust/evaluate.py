@@ -1,0 +1,230 @@
+"""`drone-rl evaluate`: evaluate a policy next to the baselines, and print the figures."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
+
+from tensordict.nn import TensorDictModuleBase
+
+from drone_rl.collectors.complete_episodes import run_episodes
+from drone_rl.config import AppearanceSettings
+from drone_rl.config.commands import EvaluateSettings, HeldOutSettings
+from drone_rl.config.configuration import from_arguments
+from drone_rl.envs import worlds_of
+from drone_rl.policies.baselines import check_baselines
+from drone_rl.policies.external_network import Logits
+from drone_rl.policies.external_policy import as_policy
+from drone_rl.policies.policy import BasePolicy
+from drone_rl.sim.tasks import as_task
+from drone_rl.trust.baselines import run_baselines
+from drone_rl.trust.metrics import summarise
+from drone_rl.trust.rounding_sensitivity import run_compared
+from drone_rl.trust.verdict_text import unlike as unlike_text
+from drone_rl.utils.display import Result, aligned, table
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import Progress, as_progress
+from drone_rl.utils.provenance import provenance
+from drone_rl.utils.seeding import RootSeed, with_seed
+from drone_rl.utils.text import Evidence, Sentence, fixed_seed, interval, percent, say, seed_line
+
+
+@dataclasses.dataclass(frozen=True)
+class Evaluation(Result):
+    """Figures of a policy and of the baselines on the same initial states."""
+
+    policy: BasePolicy
+    settings: EvaluateSettings
+    figures: dict[str, dict[str, Any]]
+    """Figures of "greedy", "sampled" and the baselines; see `drone_rl.trust.metrics.summarise`."""
+    seed: RootSeed
+    """Root of the environments' random streams."""
+    rounding: dict[str, Any] | None = None
+    """The implementation that computed the actions, and the comparison with another one; see
+    `drone_rl.trust.rounding_sensitivity.Rounding`."""
+
+    @property
+    def success(self) -> float:
+        """Success rate with the most probable actions."""
+        return self.figures["greedy"]["success"]["share"]
+
+    def rows(self) -> list[list[str]]:
+        """Return the figures as rows of text: a header, the figures, and intervals of rates.
+
+        The intervals are those of the policy only, so that the table fits a terminal.
+        """
+        figures = self.figures.values()
+        terms = as_task(self.policy.task).vocabulary
+        rows = [["", *self.figures], *self._rates("success rate", [f["success"] for f in figures])]
+        for name in self.figures["greedy"]["shares"]:
+            label = f"{terms.goals} {terms.reached}" if name == "all" else terms.side(name)
+            rows += self._rates(label, [f["shares"][name] for f in figures])
+        rows.append([f"mean {terms.goals}", *(f"{f['mean_goals']:.2f}" for f in figures)])
+        rows.append(["never reached", *(percent(f["never_reached"]["mean"]) for f in figures)])
+        for reason in self.figures["greedy"]["ends"]:
+            cells = (str(f["ends"][reason]["successes"]) for f in figures)
+            rows.append([f"end: {reason.replace('_', ' ')}", *cells])
+        rows.append(["mean length", *(f"{f['mean_length']:.1f}" for f in figures)])
+        rows.append(["episodes", *(str(f["episodes"]) for f in figures)])
+        return rows
+
+    def _rates(self, label: str, figures: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+        """Return a row of rates, and a row of the policy's 95% intervals."""
+        rates = [f["share"] if "share" in f else f["mean"] for f in figures]
+        texts = ["-" if rate is None else percent(rate) for rate in rates]
+        policy = [
+            interval(figure) if name in ("greedy", "sampled") and rate is not None else ""
+            for name, rate, figure in zip(self.figures, rates, figures, strict=True)
+        ]
+        return [[label, *texts], ["  95% CI", *policy]]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values, as in `evaluation.json`."""
+        origin = self.policy.origin
+        return {
+            "policy": origin["policy"],
+            **self.seed.as_dict(),
+            **({"unlike": self.policy.unlike} if self.policy.unlike else {}),
+            **self.figures,
+            "rounding": self.rounding,
+            **provenance(),
+            "trained": origin["trained"] and origin["trained"]["progress"],
+        }
+
+    def __str__(self) -> str:
+        """Return the table for a terminal, and notes."""
+        return "\n".join([aligned(self.rows(), are_numbers=True), *self._notes()])
+
+    def _repr_html_(self) -> str:
+        head, *rows = self.rows()
+        return table(head, rows, self._notes())
+
+    def _notes(self) -> list[str]:
+        """Return notes on the arithmetic, the seed and what differs from the training."""
+        unlike, seed = self.policy.unlike, self.seed.as_dict()
+        evidence = {**seed, "rounding": self.rounding}
+        notes = [say(EVALUATION, evidence), unlike_text({"unlike": unlike}) if unlike else ""]
+        return [*filter(None, notes), seed_line(seed)]
+
+
+def evaluate(
+    policy: str | Path | BasePolicy | Logits,
+    settings: EvaluateSettings | None = None,
+    *,
+    task: Mapping[str, Any] | None = None,
+    dynamics: Mapping[str, Any] | None = None,
+    appearance: AppearanceSettings | str | None = None,
+    outputs: str | Path = "outputs",
+    progress: Progress | None = None,
+    **changes: Any,
+) -> Evaluation:
+    """Evaluate a policy, greedily and with sampled actions, and the baselines, on held-out states.
+
+    Args:
+        policy: The policy, an argument of `load_policy`, or a callable, see `policy_from`.
+        settings: Number of episodes, seed, device and so on.
+        task: Settings to change of the policy's task.
+        dynamics: Settings to change of its vehicle dynamics.
+        appearance: Appearance of the scenes, or the name of one such as "fog"; by default that of
+            the policy's training.
+        outputs: See `load_policy`.
+        progress: Called with the name of each step; a progress bar by default.
+        changes: Changed settings, as in `evaluate("good", episodes=200)`.
+
+    Raises:
+        InputError: The policy or a setting is unusable, or the baselines lack an oracle.
+    """
+    settings, seed = with_seed(from_arguments(EvaluateSettings, settings, changes, evaluate))
+    progress = as_progress(progress)
+    policy = as_policy(policy, outputs, task=task, dynamics=dynamics, appearance=appearance)
+    if settings.baselines and (judged := as_task(policy.task)).oracle is None:
+        raise InputError(f"task={judged.name} has no oracle to compare with; give baselines=false")
+    episodes, steps = settings.episodes, 3 if settings.baselines else 2
+    with held_out_environments(policy, settings, seed) as (env, actor):
+        state, flown = env.base_env.state_dict(), worlds_of(env).dynamics
+        if settings.baselines:
+            check_baselines(as_task(policy.task), flown.actions)
+        progress("most probable actions", 0, steps)
+        greedy, rounding = run_compared(env, actor, episodes)
+        env.base_env.load_state_dict(state)
+        progress("sampled actions", 1, steps)
+        rollouts = {"greedy": greedy, "sampled": run_episodes(env, actor, episodes, greedy=False)}
+    if settings.baselines:
+        progress("baselines", 2, steps)
+        num_envs, device = settings.batch_size, settings.device
+        rollouts |= run_baselines(num_envs, policy.task, state, episodes, device, flown)
+    progress("evaluated", steps, steps)
+    figures = {name: summarise(e) for name, e in rollouts.items()}
+    return Evaluation(policy, settings, figures, seed, rounding and rounding.as_dict())
+
+
+def held_out_environments(
+    policy: BasePolicy, settings: HeldOutSettings, seed: RootSeed
+) -> AbstractContextManager[tuple[Any, TensorDictModuleBase]]:
+    """Return a context manager of environments that no training uses, and the policy's actor."""
+    where: dict[str, Any] = {"device": settings.device, "renderer": settings.renderer}
+    return policy.flying(settings.batch_size, seed=seed.value, **where)
+
+
+def _same(evidence: Evidence) -> str:
+    check = evidence["rounding"]
+    what = "All actions" if check.get("bound", True) else "The outcomes"
+    return (
+        f"{what} of the first {check['compared_episodes']:,} greedy episodes were the same "
+        f"when computed again ({check['compared']})."
+    )
+
+
+def _other(evidence: Evidence) -> str:
+    check = evidence["rounding"]
+    what = "Actions" if check.get("bound", True) else "Actions or outcomes"
+    return (
+        f"{what} differed in {check['differing']:,} of the first {check['compared_episodes']:,} "
+        f"greedy episodes when computed again ({check['compared']}): decisions depend on rounding."
+    )
+
+
+def _fragile(evidence: Evidence) -> str:
+    check = evidence["rounding"]
+    return (
+        f"These figures hold for this arithmetic only: in {check['fragile']:,} of "
+        f"{check['frames']:,} of these episodes' frames ({percent(check['fragile_rate'])}) the "
+        "order in which float32 sums are computed can change the action."
+    )
+
+
+EVALUATION = (
+    fixed_seed("evaluation.fixed_seed"),
+    Sentence(
+        "computed",
+        "the implementation that computed the actions is known",
+        lambda e: bool(e.get("rounding")),
+        lambda e: f"Computed in {e['rounding']['arithmetic']}.",
+    ),
+    Sentence(
+        "computed.same",
+        "another implementation took the same actions or, without a bound, had the same outcomes",
+        lambda e: bool(e.get("rounding")) and not e["rounding"]["differing"],
+        _same,
+    ),
+    Sentence(
+        "computed.other",
+        "another implementation took other actions or, without a bound, had other outcomes",
+        lambda e: bool(e.get("rounding")) and e["rounding"]["differing"] > 0,
+        _other,
+    ),
+    Sentence(
+        "computed.fragile",
+        "rounding can change the action in more frames or episodes than a verdict allows",
+        lambda e: bool(
+            (found := e.get("rounding"))
+            and (
+                found["fragile_rate"] > found["threshold"]
+                or found["fragile_episodes_rate"] > found["threshold_episodes"]
+            )
+        ),
+        _fragile,
+    ),
+)
+"""Sentences about an evaluation's seed and arithmetic. Evidence: `evaluation.json`."""

@@ -1,0 +1,340 @@
+"""`drone-rl verdict`: judge policies and baselines, with certificate and operating domain."""
+
+import dataclasses
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypedDict, Unpack, cast, overload
+
+from tensordict.nn import TensorDictModuleBase
+from torchrl.envs import EnvBase
+
+from drone_rl.config import AppearanceSettings, DynamicsSettings, TaskSettings
+from drone_rl.config.commands import HeldOutSettings, JudgeSettings
+from drone_rl.config.configuration import Changes, as_changes, from_arguments
+from drone_rl.envs import DroneEnv
+from drone_rl.policies.baselines import make_baseline
+from drone_rl.policies.external_network import Logits
+from drone_rl.policies.external_policy import as_policy
+from drone_rl.policies.policy import BasePolicy, Policy
+from drone_rl.trust.baselines import BASELINES
+from drone_rl.trust.coverage import Coverage, compare_with_required, find_domain, recheck_domain
+from drone_rl.trust.evaluate import held_out_environments
+from drone_rl.trust.recorded import identify
+from drone_rl.trust.rule import Rule
+from drone_rl.trust.shifts_file import SavedShifts
+from drone_rl.trust.shifts_text import BRIEF, why_not
+from drone_rl.trust.verdict import FindClaim, Verdict, judge_policy
+from drone_rl.utils.display import Result, aligned, paragraph, table
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.exit_codes import NOT_COVERED, PROOF_MISSING
+from drone_rl.utils.progress import Progress, as_progress
+from drone_rl.utils.provenance import provenance
+from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator, with_seed
+from drone_rl.utils.text import rate, say, seed_line
+
+
+@dataclasses.dataclass(frozen=True)
+class Judgement(Result):
+    """A verdict on a policy, with certificate and operating domain."""
+
+    name: str
+    settings: JudgeSettings
+    verdict: Verdict
+    certificate: Path | None = None
+    """The given file or that next to the policy, even if the verdict does not quote it."""
+    measured: SavedShifts | None = None
+    """Its robustness evaluation, if there is one."""
+    weights: str | None = None
+    """Hash of the policy's weights if it was judged in the conditions of its training."""
+    coverage: Coverage | None = None
+    """The required operating domain compared with its own, if one is required."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values, as in `verdict.json`."""
+        return {
+            "policy": self.name,
+            "weights": self.weights,
+            "certificate": self.certificate and str(self.certificate),
+            "shifts": self.measured and str(self.measured.path),
+            "domain": self.domain or None,
+            "required_domain": self.coverage and dataclasses.asdict(self.coverage),
+            **self.verdict.as_dict(),
+            **provenance(),
+        }
+
+    @property
+    def domain(self) -> str:
+        """The operating domain as text; empty if it was not measured."""
+        return "" if self.measured is None else say(BRIEF, _quoted(self.measured, self.verdict))
+
+    def status(self, require: str | None = None) -> int:
+        """Return the exit code of `drone-rl verdict`.
+
+        Args:
+            require: "proved" for a re-checked proof of every placement, "good" or None for the
+                verdict's own code; a required domain has to be covered, too.
+        """
+        if require == "proved" and not self.verdict.is_proved:
+            return PROOF_MISSING
+        if self.coverage is not None and not self.coverage.is_covered:
+            return NOT_COVERED
+        is_proof_enough = require == "proved" and self.coverage is None
+        return 0 if is_proof_enough else self.verdict.exit_code
+
+    def save(self, path: Path) -> None:
+        """Write `verdict.json`."""
+        path.write_text(json.dumps(self.as_dict(), indent=2))
+
+    def __str__(self) -> str:
+        """Return the verdict, the operating domain, what it does not cover, and the seed."""
+        certainty = "" if self.verdict.certain else " (not certain)"
+        line = f"{self.verdict.kind.value}{certainty}: {self.verdict.sentence}"
+        required = "" if self.coverage is None else str(self.coverage)
+        seed = seed_line(self.verdict.evidence)
+        return "\n".join(filter(None, (line, self.domain, required, seed)))
+
+    def _repr_html_(self) -> str:
+        return "".join(map(paragraph, str(self).splitlines()))
+
+
+class Judgements(Result, tuple[Judgement, ...]):
+    """Several judgements, in the order of the policies."""
+
+    __slots__ = ()
+
+    def rows(self) -> list[list[str]]:
+        """Return a table of texts: a heading, then a row for each policy."""
+        rows = [["policy", "verdict", "certain", "success rate (95% CI)"]]
+        for name, verdict in ((one.name, one.verdict) for one in self):
+            success = rate(verdict.evidence["greedy"]["success"], label="")
+            rows.append([name, verdict.kind.value, "yes" if verdict.certain else "no", success])
+        return rows
+
+    def __str__(self) -> str:
+        """Return the table for a terminal."""
+        return aligned(self.rows())
+
+    def _repr_html_(self) -> str:
+        head, *rows = self.rows()
+        return table(head, rows)
+
+
+class JudgeOptions(TypedDict, total=False):
+    """Arguments of `judge`: those of `judge_one`, and all of `JudgeSettings`."""
+
+    task: Mapping[str, Any] | None
+    dynamics: Mapping[str, Any] | None
+    appearance: AppearanceSettings | str | None
+    certificate: str | Path | None
+    shifts: str | Path | None
+    require_domain: str | Path | None
+    outputs: str | Path
+    progress: Progress | None
+    drawn_seed: RootSeed | None
+    find_claim: FindClaim | None
+    episodes: int
+    num_envs: int
+    seed: int | None
+    device: str
+    renderer: str
+    sampled: bool
+    good_share: float
+    certificate_flights: int
+    domain_flights: int
+
+
+Given = str | Path | BasePolicy | Logits
+"""A policy, or something that `as_policy` converts to one."""
+
+
+@overload
+def judge(
+    policy: Given, settings: JudgeSettings | None = None, **options: Unpack[JudgeOptions]
+) -> Judgement: ...
+
+
+@overload
+def judge(
+    policy: Sequence[Given], settings: JudgeSettings | None = None, **options: Unpack[JudgeOptions]
+) -> Judgements: ...
+
+
+def judge(
+    policy: Given | Sequence[Given],
+    settings: JudgeSettings | None = None,
+    **options: Unpack[JudgeOptions],
+) -> Judgement | Judgements:
+    """Judge one policy, or a list or tuple of policies in the same environments.
+
+    Args:
+        policy: The policy, what `load_policy` takes, a callable, see `policy_from`, a model of
+            Stable-Baselines3, or a baseline: "random", "forward", "left", "right" or "oracle".
+        settings: Number of episodes, seed, device and so on.
+        options: See `drone_rl.trust.judge.judge_one`; also settings to change, as in
+            `judge("good", episodes=1000, appearance="fog")`.
+
+    Raises:
+        InputError: A policy, setting or file is unusable, or the list is empty.
+    """
+    if not isinstance(policy, list | tuple):
+        return judge_one(cast("Any", policy), settings, **options)
+    if not policy:
+        raise InputError("policy=[] is empty; give one or more policies")
+    settings = from_arguments(JudgeSettings, settings, {}, judge_one)
+    changed = {name: options.get(name) for name in ("task", "dynamics", "appearance")}
+    for one in policy:  # a wrong one is refused before any episode
+        _loaded(one, options.get("outputs", "outputs"), changed)
+    seed = options.pop("seed", settings.seed)  # all in the same environments
+    options["drawn_seed"] = options.get("drawn_seed") or root_seed(seed)
+    return Judgements(tuple(judge_one(one, settings, **options) for one in policy))
+
+
+def judge_one(
+    policy: Given,
+    settings: JudgeSettings | None = None,
+    *,
+    task: Mapping[str, Any] | None = None,
+    dynamics: Mapping[str, Any] | None = None,
+    appearance: AppearanceSettings | str | None = None,
+    certificate: str | Path | None = None,
+    shifts: str | Path | None = None,
+    require_domain: str | Path | None = None,
+    outputs: str | Path = "outputs",
+    progress: Progress | None = None,
+    drawn_seed: RootSeed | None = None,
+    find_claim: FindClaim | None = None,
+    **changes: Any,
+) -> Judgement:
+    """Judge the kind of a policy, see `drone_rl.trust.rule`, and whether it is certain.
+
+    Args:
+        policy: The policy, what `load_policy` takes, a callable, see `policy_from`, a model of
+            Stable-Baselines3, or a baseline: "random", "forward", "left", "right" or "oracle".
+        settings: Number of episodes, seed, device and so on.
+        task: Settings to change of the policy's task or, for a baseline, of the default one.
+        dynamics: Settings to change of the dynamics, likewise.
+        appearance: Appearance of the scenes, or the name of one such as "fog"; by default that of
+            the policy's training.
+        certificate: Certificate to quote, passed to `find_claim`.
+        shifts: Robustness evaluation to quote, see `drone_rl.trust.coverage.find_domain`.
+        require_domain: File of the required domain, see
+            `drone_rl.trust.coverage.read_requirements`.
+        outputs: Folder of all runs.
+        progress: Called with what is running; a progress bar by default.
+        drawn_seed: Seed of a larger analysis of which this is a part.
+        find_claim: Finds and checks certificates; by default none is quoted. `drone_rl.judge`
+            passes `drone_rl.verification.claim.find_claim`.
+        changes: Settings to change, as in `judge("good", episodes=1000)`.
+
+    Raises:
+        InputError: A policy, setting or file is unusable, or a required domain was not measured.
+    """
+    settings = from_arguments(JudgeSettings, settings, changes, judge_one)
+    settings, seed = with_seed(settings, drawn_seed)
+    progress = as_progress(progress)
+    changed = {"task": task, "dynamics": dynamics, "appearance": appearance}
+    loaded = _loaded(policy, outputs, changed)
+    progress("policy and baselines", 0, 1)
+    name = str(policy) if loaded is None or isinstance(policy, str | Path) else loaded.name
+    if isinstance(loaded, Policy) and policy == "latest":  # which changes with the next run
+        name = str(loaded.path)
+    claim = measured = coverage = None
+    if loaded is None:
+        files = {"certificate": certificate, "shifts": shifts, "require_domain": require_domain}
+        for setting, path in files.items():
+            if path is not None:
+                raise InputError(
+                    f"{setting}={path}, but policy={name} has no network; give {setting}= with the "
+                    "policy that it is of"
+                )
+        changed_task = Changes(TaskSettings).read(as_changes(task, "task"), "task")
+        changed_dynamics = Changes(DynamicsSettings).read(
+            as_changes(dynamics, "dynamics"), "dynamics"
+        )
+        drone = DynamicsSettings(**changed_dynamics)
+        drone.check_air()
+        worlds = _baseline(name, TaskSettings(**changed_task), drone, settings, seed)
+    else:
+        measured = find_domain(loaded, shifts, outputs)
+        needs = require_domain
+        coverage = None if needs is None else compare_with_required(loaded, needs, measured)
+        coverage = _reflown(loaded, coverage, measured, settings, seed)
+        where = {"device": settings.device, "renderer": settings.renderer}
+        flights = settings.certificate_flights
+        if find_claim is not None:
+            claim = find_claim(loaded, certificate, flights=flights, seed=seed, **where)
+        worlds = held_out_environments(loaded, settings, seed)
+    with worlds as (env, actor):
+        verdict = judge_policy(
+            env,
+            actor,
+            settings.episodes,
+            sampled=settings.sampled and loaded is not None,
+            rule=Rule(good_share=settings.good_share),
+            claim=claim,
+            unlike=None if loaded is None else loaded.unlike,
+            seed=seed,
+        )
+    progress("judged", 1, 1)
+    path = None if claim is None else claim.path
+    judgement = Judgement(name, settings, verdict, path, measured, identify(loaded))
+    if coverage is None or measured is None:
+        return judgement
+    against = why_not(_quoted(measured, verdict))
+    return dataclasses.replace(judgement, coverage=dataclasses.replace(coverage, against=against))
+
+
+def _loaded(policy: Any, outputs: str | Path, changed: Mapping[str, Any]) -> BasePolicy | None:
+    """Return a policy with its changes; None for a baseline, which sees no images."""
+    if not (isinstance(policy, str) and policy in BASELINES):
+        return as_policy(policy, outputs, **changed)
+    if changed["appearance"] is not None:
+        raise InputError(f"policy={policy} sees no images; leave appearance out")
+    return None
+
+
+def _reflown(
+    loaded: BasePolicy,
+    coverage: Coverage | None,
+    measured: SavedShifts | None,
+    settings: JudgeSettings,
+    seed: RootSeed,
+) -> Coverage | None:
+    """Add new episodes, if the file states that the domain is covered."""
+    numbers = None if measured is None else measured.numbers
+    if coverage is None or numbers is None or not coverage.is_stated or not settings.domain_flights:
+        return coverage
+    reflown = recheck_domain(loaded, coverage.needs, numbers, settings, seed)
+    return dataclasses.replace(coverage, reflown=reflown)
+
+
+def _quoted(measured: SavedShifts, verdict: Verdict) -> dict[str, Any]:
+    """Evidence of the sentences about the operating domain."""
+    return {"shifts": measured.evidence, "verdict": verdict.evidence}
+
+
+@contextmanager
+def _baseline(
+    name: str,
+    task: TaskSettings,
+    dynamics: DynamicsSettings,
+    settings: HeldOutSettings,
+    seed: RootSeed,
+) -> Iterator[tuple[EnvBase, TensorDictModuleBase]]:
+    """Environments without images, and a baseline."""
+    env = DroneEnv(
+        settings.batch_size,
+        task,
+        seed=seed.value,
+        stream=Stream.REPORT,
+        pixels=False,
+        device=settings.device,
+        dynamics=dynamics,
+    )
+    generator = torch_generator(seed.value, Stream.ACTIONS, device=env.device)
+    try:
+        yield env, make_baseline(name, task, generator, env.worlds.dynamics.actions)
+    finally:
+        env.close()

@@ -1,0 +1,313 @@
+"""Perturbations of the robustness evaluation: task, camera, appearance, faults and delays."""
+
+import dataclasses
+import enum
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, Self
+
+import torch
+from torch import Tensor
+
+from drone_rl.config import BaseTaskSettings
+from drone_rl.config.task import ObjectRegion
+from drone_rl.envs import fault_models
+from drone_rl.envs.fault_models import FaultModel, Sample
+from drone_rl.sim.rendering import Appearance, Distractors, Scene
+from drone_rl.sim.rendering.appearance import Colors, moved, turned
+from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.rendering.view import LUMA
+from drone_rl.sim.visual_randomization import stand
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.seeding import Stream, torch_generator
+
+DRIFT = 0.1
+"""Standard deviation of a step of a drifting perturbation, as a fraction of its strength."""
+ONSET_STEP = 20
+"""Step at which a perturbation begins in mode "onset": between the first cubes."""
+MAX_DISTRACTORS = 16
+"""Largest number of distractors."""
+_BLUE = (0.2, 0.4, 1.0)
+_AWAY = (2.0, 10.0)
+"""Distance of distractors from the area of the task, metres, from and to."""
+
+
+class PerturbationMode(enum.StrEnum):
+    """When a perturbation is active."""
+
+    CONSTANT = "constant"
+    """From start to end, in each environment with one of the extreme variations."""
+    DRIFTING = "drifting"
+    """In each environment a random walk of the variation that begins at 0."""
+    ONSET = "onset"
+    """As constant, but only from `ONSET_STEP` on."""
+
+
+@dataclasses.dataclass(frozen=True)
+class AppearanceChange:
+    """A change of the appearance, with a variation in each environment."""
+
+    change: Callable[[Appearance, Tensor], Appearance]
+    """Takes an appearance and variations from -1 to 1, (num_envs, dimensions), float64."""
+    dimensions: int = 0
+    """Numbers that a variation has."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Condition:
+    """All perturbations at once; none by default."""
+
+    task: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    """Settings of the task to replace."""
+    camera: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    """Settings of the camera to replace."""
+    appearance_changes: tuple[AppearanceChange, ...] = ()
+    """Changes of colors and light; they need those of `scene_appearance`."""
+    mounts: tuple[AppearanceChange, ...] = ()
+    """Changes of the camera's pose."""
+    faults: tuple[FaultModel, ...] = ()
+    """Camera faults, in order."""
+    delay: int = 0
+    """Steps by which actions are late."""
+    clutter: int = 0
+    """Number of distractors."""
+
+    @property
+    def dimensions(self) -> tuple[int, ...]:
+        """Numbers in the variation of each appearance change, then of the mounts."""
+        return tuple(part.dimensions for part in (*self.appearance_changes, *self.mounts))
+
+    def __or__(self, other: Self) -> "Condition":
+        """Combine two conditions; the other one's settings take precedence."""
+        return Condition(
+            task={**self.task, **other.task},
+            camera={**self.camera, **other.camera},
+            appearance_changes=self.appearance_changes + other.appearance_changes,
+            mounts=self.mounts + other.mounts,
+            faults=self.faults + other.faults,
+            delay=max(self.delay, other.delay),
+            clutter=max(self.clutter, other.clutter),
+        )
+
+
+def variations(
+    mode: PerturbationMode, dimensions: Sequence[int], num_envs: int, generator: torch.Generator
+) -> Iterator[list[Tensor]]:
+    """Yield the variations of each step, without end, of all environments, active or not.
+
+    `dimensions` are those of each part of the condition; one tensor per part is yielded. Shapes:
+    (num_envs, dimensions), float64.
+    """
+    shape, is_drifting = (num_envs, sum(dimensions)), mode is PerturbationMode.DRIFTING
+    variation = torch.rand(shape, generator=generator, dtype=torch.float64).round() * 2 - 1
+    variation = torch.zeros_like(variation) if is_drifting else variation
+    while True:
+        yield [*variation.split(list(dimensions), -1)]
+        if is_drifting:
+            step = DRIFT * torch.randn(shape, generator=generator, dtype=torch.float64)
+            variation = reflect(variation + step)
+
+
+def reflect(variation: Tensor) -> Tensor:
+    """Reflect numbers at -1 and 1 into that range. Shape kept."""
+    return ((variation - 1.0) % 4.0 - 2.0).abs() - 1.0
+
+
+def scene_appearance(scene: Scene) -> Appearance:
+    """Return lights, sky and colors of a scene, without distractors.
+
+    A class whose geoms differ in color is left out, so that it stays as in the model.
+    """
+    classes = {*scene.semantic_classes} - {SemanticClass.DISTRACTOR}
+    by_class = {m: {*map(tuple, scene.colors[scene.geoms(m), :3].tolist())} for m in classes}
+    colors = {m: next(iter(own)) for m, own in by_class.items() if len(own) == 1}
+    model = scene.model
+    lights = (model.light_ambient[0], model.light_diffuse[0], model.light_dir[0])
+    ambient, sun, direction = (tuple(light.tolist()) for light in lights)
+    return Appearance(
+        colors={**colors, SemanticClass.SKY: scene.sky},
+        ambient=ambient,
+        sun=sun,
+        sun_direction=direction,
+    )
+
+
+def tint(classes: Sequence[SemanticClass], by: float) -> AppearanceChange:
+    """Shift red, green and blue of some classes by up to `by`, differently in each environment."""
+    return AppearanceChange(
+        lambda look, v: _repaint(look, classes, lambda own: (own.to(v) + by * v).clamp(0, 1)), 3
+    )
+
+
+def whiten(classes: Sequence[SemanticClass], fraction: float) -> AppearanceChange:
+    """Mix this fraction of white into the colors of some classes."""
+    return AppearanceChange(
+        lambda look, _: _repaint(look, classes, lambda own: own + fraction * (1.0 - own))
+    )
+
+
+def sun_at(degrees: float) -> AppearanceChange:
+    """Set the elevation of the sun above the horizon and keep its azimuth."""
+
+    def change(appearance: Appearance, variation: Tensor) -> Appearance:
+        assert appearance.sun_direction is not None
+        ahead = _tensor(appearance.sun_direction)[..., :2]
+        ahead = ahead / ahead.norm(dim=-1, keepdim=True)
+        angle = math.radians(degrees)
+        down = torch.full_like(ahead[..., :1], -math.sin(angle))
+        direction = torch.cat([math.cos(angle) * ahead, down], -1)
+        return dataclasses.replace(appearance, sun_direction=direction)
+
+    return AppearanceChange(change)
+
+
+def expose(gain: float) -> AppearanceChange:
+    """Multiply the camera's exposure; values above white are white."""
+
+    def change(appearance: Appearance, variation: Tensor) -> Appearance:
+        own = 1.0 if appearance.exposure is None else appearance.exposure
+        return dataclasses.replace(appearance, exposure=gain * own)
+
+    return AppearanceChange(change)
+
+
+def fog(visibility: float) -> AppearanceChange:
+    """Set the visibility in metres, see `Appearance.fog_visibility`."""
+    return AppearanceChange(lambda look, _: dataclasses.replace(look, fog_visibility=visibility))
+
+
+def mount(
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0), turn: str = "yaw", degrees: float = 0.0
+) -> AppearanceChange:
+    """Move the camera and turn it about itself, in either direction.
+
+    The offset is in metres in the drone frame: forward, to the left, up. See
+    `drone_rl.sim.rendering.appearance.AXES` for the axes to turn about.
+    """
+
+    def change(appearance: Appearance, variation: Tensor) -> Appearance:
+        shift = variation * variation.new_tensor(offset)
+        rotation = turned(turn, variation[:, 0] * degrees).to(variation)
+        return dataclasses.replace(appearance, camera=moved(appearance.camera, shift, rotation))
+
+    return AppearanceChange(change, 1)
+
+
+def elevation(direction: Colors) -> float:
+    """Return the elevation of a sun that shines in this direction, degrees above the horizon."""
+    x, y, z = _tensor(direction).tolist()
+    return math.degrees(math.atan2(-z, math.hypot(x, y)))
+
+
+def task_region(settings: BaseTaskSettings) -> ObjectRegion:
+    """Return where a task's objects are, their size and color; an `InputError` without any."""
+    if settings.object_region is None:
+        raise InputError(f"axes=distractors is not for task={settings.name}; leave it out of axes")
+    return settings.object_region
+
+
+def as_bright(color: Sequence[float]) -> tuple[float, ...]:
+    """Return a blue of the same luminance as a color, as far as possible."""
+    wanted, has = (sum(w * c for w, c in zip(LUMA, rgb, strict=True)) for rgb in (color, _BLUE))
+    return tuple(min(1.0, wanted / has * c) for c in _BLUE)
+
+
+def sample_distractors(region: ObjectRegion, num_envs: int, generator: torch.Generator) -> Tensor:
+    """Sample positions of distractors next to the area of the task, metres, world frame.
+
+    Shape: (num_envs, MAX_DISTRACTORS, 3), float64.
+    """
+    near, far = _AWAY
+    sampled = torch.rand(num_envs, MAX_DISTRACTORS, 3, generator=generator, dtype=torch.float64)
+    ahead = region.first / 2 + sampled[..., 0] * region.last
+    is_left = sampled[..., 2].round().bool()
+    return stand(region, ahead, near + sampled[..., 1] * (far - near), is_left, region.altitude)
+
+
+def clutter(appearance: Appearance | None, region: ObjectRegion, places: Tensor) -> Appearance:
+    """Add distractors of the size, height and luminance of the task's objects.
+
+    Their places are in metres, world frame. Shape: (num_envs, count, 3).
+    """
+    color = torch.tensor(as_bright(region.color)).to(places)
+    more = Distractors(
+        places=places,
+        sizes=torch.full_like(places[..., 0], region.size),
+        colors=color.expand(places.shape),
+    )
+    appearance = appearance or Appearance()
+    own = appearance.distractors
+    return dataclasses.replace(appearance, distractors=more if own is None else own.concat(more))
+
+
+def frozen_frames(rate: float) -> FaultModel:
+    """Repeat the previous image with this probability at each step.
+
+    Unlike `fault_models.frozen_frames` it samples a number at the first step, too.
+    """
+
+    def begin(images: Tensor, sample: Sample) -> Tensor:
+        sample(1)  # one number a step, the first included
+        return images
+
+    return dataclasses.replace(fault_models.frozen_frames(rate), begin=begin)
+
+
+class FaultPipeline:
+    """Applies faults in a batch of environments, of which fewer and fewer are active."""
+
+    def __init__(
+        self, faults: Sequence[FaultModel], num_envs: int, seed: int, *, hiding_only: bool = False
+    ) -> None:
+        """Take faults in the order in which they act; each has a random stream of its own.
+
+        `hiding_only` leaves out those that hide nothing.
+        """
+        self._num_envs = num_envs
+        self._faults = [
+            (fault, torch_generator(seed, Stream.SHIFTS, number=1 + i))
+            for i, fault in enumerate(faults)
+            if fault.hides or not hiding_only
+        ]
+        self._memories: dict[int, Tensor] = {}
+
+    def __call__(self, images: Tensor, active: Tensor, nothing: float = 0.0) -> Tensor:
+        """Return the faulty images of one step.
+
+        `images` are those of the `active` environments, from 0 to 1, shape (n, C, H, W); `nothing`
+        is the value of a pixel that shows nothing.
+        """
+        for i, (fault, generator) in enumerate(self._faults):
+            sample = self._sampler(generator, active)
+            if i not in self._memories:
+                rows = fault.begin(images, sample)
+                self._memories[i] = rows.new_zeros(self._num_envs, *rows.shape[1:])
+            else:
+                rows = fault.update(self._memories[i][active], images, sample)
+            self._memories[i][active] = rows
+            images = fault.show(images, rows, nothing)
+        return images
+
+    def _sampler(self, generator: torch.Generator, active: Tensor) -> Sample:
+        def sample(*shape: int, normal: bool = False) -> Tensor:
+            draw = torch.randn if normal else torch.rand
+            every = draw(self._num_envs, *shape, generator=generator)
+            return every.to(active.device)[active]
+
+        return sample
+
+
+def _repaint(
+    appearance: Appearance, classes: Sequence[SemanticClass], paint: Callable[[Tensor], Tensor]
+) -> Appearance:
+    painted = {m: paint(_tensor(c)) for m, c in appearance.colors.items() if m in classes}
+    if not painted:
+        raise InputError(
+            "the task has no objects of one color to change; leave object_color and object_white "
+            "out of axes"
+        )
+    return dataclasses.replace(appearance, colors={**appearance.colors, **painted})
+
+
+def _tensor(value: Colors) -> Tensor:
+    return torch.as_tensor(value, dtype=torch.float64)

@@ -1,0 +1,301 @@
+"""Check whether a policy's episodes depend on rounding, and whether implementations agree."""
+
+import dataclasses
+from collections.abc import Iterable, Sequence
+from typing import Any, cast
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
+from torchrl.envs import EnvBase
+
+from drone_rl.collectors.complete_episodes import (
+    CompleteEpisodes,
+    StepLog,
+    episode_batches,
+    final_episodes,
+    run_episodes,
+)
+from drone_rl.envs import base_env, worlds_of
+from drone_rl.policies import ImageNetwork, make_actor
+from drone_rl.policies.external_policy import ExternalPolicy
+from drone_rl.policies.networks import require_finite
+from drone_rl.policies.policy import BasePolicy
+from drone_rl.policies.rounding import (
+    REMEDY,
+    Decide,
+    Regrouped,
+    arithmetic_on,
+    decider,
+    require_same_in_any_batch,
+)
+from drone_rl.sim.actions import DiscreteActions
+from drone_rl.sim.dynamics import ComputerVision
+from drone_rl.utils.errors import InputError
+
+MAX_FRAGILE = 0.02
+"""Largest fraction of fragile frames for a certain verdict; honest policies have at most 0.003."""
+MAX_FRAGILE_EPISODES = 0.25
+"""Largest fraction of episodes with a fragile frame. Honest policies have at most 0.15."""
+MAX_UNEXPLAINED = 0.04
+"""Largest fraction of episodes that may end differently in another implementation if there is no
+bound on rounding, actions are continuous, or drones have flight dynamics. Otherwise an episode may
+take other actions only in or after a fragile frame."""
+COMPARED = 50
+"""Episodes that are run again: by the other implementation, or in other batches."""
+ALONE = 16
+"""Episodes that a third-party network runs again one frame at a time and in other batches."""
+_CHECKED_EPISODES = 32
+"""Episodes that check whether a third-party policy depends on the current frame only."""
+_BATCH_SIZES = (*range(1, 65), 100, 128, 200, 250, 256, 400, 500, 512, 1000)
+"""Sizes of the batches in which the same frames are evaluated."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Rounding:
+    """How far some episodes depend on rounding."""
+
+    arithmetic: str
+    """Arithmetic that computed the episodes, such as "float32 on cpu, fused kernel"."""
+    is_bound: bool
+    """Whether the rounding error is bounded, not estimated."""
+    frames: int
+    fragile: int
+    """Frames in which rounding can change the action."""
+    episodes: int
+    fragile_episodes: int
+    """Episodes with such a frame."""
+    compared: str
+    """Implementation that ran the episodes again."""
+    compared_episodes: int
+    differing: int
+    """Episodes in which it took other actions; with continuous actions or flight dynamics, episodes
+    that ended differently."""
+    unexplained: int
+    """Differing episodes without a fragile frame up to the first other action, or at all if
+    outcomes were compared."""
+
+    @property
+    def is_excessive(self) -> bool:
+        """Whether too much is fragile or unexplained for any verdict to be certain."""
+        allowed = 0.0 if self.is_bound else MAX_UNEXPLAINED
+        return self.frames > 0 and (
+            self.fragile > MAX_FRAGILE * self.frames
+            or self.fragile_episodes > MAX_FRAGILE_EPISODES * self.episodes
+            or self.unexplained > allowed * self.compared_episodes
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values, as in `verdict.json`."""
+        return {
+            "arithmetic": self.arithmetic,
+            "bound": self.is_bound,
+            "frames": self.frames,
+            "fragile": self.fragile,
+            "fragile_rate": self.fragile / max(1, self.frames),
+            "threshold": MAX_FRAGILE,
+            "episodes": self.episodes,
+            "fragile_episodes": self.fragile_episodes,
+            "fragile_episodes_rate": self.fragile_episodes / max(1, self.episodes),
+            "threshold_episodes": MAX_FRAGILE_EPISODES,
+            "compared": self.compared,
+            "compared_episodes": self.compared_episodes,
+            "differing": self.differing,
+            "unexplained": self.unexplained,
+            "excessive": self.is_excessive,
+        }
+
+
+def run_compared(
+    env: EnvBase, actor: TensorDictModuleBase, num_episodes: int
+) -> tuple[CompleteEpisodes, Rounding | None]:
+    """Run greedy episodes in PyTorch, and the first ones again by another implementation.
+
+    Return the episodes and what `check_rounding` returns; see there for errors.
+    """
+    state, log = base_env(env).state_dict(), StepLog()
+    greedy = run_episodes(env, actor, num_episodes, log=log)
+    base_env(env).load_state_dict(state)
+    return greedy, check_rounding(env, actor, COMPARED, greedy=greedy, log=log, is_compiled=False)
+
+
+def require_function(
+    policy: BasePolicy, *, seed: int, device: str = "cpu", renderer: str = "raytrace"
+) -> None:
+    """Check that a third-party policy depends on the current frame only.
+
+    Others are not checked: their descriptions state whether they use earlier frames. The seed,
+    device and renderer are those of the environments, see `BasePolicy.flying`.
+
+    Raises:
+        InputError: Its actions depend on the batch, on a frame's row, or on earlier calls.
+    """
+    if isinstance(policy, ExternalPolicy):
+        options: dict[str, Any] = {"seed": seed, "device": device, "renderer": renderer}
+        with policy.flying(_CHECKED_EPISODES, **options) as (env, actor):
+            run_compared(env, actor, _CHECKED_EPISODES)
+
+
+def check_rounding(
+    env: EnvBase,
+    actor: TensorDictModuleBase,
+    episodes: int,
+    *,
+    greedy: CompleteEpisodes,
+    log: StepLog,
+    is_compiled: bool = True,
+) -> Rounding | None:
+    """Run the first episodes again, with a bound on the rounding error at every frame.
+
+    They are compared with greedy episodes and their actions, `greedy` and `log`, which started from
+    the present state of the environments. If the fused kernel ran those, PyTorch runs them again;
+    otherwise the fused kernel, or PyTorch with the frames in other batches.
+
+    Args:
+        env: The environments.
+        actor: The policy's actor.
+        episodes: How many at most.
+        greedy: Greedy episodes of the policy.
+        log: Their actions.
+        is_compiled: Whether the fused kernel ran them if it supports the policy.
+
+    Returns:
+        None for an actor without a network that depends on single images only.
+
+    Raises:
+        InputError: An output is not finite, or a third-party network depends on other frames.
+    """
+    network = getattr(actor, "network", None)
+    if not isinstance(network, ImageNetwork) or network.is_recurrent:
+        return None
+    decide, is_bound = decider(network)
+    arithmetic, is_exact = arithmetic_on(worlds_of(env).device)
+    episodes, state = min(episodes, len(greedy)), base_env(env).state_dict()
+    ends, again, fragile = _run_checked(env, decide, network, episodes)
+    count = episodes
+    if log.implementation == "PyTorch":
+        count = min(COMPARED, episodes)
+        if not is_compiled:
+            ends, again = _run_again(env, actor, count, state, is_compiled=True)
+        if is_compiled or again.implementation == "PyTorch":
+            mixed = make_actor(Regrouped(network, "mixed"), env.action_spec)
+            ends, again = _run_again(env, mixed, count, state)
+            again.implementation = "PyTorch, in other batches"
+    if by_action := _is_compared_by_action(env, network):
+        pairs = zip(log.actions[:count], again.actions[:count], strict=True)
+        steps = [_first_difference(one, other) for one, other in pairs]
+    else:
+        steps = [_other_outcome(greedy, ends, i) for i in range(count)]
+    if not is_bound:
+        base_env(env).load_state_dict(state)
+        _require_function_of_frames(env, network, log, fragile)
+    return Rounding(
+        arithmetic=f"{arithmetic}, {log.implementation}",
+        is_bound=is_bound and by_action and is_exact,
+        frames=sum(map(len, fragile)),
+        fragile=int(sum(f.sum() for f in fragile)),
+        episodes=len(fragile),
+        fragile_episodes=sum(bool(f.any()) for f in fragile),
+        compared=again.implementation,
+        compared_episodes=count,
+        differing=sum(step is not None for step in steps),
+        unexplained=_count_unexplained(steps, fragile),
+    )
+
+
+def _run_checked(
+    env: EnvBase, decide: Decide, network: ImageNetwork, episodes: int
+) -> tuple[CompleteEpisodes, StepLog, list[Tensor]]:
+    """Run episodes in PyTorch; return also which frames of each are fragile, (T,), bool."""
+    log, fragile, finals = StepLog(), list[Tensor](), []
+    for batch in episode_batches(
+        env, _CheckingActor(decide, network), episodes, ("fragile",), log=log
+    ):
+        lengths = [len(actions) for actions in log.actions[len(fragile) :]]
+        fragile += cast(Tensor, batch["fragile"]).cpu().split(lengths)
+        finals.append(final_episodes(env, batch))
+    return CompleteEpisodes.joined(finals), log, fragile
+
+
+def _run_again(
+    env: EnvBase,
+    actor: TensorDictModuleBase,
+    episodes: int,
+    state: dict[str, Any],
+    *,
+    is_compiled: bool = False,
+) -> tuple[CompleteEpisodes, StepLog]:
+    """Run episodes from this state of the environments."""
+    base_env(env).load_state_dict(state)
+    log = StepLog()
+    return run_episodes(env, actor, episodes, is_compiled=is_compiled, is_exact=True, log=log), log
+
+
+def _is_compared_by_action(env: EnvBase, network: ImageNetwork) -> bool:
+    """Return whether episodes are compared by action, not only by outcome.
+
+    Implementations of flight dynamics round differently, so frames are not the same.
+    """
+    dynamics = worlds_of(env).dynamics
+    return isinstance(network.actions, DiscreteActions) and isinstance(dynamics, ComputerVision)
+
+
+def _first_difference(one: Tensor, other: Tensor) -> int | None:
+    """Return the first step at which two sequences of actions differ, or None."""
+    shared = min(len(one), len(other))
+    steps = (one[:shared] != other[:shared]).nonzero()
+    if len(steps):
+        return int(steps[0, 0])
+    return None if len(one) == len(other) else shared
+
+
+def _other_outcome(one: CompleteEpisodes, other: CompleteEpisodes, i: int) -> int | None:
+    """Return the length of episode i if its outcomes differ, or None."""
+    is_same = bool(one.end_reason[i] == other.end_reason[i]) and torch.equal(
+        one.goals.reached[i], other.goals.reached[i]
+    )
+    return None if is_same else int(one.length[i])
+
+
+def _count_unexplained(steps: Iterable[int | None], fragile: Sequence[Tensor]) -> int:
+    """Count the differing episodes without a fragile frame up to the step where they differ."""
+    differing = ((i, step) for i, step in enumerate(steps) if step is not None)
+    return sum(not fragile[i][: step + 1].any() for i, step in differing)
+
+
+class _CheckingActor(TensorDictModuleBase):
+    """Act greedily, and write whether rounding could change the action."""
+
+    def __init__(self, decide: Decide, network: ImageNetwork) -> None:
+        super().__init__()
+        self.in_keys, self.out_keys = ["pixels"], ["action", "fragile"]
+        self._decide, self._network = decide, network
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Write "action" and "fragile"."""
+        decisions = self._decide(cast(Tensor, tensordict.get("pixels")))
+        require_finite(decisions.outputs, self._network.owner)
+        tensordict.set("fragile", decisions.is_fragile)
+        return tensordict.set("action", self._network.actions.greedy(decisions.outputs))
+
+
+def _require_function_of_frames(
+    env: EnvBase, network: ImageNetwork, log: StepLog, fragile: Sequence[Tensor]
+) -> None:
+    """Check that a third-party network depends on the frame alone, in batches of any size."""
+    before, frames = base_env(env).state_dict(), torch.empty(0)
+    count = min(ALONE, len(fragile))
+    for groups, how in (("single", "one frame at a time"), ("mixed", "in other batches")):
+        base_env(env).load_state_dict(before)
+        again, actor = StepLog(), make_actor(Regrouped(network, groups), env.action_spec)
+        for batch in episode_batches(env, actor, count, ("pixels",), log=again):
+            frames = cast(Tensor, batch["pixels"])
+        steps = map(_first_difference, log.actions, again.actions)  # until one log ends
+        other = _count_unexplained(steps, fragile)
+        if isinstance(network.actions, DiscreteActions) and other > MAX_UNEXPLAINED * count:
+            raise InputError(
+                f"{network.owner} depends on more than the frame: evaluated {how} it takes other "
+                f"actions in {other} of {count} episodes; {REMEDY}"
+            )
+    require_same_in_any_batch(network, frames, sorted({*_BATCH_SIZES, env.batch_size[0]}))

@@ -1,0 +1,231 @@
+"""Measure success rates along every axis, paired with those without perturbation."""
+
+import base64
+import contextlib
+import dataclasses
+import functools
+import math
+import zlib
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from drone_rl.trust.agents import OracleAgent, StepContext, has_oracle
+from drone_rl.trust.axes import TOGETHER, Axis
+from drone_rl.trust.paired_evaluation import ConditionResult, PairedEvaluator
+from drone_rl.trust.perturbations import Condition, PerturbationMode
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.intervals import mean_bounds, proportion
+
+Report = Callable[[str], None]
+STEP = 8
+"""Step of the example images: the first cube is near, and delays are visible."""
+
+
+class Suite:
+    """Run a policy and the oracle under all conditions."""
+
+    def __init__(
+        self, evaluator: PairedEvaluator, modes: Sequence[PerturbationMode], possible_share: float
+    ) -> None:
+        """Run both without perturbation.
+
+        A strength is impossible if the oracle's success rate is certainly below `possible_share`.
+        """
+        self._evaluator, self._modes, self._possible = evaluator, modes, possible_share
+        self.plain = evaluator.run(Condition())
+        self._knows = has_oracle(self.plain.episodes.task)
+        self.oracle: ConditionResult | None = None
+        self.oracle = self._fly_oracle(Condition()) if self._knows else None
+
+    def run(self, axes: Sequence[Axis], numbers: Sequence[int], report: Report) -> dict[str, Any]:
+        """Measure axes at the strengths with these numbers (from 1), alone and combined.
+
+        Returns:
+            Plain values: "plain", without perturbation; "axes", by name; and "together", all axes
+            combined, each at its third strength.
+        """
+        by_axis = {axis.name: self.along(axis, numbers, report) for axis in axes}
+        report("all together")
+        parts = (axis.make(axis.strengths[TOGETHER - 1], self._evaluator.subject) for axis in axes)
+        together = functools.reduce(lambda a, b: a | b, parts, Condition())
+        plain = {"oracle": _success(self.oracle), **self._figures(self.plain)}
+        return {"plain": plain, "axes": by_axis, "together": self.level(together)}
+
+    def along(self, axis: Axis, numbers: Sequence[int], report: Report) -> dict[str, Any]:
+        """Measure one axis at some of its strengths."""
+        levels, subject = [], self._evaluator.subject
+        for number in numbers:
+            strength = axis.strengths[number - 1]
+            report(f"{axis.name} {number}")
+            at = {"value": axis.value(strength, subject), "position": axis.position(strength)}
+            levels.append({"number": number, **at, **self.level(axis.make(strength, subject))})
+        plain = float(self.plain.episodes.success.mean())
+        return {
+            "group": axis.group,
+            "unit": axis.unit,
+            "neutral": finite(axis.value(axis.neutral, subject)),
+            "areas": {mode.value: success_area(levels, plain, mode) for mode in self._modes},
+            "levels": levels,
+        }
+
+    def level(self, condition: Condition) -> dict[str, Any]:
+        """Measure one condition.
+
+        Returns:
+            "refused": why the task or the camera does not allow it, or None; "oracle": the oracle's
+            success rate, if any; "impossible": whether that is too low; "modes": figures by mode.
+        """
+        try:
+            self._evaluator.settings(condition)
+        except InputError as error:
+            return {"refused": str(error), "oracle": None, "impossible": None, "modes": {}}
+        oracle = _success(self._fly_oracle(condition) if self._knows else None)
+        drifts = sum(condition.dimensions) > 0
+        return {
+            "refused": None,
+            "oracle": oracle,
+            "impossible": None if oracle is None else oracle["upper95"] < self._possible,
+            "modes": {
+                mode.value: self._figures(self._evaluator.run(condition, mode))
+                for mode in self._modes
+                if drifts or mode is not PerturbationMode.DRIFTING
+            },
+        }
+
+    def _fly_oracle(self, condition: Condition) -> ConditionResult:
+        """Run the oracle; if a condition changes nothing that affects it, reuse the first run.
+
+        Light, colors and faults that hide nothing do not affect it.
+        """
+        faults = tuple(fault for fault in condition.faults if fault.hides)
+        kept = dataclasses.replace(condition, appearance_changes=(), faults=faults)
+        if kept == Condition() and self.oracle is not None:
+            return self.oracle
+        return self._evaluator.run(condition, agent=OracleAgent())
+
+    def _figures(self, result: ConditionResult) -> dict[str, Any]:
+        episodes, plain = result.episodes, self.plain.episodes
+        task = episodes.task
+        shares = {"all": mean_bounds(episodes.share)}
+        for i, name in enumerate(task.strata):
+            shares[name] = mean_bounds(episodes.stratum_share(i))
+        ends = torch.bincount(episodes.end_reason, minlength=len(task.ends)).tolist()
+        return {
+            "success": proportion(int(episodes.success.sum()), len(episodes)),
+            "difference": mean_bounds(episodes.success - plain.success, -1.0, 1.0),
+            "paired": mcnemar(plain.success, episodes.success),
+            "shares": shares,
+            "ends": {end.name.lower(): ends[end] for end in task.ends if end != 0},
+            "unchanged": bool(torch.equal(result.trace, self.plain.trace))
+            and bool(torch.equal(episodes.length, plain.length)),
+        }
+
+
+class FrameRecorder:
+    """Fly straight on and record the color image of one step."""
+
+    needs_only_hiding_faults = False
+
+    def __init__(self) -> None:
+        self._step = 0
+        self.image: Tensor | None = None
+
+    def act(self, context: StepContext) -> tuple[Tensor, Tensor | None]:
+        """See `Agent`."""
+        images = context.render("rgb").movedim(-1, 1).float() / 255.0
+        images = context.apply_faults(images, context.active)
+        if self._step <= STEP:  # some episodes end earlier
+            self.image = (images[0] * 255).round().to(torch.uint8).movedim(0, -1)
+        self._step += 1
+        actions, active = context.worlds.dynamics.actions, context.active
+        ahead = actions.always(actions.names[0])
+        return ahead.expand(len(active), *ahead.shape).to(active.device), None
+
+
+def make_strip(evaluator: PairedEvaluator, axis: Axis) -> list[NDArray | None]:
+    """Record the camera of one environment without perturbation and at each strength of an axis.
+
+    Shapes: (H, W, 3), uint8; None where task or camera do not allow a strength.
+    """
+    conditions = (axis.make(strength, evaluator.subject) for strength in axis.strengths)
+    strip: list[NDArray | None] = []
+    for condition in (Condition(), *conditions):
+        agent = FrameRecorder()
+        with contextlib.suppress(InputError):
+            evaluator.run(condition, agent=agent)
+        strip.append(None if agent.image is None else agent.image.cpu().numpy())
+    return strip
+
+
+def finite(value: float) -> float | None:
+    """Return a finite value unchanged and None for infinity, such as visibility without fog."""
+    return value if math.isfinite(value) else None
+
+
+def mcnemar(before: Tensor, after: Tensor) -> dict[str, Any]:
+    """Return McNemar's exact test of paired successes, 1 or 0. Shapes: (n,).
+
+    Returns:
+        "lost": pairs with success only before, "gained": only after; "p": the p-value.
+    """
+    lost, gained = int((before > after).sum()), int((after > before).sum())
+    return {"lost": lost, "gained": gained, "p": mcnemar_p(lost, gained)}
+
+
+def mcnemar_p(lost: int, gained: int) -> float:
+    """Return the p-value of `mcnemar` from its counts."""
+    from scipy.special import bdtr  # slow to import
+
+    tail = float(bdtr(min(lost, gained), lost + gained, 0.5)) if lost + gained else 0.5
+    return min(1.0, 2 * tail)
+
+
+def area(positions: Sequence[float], shares: Sequence[float]) -> float:
+    """Return the mean height of the curve through points sorted by position."""
+    width = positions[-1] - positions[0]
+    return float(np.trapezoid(shares, positions)) / width if width else float(shares[0])
+
+
+def success_area(
+    levels: Iterable[dict[str, Any]], plain: float, mode: PerturbationMode
+) -> float | None:
+    """Return the mean height of the curve of success rate against strength; None without levels."""
+    points = [(0.0, plain)] + [
+        (level["position"], level["modes"][mode.value]["success"]["share"])
+        for level in levels
+        if mode.value in level["modes"]
+    ]
+    if len(points) == 1:
+        return None
+    positions, shares = zip(*sorted(points), strict=True)
+    return area(positions, shares)
+
+
+def _success(result: ConditionResult | None) -> dict[str, Any] | None:
+    if result is None:
+        return None
+    success = result.episodes.success
+    return proportion(int(success.sum()), len(success))
+
+
+def packed(image: NDArray) -> str:
+    """Encode an image as text."""
+    return base64.b64encode(zlib.compress(image.tobytes(), 9)).decode()
+
+
+def unpacked(text: str, shape: tuple[int, ...], where: str) -> NDArray:
+    """Decode an image of `packed`, uint8; any other text is an `InputError` about `where`."""
+    size = math.prod(shape)
+    try:
+        unpacking = zlib.decompressobj()
+        content = unpacking.decompress(base64.b64decode(text, validate=True), size + 1)
+    except (ValueError, zlib.error):
+        content = b""
+    if len(content) != size:
+        raise InputError(f"{where} is not an image of {shape[0]} rows and {shape[1]} columns")
+    return np.frombuffer(content, np.uint8).reshape(shape)

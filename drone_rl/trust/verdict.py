@@ -1,0 +1,317 @@
+"""Judge a policy: run episodes, apply the rule and return a verdict."""
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from tensordict.nn import TensorDictModuleBase
+from torchrl.envs import EnvBase
+
+from drone_rl.collectors.complete_episodes import CompleteEpisodes, StepLog, run_episodes
+from drone_rl.envs import base_env, worlds_of
+from drone_rl.policies.baselines import check_baselines
+from drone_rl.policies.policy import BasePolicy, load_policy
+from drone_rl.sim.actions import Actions
+from drone_rl.sim.tasks import Task
+from drone_rl.sim.vocabulary import terms_of
+from drone_rl.trust.baselines import run_baselines
+from drone_rl.trust.metrics import failure_table, summarise
+from drone_rl.trust.rounding_sensitivity import Rounding, check_rounding
+from drone_rl.trust.rule import Quantity, Rule, VerdictKind, decide, kinds_within
+from drone_rl.trust.verdict_text import SENTENCES, is_proved
+from drone_rl.utils.exit_codes import NOT_CERTAIN
+from drone_rl.utils.intervals import mean_bounds, proportion
+from drone_rl.utils.seeding import RootSeed, Stream, root_seed
+from drone_rl.utils.text import say
+
+MANY = (2, 3, 5, 10, 20, 50, 100)
+"""Multiples of the number of episodes for which certainty is extrapolated."""
+
+
+class CertificateClaim(Protocol):
+    """A certificate of the policy; `drone_rl.verification.claim` has the implementation."""
+
+    @property
+    def path(self) -> Path:
+        """Its file."""
+        ...
+
+    @property
+    def refused(self) -> str | None:
+        """Why it is refused, in one line; None if it is not."""
+        ...
+
+    def as_evidence(
+        self, greedy: CompleteEpisodes, *, rounding: Rounding | None = None
+    ) -> dict[str, Any]:
+        """Return the evidence that a verdict on these greedy episodes may quote."""
+        ...
+
+
+class FindClaim(Protocol):
+    """Finds and checks a policy's certificate; see `drone_rl.verification.claim.find_claim`."""
+
+    def __call__(
+        self,
+        policy: BasePolicy,
+        given: str | Path | None = None,
+        *,
+        flights: int = ...,
+        seed: RootSeed | None = None,
+        device: str = ...,
+        renderer: str = ...,
+    ) -> CertificateClaim | None:
+        """Return the certificate at a path, by default the one next to the policy, if any."""
+        ...
+
+
+@dataclasses.dataclass(frozen=True)
+class Verdict:
+    """The kind of a policy, whether that is certain, and the evidence."""
+
+    kind: VerdictKind
+    certain: bool
+    evidence: dict[str, Any]
+    """Plain values: all entries of `as_dict` except the sentence."""
+
+    @property
+    def exit_code(self) -> int:
+        """Exit code of the kind if it is certain, else `NOT_CERTAIN`."""
+        return self.evidence["exit_code"]
+
+    @property
+    def is_proved(self) -> bool:
+        """Whether a re-checked certificate states success from every placement."""
+        return is_proved(self.evidence)
+
+    @property
+    def sentence(self) -> str:
+        """The verdict as text."""
+        return say(SENTENCES, self.evidence)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values, as in `verdict.json`."""
+        return {**self.evidence, "sentence": self.sentence}
+
+
+def judge_policy(
+    env: EnvBase,
+    actor: TensorDictModuleBase,
+    episodes: int,
+    *,
+    sampled: bool = True,
+    rule: Rule | None = None,
+    claim: CertificateClaim | None = None,
+    unlike: Mapping[str, Any] | None = None,
+    seed: RootSeed | None = None,
+) -> Verdict:
+    """Run so many episodes of a policy and of each baseline, and apply the rule.
+
+    Initial states are the same. `sampled` also runs the policy with sampled actions; for the other
+    arguments see `apply_rule`.
+
+    Raises:
+        InputError: The task has no oracle, baselines or strata; also what `check_rounding` raises.
+    """
+    base, worlds = base_env(env), worlds_of(env)
+    check_judged(worlds.task, worlds.dynamics.actions)  # before its episodes
+    state = base.state_dict()
+    baselines = run_baselines(
+        env.batch_size[0], worlds.task, state, episodes, str(worlds.device), worlds.dynamics
+    )
+    log, drawn = StepLog(), None
+    greedy = run_episodes(env, actor, episodes, is_compiled=True, log=log)
+    if sampled:
+        base.load_state_dict(state)
+        drawn = run_episodes(env, actor, episodes, greedy=False)
+    base.load_state_dict(state)
+    rounding = check_rounding(env, actor, episodes, greedy=greedy, log=log)
+    return apply_rule(
+        greedy,
+        baselines,
+        rule=rule,
+        sampled=drawn,
+        claim=claim,
+        unlike=unlike,
+        seed=seed,
+        rounding=rounding,
+    )
+
+
+def judge_for_selection(
+    path: Path,
+    episodes: int,
+    device: str,
+    renderer: str = "raytrace",
+    *,
+    seed: RootSeed | None = None,
+) -> tuple[dict[str, Any], dict]:
+    """Judge a checkpoint in environments of `Stream.CHOICE`, for selection.
+
+    Reported figures come from environments of `Stream.REPORT`, never from these.
+    The root of the random streams is fresh by default. Return the verdict, as in verdict.json, and
+    the checkpoint's progress.
+
+    Raises:
+        InputError: The checkpoint is unusable.
+    """
+    policy, seed = load_policy(path), seed or root_seed(None)
+    how: dict[str, Any] = {"stream": Stream.CHOICE, "device": device, "renderer": renderer}
+    with policy.flying(min(episodes, 250), seed=seed.value, **how) as (env, actor):
+        verdict = judge_policy(env, actor, episodes, seed=seed)
+        return verdict.as_dict(), policy.state["progress"]
+
+
+def check_judged(task: Task[Any], actions: Actions) -> None:
+    """Raise the `InputError` with which a verdict on a task would end after its episodes."""
+    _rule_of(None, task)
+    check_baselines(task, actions)
+    terms_of({"terms": task.vocabulary.as_dict()})
+
+
+def _rule_of(rule: Rule | None, task: Task[Any]) -> Rule:
+    """Return the rule for a task's strata and baselines; an `InputError` if it has none."""
+    of_task = {"strata": task.strata, "blind_baselines": task.blind_baselines}
+    return dataclasses.replace(rule or Rule(), **of_task)
+
+
+def apply_rule(
+    greedy: CompleteEpisodes,
+    baselines: Mapping[str, CompleteEpisodes],
+    *,
+    rule: Rule | None = None,
+    sampled: CompleteEpisodes | None = None,
+    claim: CertificateClaim | None = None,
+    unlike: Mapping[str, Any] | None = None,
+    seed: RootSeed | None = None,
+    rounding: Rounding | None = None,
+) -> Verdict:
+    """Apply the rule to episodes.
+
+    Args:
+        greedy: The policy's episodes with the most probable actions.
+        baselines: Episodes of each baseline; the k-th starts in the state of the policy's k-th.
+        rule: Thresholds of the verdict.
+        sampled: The policy's episodes with sampled actions, from the same states.
+        claim: A certificate of the policy in this task, if there is one.
+        unlike: Settings that differ from the training, by name: "own", its value in training, and
+            "flown".
+        seed: Root of the environments' random streams; without it the verdict says that a policy
+            could have been fitted to these environments.
+        rounding: How far `greedy` depends on rounding; None if that was not checked.
+
+    Raises:
+        ValueError: The initial states differ.
+    """
+    task = greedy.task
+    rule = _rule_of(rule, task)
+    for other in (*baselines.values(), greedy if sampled is None else sampled):
+        if not torch.equal(other.goals.world, greedy.goals.world):
+            raise ValueError("policy and baselines have different initial states; use the same")
+    quantities = measure(greedy, baselines, rule)
+    kind = decide([quantity.level for quantity in quantities], len(rule.strata))
+    is_enough, is_open = (
+        _is_certain(quantities, rule),
+        rounding is not None and rounding.is_excessive,
+    )
+    certain, depends = is_enough and not is_open, is_enough and is_open
+    evidence = {
+        "kind": kind.value,
+        "certain": certain,
+        "exit_code": kind.exit_code if certain else NOT_CERTAIN,
+        **({"seed": None, "seed_is_fixed": True} if seed is None else seed.as_dict()),
+        "rule": rule.text,
+        "error_rate": rule.error_rate,
+        "good_share": rule.good_share,
+        "terms": task.vocabulary.as_dict(),
+        "num_cubes": greedy.goals.reached.shape[-1],
+        "rounding": None if rounding is None else {**rounding.as_dict(), "decides": depends},
+        "proof": None if claim is None else claim.as_evidence(greedy, rounding=rounding),
+        "greedy": summarise(greedy),
+        "sampled": None if sampled is None else summarise(sampled),
+        "baselines": {name: summarise(of) for name, of in baselines.items()},
+        "skill": {
+            name: mean_bounds(greedy.share - of.share, -1.0, 1.0) for name, of in baselines.items()
+        },
+        "drawing": None
+        if sampled is None
+        else mean_bounds(sampled.success - greedy.success, -1.0, 1.0),
+        "failures": failure_table(greedy),
+        "quantities": {
+            name: q._asdict() for name, q in zip(rule.quantities, quantities, strict=True)
+        },
+        "enough": _enough(greedy, baselines, rule) if is_enough or not is_open else None,
+        **({"unlike": dict(unlike)} if unlike else {}),
+    }
+    return Verdict(kind, certain, evidence)
+
+
+def measure(
+    greedy: CompleteEpisodes, baselines: Mapping[str, CompleteEpisodes], rule: Rule, times: int = 1
+) -> tuple[Quantity, ...]:
+    """Return the rule's quantities with simultaneous confidence intervals.
+
+    Every episode counts `times` times, to extrapolate to more episodes.
+    """
+    observed = observe(greedy, baselines, rule)
+    return tuple(estimate(i, np.tile(values, times), rule) for i, values in enumerate(observed))
+
+
+def observe(
+    greedy: CompleteEpisodes, baselines: Mapping[str, CompleteEpisodes], rule: Rule
+) -> list[NDArray]:
+    """Return each episode's value of each of the rule's quantities, float64.
+
+    Shapes: (at most n,); those of "collected" are only of episodes that offered such a goal.
+    """
+    each = observe_each(greedy, baselines, rule)
+    return [values[~np.isnan(values)] for values in each]
+
+
+def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
+    """Estimate the quantity of this index in a rule from its values, see `observe`."""
+    name, thresholds = rule.quantities[quantity], rule.thresholds[quantity]
+    if name.startswith("offered"):
+        share = proportion(int(values.sum()), len(values), rule.confidence)
+        return Quantity(share["share"], share["lower95"], share["upper95"], thresholds)
+    mean = mean_bounds(values, *rule.ranges[quantity], rule.confidence)
+    return Quantity(mean["mean"], mean["lower95"], mean["upper95"], thresholds)
+
+
+def observe_each(
+    greedy: CompleteEpisodes, baselines: Mapping[str, CompleteEpisodes], rule: Rule
+) -> list[NDArray]:
+    """Return the values of `observe` for all episodes, NaN if undefined. Shapes: (n,), float64."""
+    oracle = baselines["oracle"]
+    observed = [greedy.success - rule.good_share * oracle.success]
+    offered = [greedy.offered(stratum) for stratum in range(len(rule.strata))]
+    observed += [there.double() for there in offered]
+    for stratum, there in enumerate(offered):
+        share = torch.full_like(there, torch.nan, dtype=torch.float64)
+        share[there] = greedy.stratum_share(stratum)
+        observed.append(share)
+    for name in rule.blind_baselines:
+        blind = (1 - rule.poor_margin) * baselines[name].share
+        observed.append(greedy.share - blind - rule.poor_margin * oracle.share)
+    for name in rule.blind_baselines:
+        observed.append(rule.good_share * oracle.success - baselines[name].success)
+    return [values.numpy() for values in observed]
+
+
+def _is_certain(found: tuple[Quantity, ...], rule: Rule) -> bool:
+    box = tuple(quantity.levels for quantity in found)
+    return len(kinds_within(box, len(rule.strata))) == 1
+
+
+def _enough(
+    greedy: CompleteEpisodes, baselines: Mapping[str, CompleteEpisodes], rule: Rule
+) -> int | None:
+    """Return about how many episodes certainty needs; None if more than `MANY` covers."""
+    for times in (1, *MANY):
+        if _is_certain(measure(greedy, baselines, rule, times), rule):
+            return times * len(greedy)
+    return None

@@ -1,0 +1,318 @@
+"""`drone-rl play`: videos of the drone, its cameras and its action probabilities."""
+
+import contextlib
+import dataclasses
+import logging
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+import imageio.v3 as iio
+import numpy as np
+import torch
+from PIL import Image, ImageDraw, ImageFont
+from tensordict import TensorDict, TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
+from torchrl.envs import TransformedEnv
+
+from drone_rl.envs import DroneEnv
+from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transforms
+from drone_rl.policies.actor import exploring
+from drone_rl.policies.policy import Policy
+from drone_rl.policies.recurrent import require_memoryless
+from drone_rl.sim.actions import MOVES, Actions
+from drone_rl.sim.composer_task import make_environment
+from drone_rl.sim.coordinates import inverse
+from drone_rl.sim.dynamics import FlightState, Quadrotor
+from drone_rl.sim.dynamics.state import twist_about_z
+from drone_rl.sim.entities import (
+    BACK_CENTER,
+    BOTTOM_CENTER,
+    CHASE,
+    FRONT_CENTER,
+    FRONT_LEFT,
+    FRONT_RIGHT,
+)
+from drone_rl.sim.rendering import Appearance
+from drone_rl.sim.rendering.appearance import Mounting, product, rotate
+from drone_rl.sim.tasks import Task
+from drone_rl.sim.worlds import Worlds
+from drone_rl.trust import instruments
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.palette import MUTED, PAPER
+from drone_rl.utils.seeding import legacy_seed
+
+_log = logging.getLogger(__name__)
+WIDTH, HEIGHT = 1280, 720
+CHASE_HEIGHT, STRIP_HEIGHT, GAP = 532, 144, 5
+INSET_WIDTH = 320
+"""Pixels of the image of the policy's camera, enlarged."""
+FRAMES_PER_SECOND = 10
+_STRIP = CHASE_HEIGHT + GAP
+_BOTTOM = _STRIP + STRIP_HEIGHT + 9
+CAMERAS = tuple(c.name for c in (FRONT_LEFT, FRONT_CENTER, FRONT_RIGHT, BACK_CENTER, BOTTOM_CENTER))
+"""The drone's cameras, as a film shows them from left to right."""
+Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
+_BACKGROUND, _TEXT, _CHOSEN, _BAR = (24, 26, 31), (235, 235, 240), PAPER, MUTED
+
+
+def film(
+    policy: Policy,
+    folder: Path,
+    episodes: int,
+    *,
+    greedy: bool = True,
+    seed: int = 0,
+    device: str = "cpu",
+    renderer: str = "raytrace",
+) -> list[Path]:
+    """Film episodes in held-out environments as MP4 and GIF files, and return the files.
+
+    The policy takes the most probable action, or samples it. For the other arguments see
+    `Policy.make_env`.
+    """
+    files: list[Path] = []
+    with policy.flying(1, seed=seed, device=device, renderer=renderer) as (env, actor):
+        for episode in range(episodes):
+            frames = list(film_episode(env, actor, greedy=greedy))
+            files += write_video(frames, folder / f"episode_{episode}")
+    for file in files:
+        _log.info("written: %s", file)
+    return files
+
+
+def has_display() -> bool:
+    """Return whether this process can open windows."""
+    names = ("DISPLAY", "WAYLAND_DISPLAY")
+    return sys.platform in ("darwin", "win32") or any(os.environ.get(name) for name in names)
+
+
+def view(
+    policy: Policy,
+    *,
+    greedy: bool = True,
+    seed: int = 0,
+    device: str = "cpu",
+    renderer: str = "raytrace",
+) -> None:
+    """Open dm_control's viewer on the composer task, controlled by a policy; see `film`.
+
+    The viewer shows the dm_control simulation; observations are rendered as in training.
+
+    Raises:
+        InputError: There is no display, or the policy is recurrent.
+    """
+    require_memoryless(policy.make_network(), "the viewer", "leave viewer=false to film it")
+    if not has_display():
+        raise InputError("viewer=true needs a display, and there is none; leave it false to film")
+    import dm_env
+    from dm_control import viewer
+
+    env = policy.make_env(1, seed=seed, device=device, renderer=renderer)
+    base = cast(DroneEnv, env.base_env)
+    actor, worlds = policy.make_actor(env, seed=seed), base.worlds
+    shown = make_environment(
+        worlds.task,
+        worlds.camera,
+        dynamics=worlds.dynamics,
+        pixels=False,
+        random_state=legacy_seed(seed),
+        appearance=base.appearances.settings,
+    )
+    pipeline: Any = env.transform
+    transforms, frames = pixel_transforms(pipeline), list[Tensor]()
+
+    @torch.no_grad()
+    def act(timestep: dm_env.TimeStep) -> np.ndarray:
+        if timestep.first():
+            frames.clear()
+        state = shown.task.state.to(worlds.device)
+        frames.append(worlds.render(state, appearance=shown.task.appearance))
+        del frames[: -1 - memory_of(transforms)]
+        seen = TensorDict(
+            {"pixels": apply_to_frames(transforms, frames)}, [1], device=worlds.device
+        )
+        with exploring(greedy=greedy):
+            return actor(seen)["action"][0].cpu().numpy()
+
+    with contextlib.closing(env):
+        viewer.launch(shown, act, title="drone-rl play")
+
+
+class StepImages(NamedTuple):
+    """Images of one step. Shapes: (height, width, 3); of the strip: (5, height, width, 3)."""
+
+    camera: Tensor
+    """The policy's camera, before transforms."""
+    chase: Tensor
+    strip: Tensor
+    """The cameras `CAMERAS`."""
+    panel: Image.Image | None = None
+    """Instruments, if the drone has flight dynamics."""
+
+
+@torch.no_grad()
+def film_episode(
+    env: TransformedEnv, actor: TensorDictModuleBase, *, greedy: bool = True
+) -> Iterator[np.ndarray]:
+    """Run one episode in a single environment and yield its video frames.
+
+    The policy takes the most probable action, or samples it; "logits" are shown as probabilities.
+
+    Yields:
+        RGB frames, uint8. Shape: (720, 1280, 3).
+    """
+    base, earned = cast(DroneEnv, env.base_env), 0.0
+    task, actions = base.worlds.task, base.worlds.dynamics.actions
+    for state, acted in run_episode(env, actor, greedy=greedy):
+        earned += float(state.get("reward", torch.zeros(1))[0])
+        yield _compose(render_step(base), _caption(task, state, earned), acted, actions)
+
+
+@torch.no_grad()
+def run_episode(
+    env: TransformedEnv, actor: TensorDictModuleBase, *, greedy: bool = True
+) -> Iterator[tuple[TensorDictBase, TensorDictBase | None]]:
+    """Run one episode in a single environment; yield each state with what the actor returns for it.
+
+    The environment is then in that state. The last one, in which no action is taken, comes with
+    None.
+    """
+    state = env.reset()
+    while not bool(state["done"].all()):
+        with exploring(greedy=greedy):  # not while the caller has the state
+            acted = actor(state.clone(False))
+        yield state, acted
+        state = env.step(acted)["next"]
+    yield state, None
+
+
+def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:
+    """Write RGB frames of one size as MP4 and, at half the size, as GIF; return the two files.
+
+    The path is without suffix.
+
+    Raises:
+        InputError: A file can't be written.
+    """
+    files = [path.with_name(path.name + suffix) for suffix in (".mp4", ".gif")]
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        iio.imwrite(files[0], np.stack(frames), fps=FRAMES_PER_SECOND, codec="libx264")
+        half = [Image.fromarray(f).resize((f.shape[1] // 2, f.shape[0] // 2)) for f in frames]
+        first, *rest = (
+            image.quantize(128, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+            for image in half
+        )
+        duration = 1000 // FRAMES_PER_SECOND
+        first.save(files[1], save_all=True, append_images=rest, duration=duration, loop=0)
+    except OSError as error:
+        raise InputError(
+            f"video {path} can't be written ({error}); choose another folder"
+        ) from error
+    return files
+
+
+def _caption(task: Task[Any], state: TensorDictBase, earned: float) -> str:
+    end = task.ends(int(state["info", "end_reason"][0]))
+    ended = "" if end == 0 else f"   ended: {end.name.lower()}"
+    return f"return {earned:.3g}" + ended.replace("_", " ")
+
+
+def render_step(base: DroneEnv) -> StepImages:
+    """Render what a film shows of the first environment."""
+    worlds, look = base.worlds, base.appearances.current()
+    five = worlds.view(CAMERAS, height=STRIP_HEIGHT, width=(WIDTH + GAP) // len(CAMERAS) - GAP)
+    chase = render_chase(worlds, look, CHASE_HEIGHT, WIDTH)[0]
+    strip = worlds.render_all(worlds.state, five, look)["rgb"][0]
+    body, dynamics, panel = worlds.state.body, worlds.dynamics, None
+    if isinstance(body, FlightState) and isinstance(dynamics, Quadrotor):
+        panel = instruments.panel(instruments.read(body), dynamics.settings.hover_throttle)
+    return StepImages(base.last_pixels[0], chase, strip, panel)
+
+
+def _compose(
+    seen: StepImages, caption: str, acted: TensorDictBase | None = None, actions: Actions = MOVES
+) -> np.ndarray:
+    """Chase view with the camera image as inset; below all five cameras, a caption and bars."""
+    canvas = Image.new("RGB", (WIDTH, HEIGHT), _BACKGROUND)
+    draw, font = ImageDraw.Draw(canvas), ImageFont.load_default(16)
+    canvas.paste(Image.fromarray(seen.chase.cpu().numpy()), (0, 0))
+    inside = Image.fromarray(seen.camera.cpu().numpy())
+    height = INSET_WIDTH * inside.height // inside.width
+    size = (INSET_WIDTH, max(1, min(CHASE_HEIGHT // 2, height)))
+    draw.rectangle((12, 12, 17 + size[0], 41 + size[1]), _BACKGROUND)
+    draw.text((20, 16), "camera image", _TEXT, font)
+    canvas.paste(inside.resize(size, Image.Resampling.NEAREST), (15, 39))
+    if seen.panel is not None:
+        canvas.paste(seen.panel, (WIDTH - 12 - instruments.WIDTH, 12))
+    for i, (name, picture) in enumerate(zip(CAMERAS, seen.strip.cpu().numpy(), strict=True)):
+        x = i * (WIDTH + GAP) // len(CAMERAS)
+        canvas.paste(Image.fromarray(picture), (x, _STRIP))
+        label = name.replace("_", " ")
+        width = draw.textlength(label, font)
+        draw.rectangle((x, _STRIP, x + width + 12, _STRIP + 23), _BACKGROUND)
+        draw.text((x + 6, _STRIP + 2), label, _TEXT, font)
+    draw.text((12, _BOTTOM), caption, _TEXT, font)
+    if acted is not None:
+        _draw_bars(draw, font, acted, actions)
+    return np.asarray(canvas)
+
+
+def probabilities(acted: TensorDictBase, actions: Actions) -> Tensor:
+    """Return the probabilities of the parts in the first environment. Shape: (K,).
+
+    Without "logits", that of the chosen part is 1.
+    """
+    logits = acted.get("logits", None)
+    if logits is None:
+        return torch.eye(len(actions))[int(actions.part(acted["action"][0]))]
+    return actions.probabilities(logits[0])
+
+
+def _draw_bars(
+    draw: ImageDraw.ImageDraw, font: Font, acted: TensorDictBase, actions: Actions
+) -> None:
+    """Draw a bar for each action; its length is the probability. The chosen action's is white."""
+    chosen, names = int(actions.part(acted["action"][0])), actions.names
+    probs = probabilities(acted, actions)
+    room = 960 // len(names)
+    for i, action in enumerate(actions.order):
+        x, y = 300 + room * i, _BOTTOM
+        share = float(probs[action])
+        draw.text((x, y), f"{names[action]} {share:.2f}", _TEXT, font)
+        color = _CHOSEN if action == chosen else _BAR
+        most = room - 140
+        draw.rectangle((x + 120, y + 2, x + 120 + max(1, int(most * share)), y + 18), color)
+
+
+def render_chase(worlds: Worlds, look: Appearance | None, height: int, width: int) -> Tensor:
+    """Render the drones from behind, in an appearance that all environments share.
+
+    With flight dynamics the chase camera follows the heading only, so that tilt is visible.
+
+    Returns:
+        Colors. Shape: (num_envs, height, width, 3), uint8.
+    """
+    view = worlds.view(CHASE.name, height=height, width=width, show_drone=True)
+    state = worlds.state
+    if not isinstance(state.body, FlightState):
+        return worlds.render(state, view, look)
+    attitude = state.body.attitude
+    whole = (look or Appearance()).over(worlds.appearance)
+    tilted = dataclasses.replace(worlds.poses(state, whole), attitude=attitude)
+    held = dataclasses.replace(whole, camera=level(attitude, view.cameras[0]))
+    return worlds.renderer.render(view, tilted, held)["rgb"][:, 0]
+
+
+def level(attitude: Tensor, camera: str) -> Mounting:
+    """Return the mounting that keeps the chase camera level on tilted bodies.
+
+    Attitudes are quaternions (w, x, y, z), (num_envs, 4); the camera is its name in the model.
+    """
+    back = product(inverse(attitude), twist_about_z(attitude))
+    place = torch.tensor(CHASE.pos, dtype=attitude.dtype, device=attitude.device)
+    return Mounting(camera=camera, offset=rotate(back, place) - place, turn=back)

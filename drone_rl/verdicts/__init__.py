@@ -1,1 +1,0 @@
-"""Verdicts on policies from episodes, certificates and operating domains; export with a card."""

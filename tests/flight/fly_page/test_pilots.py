@@ -1,0 +1,271 @@
+"""How controls and the policy move the drone."""
+
+import math
+
+import pytest
+import torch
+
+from drone_rl.flight.fly_page import pilots
+from drone_rl.flight.fly_page.pilots import Controls, make_pilot
+from drone_rl.sim.dynamics import FlightState
+
+
+class Steps(list):
+    """The steps that a pilot has taken."""
+
+    def note(self, frame, action, reward):
+        self.append((tuple(frame.shape), action.tolist(), reward))
+
+
+def fly(pilot, controls, seconds, speed=4.0, period=0.025):
+    """Let time pass as the page does."""
+    for _ in range(round(seconds / period)):
+        controls.advance(period)
+        pilot.advance(period, controls, speed)
+
+
+def place(world):
+    return world.body.position[0].tolist()
+
+
+def test_controls_note_each_press_once_and_repeat_after_a_while():
+    controls = Controls()
+    controls.hold(["left"])
+    controls.hold(["left", "forward"])
+    controls.hold(["left"])
+    assert controls.presses == ["left", "forward"]
+    assert controls.axes == (0.0, 1.0, 0.0, 0.0)
+    controls.advance(0.29)
+    assert controls.repeating == []
+    controls.advance(0.02)
+    assert controls.repeating == ["left"]
+    controls.release()
+    assert controls.presses == [] and controls.repeating == [] and not any(controls.axes)
+
+
+def test_opposite_keys_cancel_and_sticks_add():
+    controls = Controls()
+    controls.hold(["forward", "backward", "right"])
+    assert controls.axes == (0.0, -1.0, 0.0, 0.0)
+    controls.hold([])
+    controls.set_sticks((0.25, 0.0, -0.75, 0.0))
+    assert controls.axes == (0.25, 0.0, -0.75, 0.0)
+    assert controls.presses[-1] == "down"  # beyond half its way a stick is a key, too
+    controls.hold(["forward"])
+    assert controls.axes[0] == 1.0
+
+
+def test_presses_that_nobody_uses_do_not_pile_up():
+    controls = Controls()
+    for _ in range(1000):
+        controls.hold(["forward"])
+        controls.hold([])
+    assert len(controls.presses) == 8
+
+
+def test_the_policy_acts_at_the_speed(make_world):
+    world, steps = make_world(), Steps()
+    pilot = make_pilot("policy", world, steps.note)
+    fly(pilot, Controls(), 1.0)
+    assert len(steps) == 4 and sum(map(abs, place(world)[:2])) == 4.0
+    fly(pilot, Controls(), 1.0, speed=2.0)
+    assert len(steps) == 6
+    assert steps[0][0] == (1, 25, 64, 3)
+
+
+def test_a_late_policy_does_not_rush(make_world):
+    world, steps = make_world(), Steps()
+    make_pilot("policy", world, steps.note).advance(60.0, Controls(), 4.0)
+    assert len(steps) == 5
+
+
+def test_the_policy_stops_where_the_episode_ends(make_world):
+    world, steps = make_world(), Steps()
+    pilot = make_pilot("policy", world, steps.note)
+    fly(pilot, Controls(), 30.0)
+    assert world.is_over and world.goals == (3, 0)
+    before = len(steps)
+    fly(pilot, Controls(), 2.0)
+    assert len(steps) == before
+
+
+def test_a_press_is_one_action_and_time_stands_still_between(make_world):
+    world, steps, controls = make_world(), Steps(), Controls()
+    pilot = make_pilot("actions", world, steps.note)
+    fly(pilot, controls, 2.0)
+    assert steps == []
+    controls.hold(["forward"])
+    fly(pilot, controls, 0.1)
+    controls.hold([])
+    controls.hold(["left"])
+    fly(pilot, controls, 0.1)
+    controls.hold(["backward"])  # no action of this policy
+    fly(pilot, controls, 1.0)
+    assert [action for _, action, _ in steps] == [[0], [1]]
+    assert place(world) == [1.0, 1.0, 2.5]
+
+
+def test_a_held_key_repeats_the_action_at_the_speed(make_world):
+    world, steps, controls = make_world(), Steps(), Controls()
+    pilot = make_pilot("actions", world, steps.note)
+    controls.hold(["forward"])
+    fly(pilot, controls, 1.325, speed=4.0)  # one at once, then from 0.3 s on every 0.25 s
+    assert len(steps) == 5
+    controls.hold(["forward", "right"])
+    fly(pilot, controls, 0.1)
+    assert steps[-1][1] == [2]
+
+
+def test_continuous_actions_follow_keys_and_sticks(make_world):
+    world, steps, controls = make_world("flight_velocity"), Steps(), Controls()
+    pilot = make_pilot("actions", world, steps.note)
+    fly(pilot, controls, 0.5)
+    assert steps == []
+    controls.hold(["forward", "yaw_right"])
+    fly(pilot, controls, 0.05)
+    assert steps == [((1, 25, 64, 3), [[1.0, 0.0, -1.0]], 0.0)]
+    controls.hold([])
+    controls.set_sticks((0.0, 0.5, 0.0, 0.0))
+    fly(pilot, controls, 0.2)
+    assert steps[-1][1] == [[-1.0, 0.5, 0.0]] and len(steps) in (2, 3)
+
+
+def test_computer_vision_keys_step_the_pose(make_world):
+    world, controls = make_world(), Controls()
+    pilot = make_pilot("computer_vision", world, Steps().note)
+    controls.hold(["forward"])
+    fly(pilot, controls, 0.1)
+    assert place(world) == pytest.approx([0.25, 0.0, 2.5])
+    controls.hold(["yaw_left"])
+    fly(pilot, controls, 0.1)
+    controls.hold(["up"])
+    fly(pilot, controls, 0.1)
+    assert place(world) == pytest.approx([0.25, 0.0, 2.75])
+    assert float(world.body.heading[0]) == pytest.approx(math.radians(5.0))
+    assert world.worlds.state.steps.tolist() == [0]  # no time passes
+
+
+def test_computer_vision_goes_on_from_the_drones_pose_at_the_speed(make_world):
+    world, controls = make_world(), Controls()
+    world.move(world.body.moved(torch.tensor([[7.0, -1.0, 2.5]]).double()))
+    pilot = make_pilot("computer_vision", world, Steps().note)
+    controls.hold(["right"])
+    fly(pilot, controls, 1.3, speed=2.0)  # a step, then about a second at 2 m/s
+    x, y, z = place(world)
+    assert (x, z) == pytest.approx((7.0, 2.5))
+    assert y == pytest.approx(-1.0 - 0.25 - 2.0, abs=0.3)
+
+
+def test_poses_stay_above_the_ground(make_world):
+    world, controls = make_world(), Controls()
+    pilot = make_pilot("computer_vision", world, Steps().note)
+    controls.hold(["down"])
+    fly(pilot, controls, 3.0)
+    assert 0.3 <= place(world)[2] < 0.55
+
+
+def test_velocities_accelerate_the_drone_and_letting_go_stops_it(make_world):
+    world, controls = make_world(), Controls()
+    pilot = make_pilot("simple_flight", world, Steps().note)
+    fly(pilot, controls, 1.0)
+    assert place(world) == pytest.approx([0.0, 0.0, 2.5], abs=0.05)  # it hovers
+    controls.hold(["forward"])
+    fly(pilot, controls, 3.0, speed=3.0)
+    assert world.body.velocity[0].tolist() == pytest.approx([3.0, 0.0, 0.0], abs=0.4)
+    assert isinstance(world.body, FlightState)
+    controls.hold([])
+    fly(pilot, controls, 5.0)
+    assert float(world.body.velocity.norm()) < 0.1
+    before = place(world)
+    fly(pilot, controls, 2.0)
+    assert place(world) == pytest.approx(before, abs=0.1)
+
+
+def test_velocities_are_those_of_the_heading(make_world):
+    world, controls = make_world(), Controls()
+    pilot = make_pilot("simple_flight", world, Steps().note)
+    controls.hold(["yaw_left"])
+    fly(pilot, controls, 1.5)  # 60 degrees a second
+    assert float(world.body.heading[0]) == pytest.approx(math.radians(90.0), abs=0.3)
+    controls.hold(["forward"])
+    fly(pilot, controls, 2.0)
+    x, y, _ = place(world)
+    assert y > 3.0 and abs(x) < 0.4 * y
+
+
+def test_the_drone_lands_and_takes_off(make_world):
+    world, controls = make_world(), Controls()
+    pilot = make_pilot("simple_flight", world, Steps().note)
+    fly(pilot, controls, 0.2)
+    pilot.land()
+    fly(pilot, controls, 16.0)
+    assert place(world)[2] == pytest.approx(0.3, abs=0.05)  # the radius of its ball
+    pilot.take_off()
+    fly(pilot, controls, 8.0)
+    assert place(world)[2] == pytest.approx(2.3, abs=0.25)
+    controls.hold(["up"])
+    fly(pilot, controls, 2.0)
+    assert place(world)[2] > 4.0
+
+
+def test_landing_is_not_braking(make_world):
+    world, controls = make_world(), Controls()
+    pilot = make_pilot("simple_flight", world, Steps().note)
+    controls.hold(["forward"])
+    fly(pilot, controls, 1.0)
+    controls.hold([])
+    fly(pilot, controls, 0.1)
+    pilot.land()
+    fly(pilot, controls, 16.0)
+    assert place(world)[2] == pytest.approx(0.3, abs=0.05)
+
+
+def test_wind_drifts_a_braking_drone_and_can_change(make_world):
+    world, controls = make_world(), Controls()
+    pilot = make_pilot("simple_flight", world, Steps().note)
+    world.set_wind(8.0, 270.0)  # from the left, to the right
+    fly(pilot, controls, 3.0)
+    assert place(world)[1] < -0.1
+    world.set_wind(0.0, 0.0)
+    fly(pilot, controls, 6.0)
+    assert place(world) == pytest.approx([0.0, 0.0, 2.5], abs=0.1)  # it holds its place
+
+
+def test_it_takes_over_a_flying_drone_with_its_speed(make_world):
+    world, steps = make_world("flight"), Steps()
+    fly(make_pilot("policy", world, steps.note), Controls(), 2.0)
+    speed = world.body.velocity[0].tolist()
+    assert speed[0] > 1.0
+    make_pilot("simple_flight", world, steps.note)
+    assert world.body.velocity[0].tolist() == speed
+
+
+def test_computer_vision_drones_begin_to_hover_in_flight(make_world):
+    world, controls = make_world(), Controls()
+    make_pilot("computer_vision", world, Steps().note)
+    pilot = make_pilot("simple_flight", world, Steps().note)
+    fly(pilot, controls, 1.0)
+    assert place(world)[2] == pytest.approx(2.5, abs=0.05)
+
+
+def test_a_person_collects_a_cube_in_flight(make_world):
+    world, controls = make_world(), Controls()
+    pilot = make_pilot("simple_flight", world, Steps().note)
+    x, y, z = world.objects[0]
+    start = torch.tensor([[x - 6.0, y, z]]).double()
+    world.move(world.body.moved(start))
+    pilot = pilots.VelocityPilot(world)
+    controls.hold(["forward"])
+    fly(pilot, controls, 4.0)
+    assert world.goals[0] == 1
+
+
+def test_pillars_stop_a_flying_drone(make_world):
+    world, controls = make_world("pillars_good"), Controls()
+    x, y, _ = next(place for place in world.objects if place)
+    start = torch.tensor([[x - 4.0, y, 2.0]]).double()
+    world.move(world.body.moved(start))
+    pilot = make_pilot("simple_flight", world, Steps().note)
+    controls.hold(["forward"])
+    fly(pilot, controls, 4.0)
+    assert place(world)[0] < x

@@ -1,0 +1,172 @@
+"""Recorded flights: which steps become demonstrations."""
+
+import sys
+import types
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from tests.flight.fly_page.test_flight import run, state_of
+
+
+class Written(list):
+    """A stand-in for `drone_rl.training.demonstrations`: what would have been written."""
+
+    def module(self):
+        made = types.ModuleType("drone_rl.training.demonstrations")
+        made.FlightConditions = lambda *parts: parts
+        made.Demonstration = lambda conditions, **arrays: {"conditions": conditions, **arrays}
+        made.add_demonstration = lambda folder, one: self.append((folder, one))
+        return made
+
+
+@pytest.fixture
+def written(monkeypatch):
+    found = Written()
+    monkeypatch.setitem(sys.modules, "drone_rl.training.demonstrations", found.module())
+    return found
+
+
+def press(flight, *controls):
+    for control in controls:
+        flight.handle({"type": "hold", "controls": [control]})
+        run(flight, 0.05)
+        flight.handle({"type": "hold", "controls": []})
+
+
+def test_steps_of_a_person_become_a_demonstration(make_flight, written, tmp_path):
+    flight = make_flight()
+    press(flight, "forward")  # before recording
+    flight.handle({"type": "record", "on": True})
+    frame = flight.world.see().frame[0]
+    press(flight, "forward", "left", "right")
+    assert state_of(flight)["recording"] == {"on": True, "steps": 3, "saved": 0, "problem": None}
+    flight.handle({"type": "record", "on": False})
+    assert state_of(flight)["recording"] == {"on": False, "steps": 0, "saved": 1, "problem": None}
+    ((folder, one),) = written
+    assert folder == tmp_path / "demonstrations" and one["pilot"] == "person"
+    assert one["actions"].tolist() == [0, 1, 2] and one["actions"].dtype == np.int64
+    assert one["images"].shape == (3, 25, 64, 3) and one["images"].dtype == np.uint8
+    assert np.array_equal(one["images"][0], frame.numpy())
+    assert one["rewards"].tolist() == [0.0, 0.0, 0.0] and one["rewards"].dtype == np.float32
+    assert one["done"].tolist() == [False, False, False]
+    policy = flight.world.policy
+    assert one["conditions"] == (
+        policy.task,
+        policy.description.camera,
+        policy.dynamics,
+        policy.actions,
+    )
+
+
+def test_each_episode_of_the_policy_is_a_demonstration(make_flight, written):
+    flight = make_flight()
+    flight.handle({"type": "record", "on": True})
+    flight.handle({"type": "pilot", "pilot": "policy"})
+    run(flight, 40.0)
+    flight.handle({"type": "record", "on": False})
+    assert len(written) >= 2
+    for _, one in written[:2]:
+        assert one["pilot"] == "policy" and one["done"].sum() == 1 and one["done"][-1]
+        assert one["rewards"].sum() == 3.0
+
+
+def test_recording_switches_to_the_policys_actions(make_flight, written):
+    flight = make_flight(mode="simple_flight")
+    flight.handle({"type": "record", "on": True})
+    state = state_of(flight)
+    assert state["mode"] == "actions" and "now your controls" in state["note"]
+    press(flight, "forward")
+    flight.handle({"type": "mode", "mode": "computer_vision"})  # ends this demonstration
+    press(flight, "forward")
+    flight.handle({"type": "record", "on": False})
+    assert [len(one["actions"]) for _, one in written] == [1]
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        {"type": "pilot", "pilot": "policy"},
+        {"type": "reset"},
+        {"type": "set", "name": "wind", "value": 2.0},
+    ],
+)
+def test_a_demonstration_has_one_flyer_one_episode_and_one_wind(make_flight, written, message):
+    flight = make_flight()
+    flight.handle({"type": "record", "on": True})
+    press(flight, "forward", "left")
+    flight.handle(message)
+    assert [(one["pilot"], len(one["actions"])) for _, one in written] == [("person", 2)]
+    assert flight.recorder.is_on
+
+
+def test_free_flight_is_not_recorded_nor_said_to_be(make_flight, written):
+    flight = make_flight()
+    flight.handle({"type": "record", "on": True})
+    press(flight, "forward")
+    flight.handle({"type": "mode", "mode": "simple_flight"})
+    assert not flight.recorder.is_on
+    assert len(written) == 1
+
+
+def test_closing_writes_what_was_recorded(make_flight, written):
+    flight = make_flight()
+    flight.handle({"type": "record", "on": True})
+    press(flight, "forward")
+    flight.close()
+    assert len(written) == 1
+
+
+def test_a_folder_that_cannot_be_written_is_reported_and_ends_recording(
+    make_flight, written, monkeypatch
+):
+    def refuse(folder, one):
+        raise OSError(28, "No space left on device")
+
+    flight = make_flight()
+    module = sys.modules["drone_rl.training.demonstrations"]
+    monkeypatch.setattr(module, "add_demonstration", refuse)
+    flight.handle({"type": "record", "on": True})
+    press(flight, "forward")
+    flight.handle({"type": "reset"})
+    recording = state_of(flight)["recording"]
+    assert not recording["on"] and recording["saved"] == 0
+    assert "can't be written (No space left on device)" in recording["problem"]
+    flight.handle({"type": "record", "on": True})
+    assert state_of(flight)["recording"]["problem"] is None
+    press(flight, *["left"] * 60)  # beyond the side boundary: the episode ends
+    state = state_of(flight)
+    assert state["end"] == "outside the field, left or right" and not state["recording"]["on"]
+    assert "can't be written" in state["recording"]["problem"]
+
+
+def test_nothing_is_written_without_steps(make_flight, written):
+    flight = make_flight()
+    flight.handle({"type": "record", "on": True})
+    flight.handle({"type": "reset"})
+    flight.handle({"type": "record", "on": False})
+    assert written == []
+
+
+def test_files_are_demonstrations_that_a_training_reads(make_flight, tmp_path):
+    demonstrations = pytest.importorskip("drone_rl.training.demonstrations")
+    flight = make_flight()
+    flight.handle({"type": "record", "on": True})
+    press(flight, "forward", "right")
+    flight.handle({"type": "record", "on": False})
+    conditions = demonstrations.FlightConditions(*flight.world.conditions)
+    (read,) = demonstrations.read_demonstrations(tmp_path / "demonstrations", conditions)
+    assert read.actions.tolist() == [0, 2] and read.pilot == "person"
+
+
+def test_continuous_actions_keep_their_shape(make_flight, written):
+    flight = make_flight("flight_velocity")
+    flight.recorder.is_on = True
+    action = torch.tensor([[1.0, 0.0, -0.5]])
+    flight.recorder.note(flight.world.see().frame, action, 0.0)
+    flight.recorder.finish("person")
+    ((folder, one),) = written
+    assert isinstance(folder, Path) and one["actions"].tolist() == [[1.0, 0.0, -0.5]]
+    assert one["actions"].dtype == np.float32

@@ -1,0 +1,100 @@
+"""Live heat maps: the tests in another process, and maps of a trusted method."""
+
+import functools
+import time
+import types
+from unittest.mock import patch
+
+import pytest
+import torch
+
+import drone_rl
+from drone_rl.config import TASKS
+from drone_rl.explanations import trust
+from drone_rl.explanations.context import Context
+from drone_rl.explanations.settings import ExplainSettings
+from drone_rl.flight.fly_page import saliency
+from drone_rl.flight.fly_page.saliency import LiveSaliency, find_trusted
+from drone_rl.sim.tasks.task import MAKERS, as_settings
+from tests.second_task import Posts
+
+
+def test_the_tests_are_those_of_the_report(monkeypatch):
+    few, given = ExplainSettings(frames=60, perplexity=5), {}
+    monkeypatch.setattr(saliency, "ExplainSettings", lambda: few)
+
+    def check_maps(trial, methods):
+        given.update(trial=trial, methods=methods)
+        return {"trusted": "occlusion"}
+
+    monkeypatch.setattr(trust, "check_maps", check_maps)
+    assert find_trusted(drone_rl.load_policy("good")) == "occlusion"
+    assert set(given["methods"]) >= {"grad_cam", "saliency", "occlusion"}
+    assert 30 < len(given["trial"].actions) <= 60
+
+
+def test_nothing_is_shown_without_a_trusted_method(make_world):
+    live = LiveSaliency(make_world())
+    assert live.state == "off" and live.heat(live._world.see()) is None
+    live.trust(None)
+    assert live.state == "none" and live.heat(live._world.see()) is None
+    live.poll()
+    live.close()
+
+
+def test_the_map_is_that_of_the_most_probable_action(make_world):
+    world = make_world()
+    for _ in range(10):
+        world.step(torch.tensor([0]))
+    seen, live = world.see(), LiveSaliency(world)
+    live.trust("saliency")
+    policy = drone_rl.load_policy("good")
+    env = policy.make_env(1)
+    explainer = Context(env, policy.make_network(), ExplainSettings()).explainer
+    part = torch.tensor(seen.probabilities).argmax()[None]
+    expected = explainer.methods()["saliency"](seen.observation, part)[0]
+    env.close()
+    assert live.heat(seen) == pytest.approx(expected.numpy())
+    assert live.heat(seen).shape == (25, 64)
+
+
+class Connection(list):
+    """One end of a pipe."""
+
+    def send(self, value):
+        self.append(value)
+
+
+def test_a_policy_that_cannot_be_explained_says_why(monkeypatch):
+    def refuse(policy):
+        raise drone_rl.InputError("task=x cannot be explained")
+
+    sent = Connection()
+    monkeypatch.setattr(saliency, "find_trusted", refuse)
+    monkeypatch.setattr(saliency.os, "nice", lambda more: more)
+    saliency._work(sent, None, [])
+    assert sent == [(None, "task=x cannot be explained")]
+
+
+def test_a_process_that_fails_is_noticed(caplog):
+    broken = types.SimpleNamespace(name="broken", make_env=functools.partial(int, "no number"))
+    live = LiveSaliency(types.SimpleNamespace(policy=broken))
+    live.start()
+    live.start()  # once is enough
+    assert live.state == "testing"
+    until = time.monotonic() + 120
+    while live.state == "testing" and time.monotonic() < until:
+        live.poll()
+        time.sleep(0.05)
+    assert live.state == "failed" and live.method is None
+    assert live.problem == "the process ended early"
+    assert "policy broken can't be tested" in caplog.text
+
+
+def test_a_task_that_no_other_process_can_load_is_told():
+    with patch.dict(TASKS), patch.dict(MAKERS):
+        policy = types.SimpleNamespace(name="mine", task=as_settings(Posts()))
+        live = LiveSaliency(types.SimpleNamespace(policy=policy))
+        live.start()
+    assert live.state == "failed" and "another process" in live.problem
+    live.close()

@@ -1,0 +1,425 @@
+"""The server: refusals, slow pages, wrong messages, and flights through the page's protocol."""
+
+import asyncio
+import contextlib
+import functools
+import json
+import queue
+import socket
+import sys
+import threading
+import time
+import types
+import urllib.error
+import urllib.request
+
+import numpy as np
+import pytest
+
+import drone_rl
+from drone_rl.flight.fly_page import server
+from drone_rl.utils.errors import InputError
+from tests.flight.fly_page.conftest import decode
+
+pytest.importorskip("uvicorn")
+client = pytest.importorskip("websockets.sync.client")
+exceptions = pytest.importorskip("websockets.exceptions")
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    folder = str(tmp_path_factory.mktemp("demonstrations"))
+    with drone_rl.fly("good", saliency=False, demonstrations=folder) as opened:
+        yield opened
+
+
+def origin_of(page):
+    return "/".join(page.url.split("/")[:3])
+
+
+@contextlib.contextmanager
+def connected(page, **changes):
+    """Open a socket as a browser does; return it and the first message."""
+    options = {"origin": origin_of(page), "max_size": 2**20, **changes}
+    url = page.url.replace("http", "ws") + "socket"
+    with client.connect(url, **options) as opened:
+        yield opened, json.loads(opened.recv(timeout=20))
+
+
+def send(opened, **message):
+    opened.send(json.dumps(message))
+
+
+def frames(opened):
+    """Yield states and images for ever, and acknowledge each."""
+    while True:
+        message = opened.recv(timeout=20)
+        if isinstance(message, str):
+            yield json.loads(message), {}
+            continue
+        send(opened, type="ack")
+        yield decode(message)
+
+
+def wait_for(opened, condition, limit=400):
+    for _, (state, _) in zip(range(limit), frames(opened), strict=False):
+        if condition(state):
+            return state
+    raise AssertionError("this never happened")
+
+
+def fetch(url, **headers):
+    request = urllib.request.Request(url, headers=headers)
+    with urllib.request.urlopen(request, timeout=20) as answer:
+        return answer.status, answer.headers, answer.read()
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "part"),
+    [
+        ("", "text/html", b"<h1>Fly a drone</h1>"),
+        ("fly.js", "text/javascript", b"requestAnimationFrame"),
+        ("fly.css", "text/css", b"prefers-color-scheme: dark"),
+    ],
+)
+def test_the_page_and_its_files_need_no_other_server(page, name, kind, part):
+    status, headers, content = fetch(page.url + name)
+    assert status == 200 and part in content
+    assert headers["Content-Type"].startswith(kind)
+    assert "default-src 'none'" in headers["Content-Security-Policy"]
+    assert headers["Referrer-Policy"] == "no-referrer"
+    assert b"http://" not in content and b"https://" not in content
+
+
+def test_it_listens_at_this_machine_alone_under_a_random_token(page):
+    assert page.url.startswith("http://127.0.0.1:")
+    assert len(page.url.split("/")[3]) >= 32
+    with drone_rl.fly("good", saliency=False) as other:
+        assert other.url.split("/")[3] != page.url.split("/")[3]
+
+
+@pytest.mark.parametrize("path", ["", "socket", "x/", "x/fly.js", "../etc/passwd", "%2e%2e/"])
+def test_without_the_token_everything_is_forbidden(page, path):
+    with pytest.raises(urllib.error.HTTPError) as refused:
+        fetch(f"{origin_of(page)}/{path}")
+    assert refused.value.code == 403
+    assert page.url.split("/")[3].encode() not in refused.value.read()
+
+
+def test_other_files_are_not_served(page):
+    for name in ("server.py", "index.html", "..%2fworld.py", "socket/"):
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            fetch(page.url + name)
+        assert refused.value.code in (404, 405)
+
+
+@pytest.mark.parametrize(
+    "headers", [{"Host": "evil.example"}, {"Host": "127.0.0.1"}, {"Origin": "http://evil.example"}]
+)
+def test_other_hosts_and_origins_are_forbidden(page, headers):
+    with pytest.raises(urllib.error.HTTPError) as refused:
+        fetch(page.url, **headers)
+    assert refused.value.code == 403
+
+
+def test_this_machines_name_is_a_host(page):
+    assert fetch(page.url.replace("127.0.0.1", "localhost"))[0] == 200
+
+
+@pytest.mark.parametrize(
+    "origin", [None, "http://evil.example", "null", "https://127.0.0.1", "http://127.0.0.1:1"]
+)
+def test_the_socket_is_for_the_page_alone(page, origin):
+    with pytest.raises(exceptions.InvalidStatus) as refused, connected(page, origin=origin):
+        pass
+    assert refused.value.response.status_code == 403
+
+
+def test_the_socket_needs_the_token(page):
+    url = f"{origin_of(page)}/wrong/socket".replace("http", "ws", 1)
+    with pytest.raises(exceptions.InvalidStatus) as refused:
+        client.connect(url, origin=origin_of(page))
+    assert refused.value.response.status_code == 403
+
+
+def test_a_press_moves_the_drone(page):
+    with connected(page) as (opened, hello):
+        assert hello["policy"] == "good"
+        send(opened, type="reset")
+        send(opened, type="hold", controls=["forward"])
+        send(opened, type="hold", controls=[])
+        state = wait_for(opened, lambda s: s["position"][0] == 1.0)
+        assert state["steps"] == 1
+
+
+def test_a_wrong_message_is_answered_and_nothing_else_happens(page):
+    with connected(page) as (opened, _):
+        for text in ("no JSON", "[" * 3000, '{"type": "fly"}', '{"type": "reset", "x": NaN}'):
+            opened.send(text)
+            state = wait_for(opened, lambda s: "error" in s)
+            assert "is unknown" in state["error"] or "must be a mapping" in state["error"]
+        opened.send(b"\x00\xff")
+        assert "error" in wait_for(opened, lambda s: "error" in s)
+        assert "position" in wait_for(opened, lambda s: "position" in s)
+
+
+def test_a_long_message_closes_the_socket(page):
+    with connected(page) as (opened, _):
+        opened.send("x" * (server.MAX_MESSAGE + 1))
+        with pytest.raises(exceptions.ConnectionClosed):
+            for _ in range(100):
+                opened.recv(timeout=20)
+    with connected(page) as (_, hello):
+        assert hello["policy"] == "good"
+
+
+def test_a_slow_page_gets_few_frames_and_the_newest(page):
+    with connected(page) as (slow, _), connected(page) as (quick, _):
+        first = [decode(slow.recv(timeout=20))[0] for _ in range(3)]
+        seen = wait_for(quick, lambda s: s["frame"] > first[-1]["frame"] + 40)
+        with pytest.raises(TimeoutError):
+            slow.recv(timeout=0.3)  # three are not displayed yet
+        send(slow, type="ack")
+        late = decode(slow.recv(timeout=20))[0]
+        assert late["frame"] >= seen["frame"]
+
+
+def test_a_page_holds_at_most_one_frame_and_one_problem():
+    page = server._Page()
+    for i in range(1000):
+        page.offer(bytes([i % 256]))
+        page.tell(f"problem {i}")
+    assert page._frame == bytes([999 % 256]) and page._problem == "problem 999"
+    page.acknowledge()
+    assert page._in_flight == 0
+
+
+def test_more_pages_than_allowed_are_refused(page):
+    with contextlib.ExitStack() as stack:
+        for _ in range(server.MAX_PAGES):
+            stack.enter_context(connected(page))
+        with pytest.raises(exceptions.InvalidStatus) as refused, connected(page):
+            pass
+        assert refused.value.response.status_code == 403
+
+
+def test_closing_a_page_lets_go_of_its_keys(page):
+    with connected(page) as (opened, _):
+        send(opened, type="reset")
+        send(opened, type="hold", controls=["forward"])
+        wait_for(opened, lambda s: s["position"][0] >= 2.0)
+    with connected(page) as (opened, _):
+        first = wait_for(opened, lambda s: True)
+        later = wait_for(opened, lambda s: s["time"] > first["time"] + 1.0)
+        assert later["position"] == first["position"]
+
+
+def test_closing_a_page_leaves_the_keys_of_another_held(page):
+    with connected(page) as (opened, _):
+        with connected(page) as (other, _):
+            send(other, type="hold", controls=[])
+            send(other, type="set", name="light", value=0.9)
+            wait_for(other, lambda s: s["settings"]["light"] == 0.9)
+            send(opened, type="reset")
+            send(opened, type="hold", controls=["forward"])
+            wait_for(opened, lambda s: s["steps"] >= 1)
+        begun = wait_for(opened, lambda s: s["steps"] >= 1)["steps"]
+        wait_for(opened, lambda s: s["steps"] >= begun + 4)
+
+
+def test_time_stands_still_without_a_page(page):
+    with connected(page) as (opened, _):
+        send(opened, type="pilot", pilot="policy")
+        before = wait_for(opened, lambda s: s["pilot"] == "policy")["time"]
+    time.sleep(1.0)
+    with connected(page) as (opened, _):
+        after = wait_for(opened, lambda s: True)["time"]
+        send(opened, type="pilot", pilot="person")
+        wait_for(opened, lambda s: s["pilot"] == "person")
+    assert after - before < 0.6
+
+
+def test_hand_over_collects_a_cube(page):
+    with connected(page) as (opened, _):
+        send(opened, type="reset")
+        send(opened, type="set", name="speed", value=10.0)
+        send(opened, type="pilot", pilot="policy")
+        wait_for(opened, lambda s: s["goals"][0] >= 1, limit=1500)
+        send(opened, type="pilot", pilot="person")
+        wait_for(opened, lambda s: s["pilot"] == "person")
+
+
+def oracle(state, size=1.65):
+    """Return the control that lines up with the next cube, then flies forward."""
+    x, y, _ = state["position"]
+    ahead = [place for place in state["objects"] if place and place[0] > x - size]
+    aside = ahead[0][1] - y if ahead else 0.0
+    return "left" if aside > size / 2 else "right" if aside < -size / 2 else "forward"
+
+
+def fly_by_oracle(opened, episodes):
+    """Fly episodes through the page's protocol: a press for each step, once it is displayed."""
+    send(opened, type="reset")
+    send(opened, type="record", on=True)
+    episode = wait_for(opened, lambda s: s.get("recording", {}).get("on"))["episode"]
+    for _ in range(episodes):
+        state = wait_for(opened, lambda s, e=episode: s["episode"] == e)
+        while state["end"] is None:
+            send(opened, type="hold", controls=[oracle(state)])
+            send(opened, type="hold", controls=[])
+            steps = state["steps"]
+            state = wait_for(opened, lambda s, n=steps: s["steps"] > n)
+        send(opened, type="reset")
+        episode += 1
+    send(opened, type="record", on=False)
+    return wait_for(opened, lambda s: not s["recording"]["on"])
+
+
+def test_the_oracle_flies_demonstrations_through_the_protocol(page, monkeypatch):
+    written = []
+    try:
+        from drone_rl.training import demonstrations
+    except ImportError:
+        demonstrations = types.ModuleType("drone_rl.training.demonstrations")
+        demonstrations.FlightConditions = lambda *parts: parts
+        demonstrations.Demonstration = lambda conditions, **arrays: types.SimpleNamespace(**arrays)
+        monkeypatch.setitem(sys.modules, "drone_rl.training.demonstrations", demonstrations)
+    monkeypatch.setattr(
+        demonstrations, "add_demonstration", lambda folder, one: written.append(one), raising=False
+    )
+    with connected(page) as (opened, _):
+        state = fly_by_oracle(opened, 2)
+        assert state["recording"]["problem"] is None
+    assert len(written) == 2
+    for one in written:
+        assert one.pilot == "person" and one.rewards.sum() == 3.0
+        assert one.done[-1] and one.done.sum() == 1
+        assert one.images.shape == (len(one.actions), 25, 64, 3)
+        assert np.unique(one.actions).tolist() in ([0, 1], [0, 2], [0, 1, 2])
+
+
+def test_a_port_in_use_is_one_line():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(InputError, match=f"port={port} can't be used .* or 0 for a free one"):
+            drone_rl.fly("good", port=port)
+
+
+def test_a_missing_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    with pytest.raises(InputError, match=r"drone-rl fly needs uvicorn.*\[fly\]"):
+        drone_rl.fly("good")
+
+
+def test_closing_ends_threads_and_frees_the_port(page):
+    before = threading.active_count()
+    with drone_rl.fly("good", saliency=False) as opened:
+        port = int(opened.url.split(":")[2].split("/")[0])
+        with connected(opened) as (talking, _):
+            wait_for(talking, lambda s: True)
+            opened.close()
+            with pytest.raises(exceptions.ConnectionClosed):
+                wait_for(talking, lambda s: False)
+    assert threading.active_count() <= before
+    with socket.socket() as again:
+        assert again.connect_ex(("127.0.0.1", port)) != 0
+
+
+def test_a_bug_in_the_simulation_ends_the_page_and_is_raised(monkeypatch):
+    def fail(flight, seconds):
+        raise RuntimeError("a bug")
+
+    monkeypatch.setattr(server.Flight, "advance", fail)
+    with drone_rl.fly("good", saliency=False) as opened, connected(opened) as (talking, _):
+        with pytest.raises(exceptions.ConnectionClosed):
+            wait_for(talking, lambda s: False)
+        with pytest.raises(RuntimeError, match="a bug"):
+            opened.wait()
+
+
+def test_too_many_messages_are_refused(page, monkeypatch):
+    with connected(page) as (opened, _):
+        monkeypatch.setattr(server, "_MOST_WAITING", 0)
+        send(opened, type="reset")
+        state = wait_for(opened, lambda s: "error" in s)
+        assert state == {"error": "too many messages; slow down"}
+
+
+def test_settings_are_checked():
+    with pytest.raises(InputError, match="view='top' is unknown"):
+        drone_rl.fly("good", view="top")
+    with pytest.raises(InputError, match="policy=none does not exist"):
+        drone_rl.fly("none")
+
+
+def test_frames_are_handed_over_under_a_lock():
+    """A frame published between the check and the exchange would stop the page for good."""
+
+    class Page:
+        _handing, _pages = threading.Lock(), ()
+        _publish = server.FlyPage._publish
+
+        def __init__(self):
+            self._loop = types.SimpleNamespace(call_soon_threadsafe=scheduled.append)
+            self._kept = None
+
+        @property
+        def _frame(self):
+            assert self._handing.locked()
+            return self._kept
+
+        @_frame.setter
+        def _frame(self, frame):
+            assert self._handing.locked()
+            self._kept = frame
+
+    scheduled = []
+    page = Page()
+    for frame in (b"1", b"2"):
+        server.FlyPage._offer(page, frame)
+    assert page._kept == b"2" and len(scheduled) == 1
+    scheduled[0]()
+    assert page._kept is None
+    server.FlyPage._offer(page, b"3")
+    assert len(scheduled) == 2
+
+
+def test_pages_that_open_at_the_same_time_are_counted():
+    """More pages than allowed, all of which wait to be accepted, must not be let in."""
+
+    class Socket:
+        async def accept(self):
+            await asyncio.sleep(0.01)
+            accepted.append(self)
+
+        async def send_text(self, text):
+            pass
+
+        async def receive(self):
+            return {"type": "websocket.disconnect"}
+
+        async def close(self, code, reason):
+            refused.append(code)
+
+    async def open_all():
+        await asyncio.gather(*(page._talk(Socket()) for _ in range(server.MAX_PAGES + 2)))
+
+    accepted, refused = [], []
+    page = types.SimpleNamespace(_pages=set(), _hello="{}", _messages=queue.SimpleQueue())
+    page._talk = functools.partial(server.FlyPage._talk, page)
+    page._receive = functools.partial(server.FlyPage._receive, page)
+    asyncio.run(open_all())
+    assert len(accepted) == server.MAX_PAGES and refused == [1013, 1013]
+    assert not page._pages
+
+
+def test_a_frame_that_is_ready_after_the_server_has_ended_is_dropped():
+    loop = asyncio.new_event_loop()
+    loop.close()
+    page = types.SimpleNamespace(
+        _loop=loop, _handing=threading.Lock(), _frame=None, _publish=lambda: None
+    )
+    server.FlyPage._offer(page, b"1")
+    assert page._frame == b"1"

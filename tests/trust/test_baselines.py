@@ -1,0 +1,79 @@
+from types import SimpleNamespace
+
+import pytest
+import torch
+
+from drone_rl.collectors.complete_episodes import run_episodes
+from drone_rl.config import TaskSettings
+from drone_rl.envs import DroneEnv
+from drone_rl.policies.baselines import constant_policy, make_baseline, oracle_policy, random_policy
+from drone_rl.sim.actions import MOVES, Move
+from drone_rl.sim.worlds import Worlds
+from drone_rl.trust.baselines import BASELINES, run_baselines
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.seeding import side_stream, world_random_state
+from tests.continuous import make_env
+from tests.second_task import Posts
+
+TASK = TaskSettings(num_cubes=1)
+
+
+@pytest.fixture
+def policies():
+    """What each baseline is; random actions follow from the first environment's stream alone."""
+    stream = side_stream(world_random_state(5, 0), 5)
+    generator = torch.Generator().manual_seed(int(stream.integers(2**63)))
+    fixed = {action.name.lower(): constant_policy(action) for action in Move}
+    return {"oracle": oracle_policy(TASK), "random": random_policy(MOVES, generator), **fixed}
+
+
+def test_baselines_run_from_the_same_initial_states(policies, monkeypatch):
+    monkeypatch.setattr(Worlds, "render", lambda *args: pytest.fail("nobody looks"))
+    env = DroneEnv(4, TASK, pixels=False, seed=5)
+    worlds = env.state_dict()
+    flown = run_baselines(4, TASK, worlds, 6)
+    assert tuple(flown) == BASELINES and set(BASELINES) == set(policies)
+    for name, episodes in flown.items():
+        env.load_state_dict(worlds)
+        expected = run_episodes(env, policies[name], 6)
+        assert torch.equal(episodes.length, expected.length), name
+        for field, values in vars(expected.goals).items():
+            found = getattr(episodes.goals, field)
+            assert torch.equal(found.nan_to_num(), values.nan_to_num()), (name, field)
+    assert len(flown["oracle"]) == 6 and flown["oracle"].success.all()
+
+
+def test_baselines_of_another_task():
+    env = DroneEnv(4, Posts(), pixels=False, seed=5)
+    flown = run_baselines(4, Posts(), env.state_dict(), 8)
+    assert tuple(flown) == ("random", "forward", "oracle")
+    assert flown["oracle"].success.all() and flown["forward"].success.all()
+    assert flown["random"].success.mean() < 0.5
+
+
+def test_baselines_with_continuous_actions():
+    env = make_env(6)
+    flown = run_baselines(
+        6,
+        env.base_env.worlds.task,
+        env.base_env.state_dict(),
+        6,
+        dynamics=env.base_env.worlds.dynamics,
+    )
+    env.close()
+    assert tuple(flown) == BASELINES and flown["oracle"].success.all()
+    assert flown["forward"].length.max() == 10  # x = 9 m is the bound; 4 m/s for 0.25 s
+    assert flown["left"].length.tolist() == [10] * 6  # y = 7 m; 3 m/s for 0.25 s
+    assert len(set(flown["random"].length.tolist())) > 1
+
+
+def test_baseline_that_is_no_action_is_refused():
+    actions = SimpleNamespace(names=("throttle", "pitch"))
+    with pytest.raises(InputError, match=r"baseline=forward of task=.* which have throttle, pitch"):
+        make_baseline("forward", TASK, torch.Generator(), actions)
+
+
+def test_oracle_of_other_actions_is_refused():
+    actions = SimpleNamespace(names=("throttle", "pitch"))
+    with pytest.raises(InputError, match="acts by forward, left, right, these drones by throttle"):
+        oracle_policy(TASK, actions)

@@ -1,0 +1,264 @@
+"""Which flights under other conditions are found, and which are not believed."""
+
+import json
+import math
+import os
+import shutil
+
+import numpy as np
+import pytest
+
+import drone_rl
+from drone_rl.config.commands import JudgeSettings
+from drone_rl.policies.zoo import shifts_path
+from drone_rl.trust.axes import AXES
+from drone_rl.trust.coverage import (
+    _strengths,
+    compare_with_required,
+    find_domain,
+    read_requirements,
+    recheck_domain,
+)
+from drone_rl.trust.domain import Prober
+from drone_rl.trust.shifts import ranges_of
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import silent
+from drone_rl.utils.seeding import RootSeed
+from tests.evidence import SHIFTS, changed
+from tests.trust.making import shifts_of
+
+
+@pytest.fixture
+def good(tmp_path):
+    """A policy in a file of its own."""
+    path = tmp_path / "mine.safetensors"
+    shutil.copy(drone_rl.load_policy("good").path, path)
+    return drone_rl.load_policy(path)
+
+
+def leave(folder, made, when=0):
+    folder.mkdir(parents=True)
+    path = folder / "shifts.json"
+    path.write_text(json.dumps(made))
+    os.utime(path, (when, when))
+    return path
+
+
+def test_no_domain(good, tmp_path):
+    assert find_domain(good, outputs=tmp_path) is None
+
+
+def test_file_next_to_the_policy_comes_first(good, tmp_path):
+    made = shifts_of(good)
+    leave(tmp_path / "shifts" / "runs" / "a", made)
+    shifts_path(good.path).write_text(json.dumps(made))
+    assert find_domain(good, outputs=tmp_path).path == tmp_path / "mine.shifts.json"
+    other = find_domain(good.in_task(num_cubes=2), outputs=tmp_path)
+    assert other.numbers is None and "of another task" in other.refused
+
+
+def test_newest_file_of_the_policy_with_ranges(good, tmp_path):
+    runs, made = tmp_path / "shifts" / "runs", shifts_of(good)
+    leave(runs / "old", made, when=1)
+    wanted = leave(runs / "newer", made, when=2)
+    leave(runs / "without", changed(made, {"domain": None}), when=3)
+    leave(runs / "of_another", shifts_of(good, weights="0" * 64), when=4)
+    assert find_domain(good, outputs=tmp_path).path == wanted
+    assert find_domain(good.in_task(num_cubes=2), outputs=tmp_path) is None
+    assert find_domain(drone_rl.load_policy("poor"), outputs=tmp_path) is None
+
+
+def test_given_file_must_be_of_the_policy(good, tmp_path):
+    path = leave(tmp_path / "a", shifts_of(good))
+    assert find_domain(good, path).path == path == find_domain(good, path.parent).path
+    with pytest.raises(InputError, match="of another task"):
+        find_domain(good.in_task(num_cubes=2), path)
+    foreign = drone_rl.policy_from(lambda pictures: pictures.flatten(1)[:, :3])
+    assert find_domain(foreign, outputs=tmp_path) is None
+    with pytest.raises(InputError, match="is not a drone_rl policy file"):
+        find_domain(foreign, path)
+
+
+@pytest.mark.parametrize(
+    ("needs", "lacks"),
+    [("blur: {high: 1.0, unit: pixels}", []), ("blur: {high: 1.1, unit: pixels}", ["blur"])],
+)
+def test_required_range_is_compared_with_the_domain(good, tmp_path, needs, lacks):
+    (tmp_path / "needs.yaml").write_text(needs)
+    measured = find_domain(good, leave(tmp_path / "a", shifts_of(good)))
+    found = compare_with_required(good, tmp_path / "needs.yaml", measured)
+    assert [*found.lacking] == lacks and found.is_stated == (not lacks)
+    assert not found.is_covered  # nothing was flown to check it
+    said = "blur: needed" if lacks else "the file states it, and no episodes re-checked it"
+    assert str(found).startswith(f"not covered: {said}")
+
+
+def test_verdict_with_a_required_domain(good, tmp_path):
+    """With few flights it is not certain, and lets it stand; a stricter one does not."""
+    good = good.in_task(num_cubes=1)  # short episodes
+    path = leave(tmp_path / "a", shifts_of(good))
+    (tmp_path / "needs.yaml").write_text("blur: {high: 1.0, unit: pixels}")
+    told = {"shifts": path, "require_domain": tmp_path / "needs.yaml", "progress": silent}
+    told["domain_flights"] = 30
+    done = drone_rl.judge(good, episodes=5, sampled=False, **told)
+    assert done.coverage.is_covered and "blur of up to 1 pixels" in done.domain
+    assert done.domain.startswith(f"Read from {path}, dated 1970-01-01 0")
+    assert "not measured again here: good with" in done.domain
+    assert "re-checked by 30 episodes at each of 3 strengths" in str(done)
+    assert len(str(done).splitlines()) == 4 and done.domain in done._repr_html_()
+    assert done.as_dict()["required_domain"]["lacking"] == {}
+    strict = drone_rl.judge(good, episodes=5, sampled=False, good_share=0.99, **told)
+    assert not strict.coverage.is_covered and "not quoted" in strict.domain
+    unchecked = drone_rl.judge(good, episodes=5, sampled=False, **{**told, "domain_flights": 0})
+    assert not unchecked.coverage.is_covered
+    assert "not covered: it requires 0.9" in str(strict)
+
+
+def test_missing_domain_is_refused_before_any_episode(good, tmp_path, monkeypatch):
+    monkeypatch.setattr("drone_rl.sim.worlds.Worlds.render", None)
+    needs = tmp_path / "needs.yaml"
+    needs.write_text("blur: {high: 1.0, unit: pixels}")
+    told = {"require_domain": needs, "outputs": tmp_path, "progress": silent}
+    with pytest.raises(InputError, match=r"no shifts.json; run drone-rl shifts policy=.*mine"):
+        drone_rl.judge(good, **told)
+    path = leave(tmp_path / "shifts" / "runs" / "a", changed(shifts_of(good), {"domain": None}))
+    with pytest.raises(InputError, match=r"has no ranges \(domain=false\); run drone-rl shifts"):
+        drone_rl.judge(good, **told)
+    shifts_path(good.path).write_text(path.read_text()[:-9])
+    with pytest.raises(InputError, match="no plain JSON"):
+        drone_rl.judge(good, **told)
+    with pytest.raises(InputError, match="policy=left has no network"):
+        drone_rl.judge("left", **told)
+
+
+FEW = JudgeSettings(domain_flights=60)
+SEED = RootSeed(3, True)
+
+
+@pytest.fixture(scope="module")
+def near():
+    return drone_rl.load_policy("good").in_task(num_cubes=1)
+
+
+def need(**ends):
+    return {"low": None, "high": None, **ends}
+
+
+def test_true_range_is_not_contradicted(near):
+    found = recheck_domain(near, {"blur": need(high=0.5)}, shifts_of(near), FEW, SEED)
+    assert found.contradictions == ()
+    assert found.strengths["blur"][0] == 0.5 and found.count == 3
+    assert all(0 < value < 0.5 for value in found.strengths["blur"][1:])
+    assert "(fixed seed 3, to which a policy could have been fitted)" in str(found)
+    assert "60 episodes at each of 3 strengths" in str(found)
+
+
+def test_invented_range_is_contradicted(near):
+    """Good, says the file, with twelve of 25 rows dead."""
+    numbers = shifts_of(near, axes=("dead_rows",))
+    found = recheck_domain(near, {"dead_rows": need(low=12.0, high=12.0)}, numbers, FEW, SEED)
+    assert found.contradictions and all(
+        line.startswith("dead rows at 12 rows: ") and "certainly not good there" in line
+        for line in found.contradictions
+    )
+
+
+def test_poor_policy_is_contradicted_without_perturbation():
+    poor = drone_rl.load_policy("poor").in_task(num_cubes=1)
+    found = recheck_domain(poor, {"blur": need(high=0.5)}, shifts_of(poor), FEW, SEED)
+    assert found.contradictions[0].startswith("without perturbation: 0% of new episodes")
+
+
+def test_all_strengths_share_the_error_probability(near, monkeypatch):
+    parts = []
+
+    class Noted(Prober):
+        def probe(self, condition, part):
+            parts.append(part)
+            return super().probe(condition, part)
+
+    monkeypatch.setattr("drone_rl.trust.coverage.Prober", Noted)
+    few = FEW.replace(domain_flights=2)
+    recheck_domain(near, {"blur": need(high=0.5)}, shifts_of(near), few, SEED)
+    assert parts == [0.25] * 4  # without perturbation, at the end, and at two random strengths
+
+
+@pytest.mark.parametrize("name", list(AXES))
+def test_rechecked_strengths_are_within_the_required_range(near, name):
+    of, axis = near.description, AXES[name]
+    value = axis.value(axis.strengths[1], of)
+    numbers = shifts_of(near, axes=(name,))
+    neutral = numbers["axes"][name]["neutral"]
+    neutral = math.inf if neutral is None else neutral
+    wanted = need(low=value) if value < neutral else need(high=value)
+    found = [*_strengths(axis, of, wanted, numbers, np.random.default_rng(0))]
+    values = [axis.value(strength, of) for strength in found]
+    assert any(math.isclose(one, value) for one in values)
+    low, high = sorted((value, neutral))
+    assert all(low - 1e-9 <= one <= high + 1e-9 for one in values)
+    assert len(found) == 3 or axis.whole
+
+
+@pytest.fixture
+def read(tmp_path):
+    def build(text, name="needs.yaml"):
+        (tmp_path / name).write_text(text)
+        return read_requirements(tmp_path / name)
+
+    return build
+
+
+def test_requirements_in_yaml_and_json(read):
+    needs = {"fog": {"low": 60.0, "high": None}, "sun": {"low": 5.0, "high": 50.0}}
+    text = "fog: {low: 60, unit: m of sight}\nsun: {low: 5, high: 50, unit: degrees}\n"
+    assert read(text) == needs
+    data = {"fog": {"low": 60, "unit": "m of sight"}}
+    data["sun"] = {"low": 5, "high": 50, "unit": "degrees"}
+    assert read(json.dumps(data), "needs.json") == needs
+
+
+def test_domain_files_are_valid_requirements(read):
+    ranges = ranges_of(SHIFTS)
+    assert ranges["sun"] == {"low": 21.07, "high": 60.0, "unit": "degrees"}
+    read(json.dumps(ranges), "domain.json")
+    bad = {"domain.ranges.sun.positions": None, "axes.blur.levels.1.modes.constant.unchanged": True}
+    assert [*ranges_of(changed(SHIFTS, bad))] == ["brightness"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "is empty; the file was damaged"),
+        ("{}", "is empty; give axes"),
+        ("[1, 2]", "must be a mapping"),
+        ("fog: [", "line 1 of .* is no YAML .*; correct it"),
+        ("fog:\n\tlow: 1", "line 2 of .* is no YAML .*; indent with spaces, not tabs"),
+        (
+            "fog: {low: 1}\nfog: {low: 2}",
+            r"line 2 of .* is no YAML \(fog occurs twice\); correct it",
+        ),
+        ("a: !!python/object/apply:os.getcwd []", "no plain YAML"),
+        ("wind: {low: 1, unit: m/s}", "'wind' is not an axis; give one or more of: object_color"),
+        ("fog: 60", "fog=60 must be a mapping; give low, high or both, and unit: m of sight"),
+        ("fog: {low: 60, unit: km}", "fog.unit='km' is wrong; give .* unit: m of sight"),
+        ("fog: {low: 60}", "fog.unit=None is wrong"),
+        ("fog: {least: 60, unit: m of sight}", "fog.'least' is unknown"),
+        ("fog: {unit: m of sight}", "neither low nor high"),
+        ("fog: {low: 60, high: 40, unit: m of sight}", "from 60 to 40, which is less"),
+        ("fog: {low: sixty, unit: m of sight}", "fog.low='sixty' is a text"),
+        ("fog: {high: .inf, unit: m of sight}", "fog.high=inf is out of range"),
+        (
+            "camera_yaw: {low: -5, high: 5, unit: degrees}",
+            "camera_yaw: limits must be 0 or more because .*, got -5; give low",
+        ),
+    ],
+)
+def test_wrong_requirements(read, text, message):
+    with pytest.raises(InputError, match=message) as error:
+        read(text)
+    assert "\n" not in str(error.value) and "needs.yaml: " in str(error.value)
+
+
+def test_missing_requirements(tmp_path):
+    with pytest.raises(InputError, match=r"require_domain=.*none\.yaml can't be read"):
+        read_requirements(tmp_path / "none.yaml")

@@ -1,0 +1,196 @@
+"""Where an exported policy says that it comes from."""
+
+import dataclasses
+import json
+
+import pytest
+
+import drone_rl
+from drone_rl.config.commands import HeldOutSettings
+from drone_rl.policies.zoo import certificate_path
+from drone_rl.sweeps.manifest import Run, Sweep
+from drone_rl.sweeps.rows import choice_in_sweep
+from drone_rl.trust.coverage import find_domain
+from drone_rl.trust.export import export, recorded_origin, write_card
+from drone_rl.utils.errors import InputError
+from drone_rl.verification.claim import find_claim
+from tests.sweeps.conftest import _verdict
+from tests.trust.cards import CARD, VERDICT
+from tests.trust.making import shifts_of
+from tests.verification.checker.making import of_every_place
+
+METRICS = "frames,train/running_reward\n100,1.5\n"
+FIGURES = {"frames": 100, "episodes": 9, "seconds": 1.0, "running_reward": 1.5, "num_cubes": 3}
+
+
+@pytest.fixture
+def checkpoint(tmp_path):
+    """The last checkpoint of the second of three runs of a sweep."""
+    runs = [
+        Run(i, (f"seed={i}", "sweep=seeds", "trial=4"), tmp_path / f"run_{i}") for i in range(3)
+    ]
+    Sweep(tmp_path, "drone-rl train sweep=seeds", {}, runs).save()
+    folder = runs[1].folder
+    (folder / ".hydra").mkdir(parents=True)
+    (folder / ".hydra" / "overrides.yaml").write_text("[seed=1]")
+    (folder / "metrics.csv").write_text(METRICS)
+    return folder / "checkpoints" / "last.pt"
+
+
+def judged(checkpoint, **verdict):
+    result = {"reason": "frames", **FIGURES, "verdict": _verdict("good", **verdict)}
+    (checkpoint.parents[1] / "result.json").write_text(json.dumps(result))
+
+
+def test_origin_of_a_run_of_a_sweep(checkpoint):
+    judged(checkpoint)
+    command, chosen = choice_in_sweep(checkpoint)
+    assert command == "drone-rl train seed=1 sweep=seeds hydra.mode=RUN"
+    assert chosen == {"runs": 3, "episodes": 200}
+
+
+def test_origin_of_a_run_without_a_current_verdict(checkpoint):
+    assert choice_in_sweep(checkpoint)[1] == {"runs": 3, "episodes": None}
+    judged(checkpoint, rule="of yore")
+    assert choice_in_sweep(checkpoint)[1] == {"runs": 3, "episodes": None}
+
+
+def test_origin_of_a_single_run(checkpoint):
+    (checkpoint.parents[2] / "sweep.json").unlink()
+    assert choice_in_sweep(checkpoint) is None
+    assert recorded_origin(checkpoint, {}) == ("drone-rl train seed=1", None)
+
+
+def test_origin_of_an_exported_file_is_kept(checkpoint):
+    said = {"command": "drone-rl train seed=9", "chosen": {"runs": 7, "episodes": 20}}
+    found = recorded_origin(checkpoint.with_suffix(".safetensors"), said)
+    assert found == (said["command"], said["chosen"])
+
+
+FEW = HeldOutSettings(episodes=4)
+ONE = {"num_cubes": 1}
+"""A task with short episodes."""
+
+
+def test_card_quotes_and_copies_a_certificate(tmp_path):
+    policy = drone_rl.load_policy("proved")
+    made = certificate_path(policy.path)
+    target = tmp_path / "mine.safetensors"
+    export(policy, target, FEW, certificate=made, find_claim=find_claim)
+    card = (tmp_path / "mine.md").read_text()
+    assert "A certificate states for every placement" in card
+    assert "re-checked by 1,000 rollouts from fresh placements" in card
+    assert "All figures except those of the certificate are from 4 episodes" in card
+    beside = tmp_path / "mine.certificate.json"
+    assert beside.read_bytes() == made.read_bytes()
+    again = drone_rl.load_policy(target)
+    assert find_claim(again, flights=20).flights == 20
+
+
+def test_card_refuses_a_certificate_that_rollouts_contradict(tmp_path):
+    policy, made = drone_rl.load_policy("poor").in_task(**ONE), tmp_path / "made.json"
+    made.write_text(json.dumps(of_every_place(policy)))
+    target = tmp_path / "mine.safetensors"
+    with pytest.raises(InputError, match="ended otherwise than stated"):
+        export(policy, target, FEW, certificate=made, find_claim=find_claim)
+    assert not target.exists()
+
+
+def test_card_refuses_a_certificate_of_another_policy(tmp_path):
+    poor, good = (drone_rl.load_policy(name).in_task(**ONE) for name in ("poor", "good"))
+    policy, target = poor, tmp_path / "mine.safetensors"
+    beside = tmp_path / "mine.certificate.json"
+    beside.write_text(json.dumps(of_every_place(good)))
+    with pytest.raises(InputError, match="network with hash"):
+        export(policy, target, FEW, certificate=beside, find_claim=find_claim)
+    export(policy, target, FEW)
+    export(drone_rl.load_policy(target), tmp_path / "again.safetensors", FEW)
+    assert "ertificate" not in (tmp_path / "again.md").read_text()
+    assert not (tmp_path / "again.certificate.json").exists()
+
+
+@pytest.mark.parametrize(("name", "is_good"), [("good", True), ("right_and_forward", False)])
+def test_card_quotes_and_copies_a_robustness_evaluation(tmp_path, name, is_good):
+    """Those of one whom the card's verdict surely finds to be something else are not believed."""
+    policy, made = drone_rl.load_policy(name).in_task(**ONE), tmp_path / "made.json"
+    made.write_text(json.dumps(shifts_of(policy)))
+    settings = dataclasses.replace(FEW, episodes=4 if is_good else 300, num_envs=300)
+    export(policy, tmp_path / "mine.safetensors", settings, shifts=made)
+    card = (tmp_path / "mine.md").read_text()
+    assert ("with blur of up to 1 pixels and up to 4 dead rows" in card) == is_good
+    assert "nothing is known of other colors, light or sizes" in card
+    beside = tmp_path / "mine.shifts.json"
+    assert beside.exists() == is_good
+    if is_good:
+        assert beside.read_bytes() == made.read_bytes()
+        again = drone_rl.load_policy(tmp_path / "mine.safetensors")
+        assert find_domain(again).path == beside
+        assert "Read from mine.shifts.json, dated" in card  # and no path of this machine
+
+
+def test_origin_of_a_run_from_python_is_unknown(checkpoint):
+    (checkpoint.parents[2] / "sweep.json").unlink()
+    (checkpoint.parents[1] / ".hydra" / "overrides.yaml").unlink()
+    assert recorded_origin(checkpoint, {}) == (None, None)
+
+
+def test_origin_in_a_checkpoint_is_ignored(checkpoint):
+    (checkpoint.parents[2] / "sweep.json").unlink()
+    lie = {"command": "drone-rl train seed=9", "chosen": {"runs": 1, "episodes": None}}
+    assert recorded_origin(checkpoint, lie) == ("drone-rl train seed=1", None)
+
+
+def test_command_of_a_resumed_run(checkpoint):
+    (checkpoint.parents[2] / "sweep.json").unlink()
+    noted = checkpoint.parents[1] / ".hydra" / "overrides.yaml"
+    noted.write_text("[seed=1, resume=outputs/a, trainer.total_frames=9]")
+    command, _ = recorded_origin(checkpoint, {})
+    assert command == "drone-rl train seed=1 trainer.total_frames=9"
+
+
+def test_wrong_command_is_refused_before_any_episode(tmp_path, monkeypatch):
+    monkeypatch.setattr("drone_rl.trust.export.judge_policy", lambda *_, **__: 1 / 0)
+    settings = HeldOutSettings(episodes=2)
+    with pytest.raises(InputError, match="command="):
+        export(
+            drone_rl.load_policy("good"), tmp_path / "a.safetensors", settings, command="rm -rf /"
+        )
+
+
+def lines(**changed):
+    return write_card("mine", "0123", {**CARD, **changed}).splitlines()
+
+
+def test_card_names_policy_verdict_origin_and_digest():
+    found = lines()
+    assert found[0] == "# mine"
+    assert found[2].startswith("**poor** (certain")
+    assert any("`drone-rl train seed=7` for 12,345 frames" in line for line in found)
+    assert "- SHA-256 of `mine.safetensors`: `0123`" in found
+    assert "- revision abc; torch 1, torchrl 2, mujoco-warp 3" in found
+
+
+def test_card_compares_with_the_best_baseline_and_the_oracle():
+    found = lines()
+    head = "|  | most probable actions | sampled actions | best blind baseline (forward) | oracle |"
+    assert head in found
+    row = found[found.index(head) + 3]
+    assert row.startswith("| cubes collected | 90.0% (80.0 to 100.0) | 60.0% (")
+    assert "| 30.0% (" in row and "| 100.0% (" in row
+
+
+def test_card_lists_the_largest_failure_first():
+    found = lines()
+    at = found.index("| fails first at | episodes | of | rate |")
+    assert found[at + 2] == "| cube: first | 31 | 400 | 75.0% (70.0 to 80.0) |"
+    assert found[at + 3].startswith("| end: step_limit | 4 | 400 |")
+    assert found[at + 4] == ""
+
+
+def test_card_of_a_policy_that_never_failed_has_a_bound():
+    bound = {"share": 0.0, "lower95": 0.0, "upper95": 0.009, "trials": 400}
+    failures = {"rows": [], "largest": None, "bound": bound}
+    found = "\n".join(lines(verdict={**VERDICT, "failures": failures}))
+    assert "| fails | never |" in found
+    assert "less than 1%" not in found
+    assert "| upper bound | 0.9% of episodes |" in found

@@ -1,0 +1,167 @@
+"""Evaluations and verdicts in Python, and how they show themselves."""
+
+import json
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import drone_rl
+from drone_rl.trust.judge import Judgements
+from drone_rl.trust.rule import VerdictKind
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import silent
+from drone_rl.utils.seeding import RootSeed
+from tests.verification.checker.making import of_every_place
+
+
+@pytest.fixture(scope="module")
+def good():
+    return drone_rl.load_policy("good")
+
+
+def test_verdict_in_python(good):
+    few = drone_rl.judge(good, episodes=8, sampled=False, progress=silent)
+    assert (few.verdict.kind, few.verdict.certain) == ("good", False)
+    assert str(few).startswith("good (not certain): ")
+    assert few.as_dict()["policy"] == "good"
+    shown = few._repr_html_()
+    assert "<td>success rate above 90% of the oracle&#x27;s (margin, good if above 0)</td>" in shown
+    success = few.verdict.evidence["greedy"]["success"]
+    rate = f"<td>success rate (95% interval)</td><td>{success['share']:.3f}</td>"
+    assert rate in shown.replace("\n", "")
+    assert "<td>success</td>" not in shown  # a margin is no success rate
+
+
+def refused(*_):
+    raise AssertionError("episodes were flown")
+
+
+def test_several_policies(good):
+    done = drone_rl.judge(["oracle", "left"], episodes=150, progress=silent)
+    assert [one.name for one in done] == ["oracle", "left"] and len(done) == 2
+    assert done[1].verdict.kind == "poor" and done[:1][0] is done[0]
+    assert str(done).splitlines()[1].split()[:3] == ["oracle", "good", "yes"]
+    assert "<td>poor</td>" in done._repr_html_()
+    seed = done[0].verdict.evidence["seed"]
+    assert (
+        done[1].verdict.evidence["seed"] == seed and not done[1].verdict.evidence["seed_is_fixed"]
+    )
+    fresh = RootSeed(seed, False)
+    alone = drone_rl.judge("left", episodes=150, progress=silent, drawn_seed=fresh)
+    assert alone.verdict.evidence == done[1].verdict.evidence
+    both = drone_rl.judge((good, "oracle"), episodes=2, sampled=False, progress=silent)
+    assert [one.name for one in both] == ["good", "oracle"]
+    with pytest.raises(InputError, match=r"policy=\[\] is empty"):
+        drone_rl.judge([])
+    with pytest.raises(InputError, match="policy=nope does not exist"):
+        drone_rl.judge(["oracle", "nope"], progress=refused)
+    for policies in ("oracle", ["oracle"]):
+        with pytest.raises(InputError, match=r"^settings=\(dict\) is no JudgeSettings"):
+            drone_rl.judge(policies, {"episodes": 2}, progress=refused)
+
+
+def test_verdict_with_a_certificate(good, tmp_path):
+    path = tmp_path / "certificate.json"
+    path.write_text(json.dumps(of_every_place(good.in_task(num_cubes=1))))
+    how = {"certificate": path, "episodes": 8, "sampled": False, "progress": silent}
+    done = drone_rl.judge(good, task={"num_cubes": 1}, certificate_flights=400, **how)
+    assert done.verdict.is_proved
+    assert "A certificate states for every placement" in str(done)
+    assert "re-checked by 400 rollouts from fresh placements" in str(done)
+    assert (done.as_dict()["certificate"], done.as_dict()["proof"]["agreeing"]) == (str(path), 8)
+    again = drone_rl.judge(good, task={"num_cubes": 1}, certificate_flights=50, **how)
+    seeds = [one.as_dict()["proof"]["seed"] for one in (done, again)]
+    assert seeds[0] != seeds[1]
+    unchecked = drone_rl.judge(good, task={"num_cubes": 1}, certificate_flights=0, **how)
+    assert not unchecked.verdict.is_proved
+    assert "not re-checked, so it proves nothing here" in str(unchecked)
+    with pytest.raises(InputError, match="another task: num_cubes=1, not 3"):
+        drone_rl.judge(good, **how)
+    with pytest.raises(InputError, match="policy=oracle has no network; give certificate= with"):
+        drone_rl.judge("oracle", **how)
+
+
+def test_contradicted_certificate_proves_nothing(tmp_path):
+    poor = drone_rl.load_policy("poor").in_task(num_cubes=1)
+    path = tmp_path / "certificate.json"
+    path.write_text(json.dumps(of_every_place(poor)))
+    few = {"episodes": 8, "sampled": False, "progress": silent}
+    done = drone_rl.judge(poor, certificate=path, certificate_flights=0, **few)
+    assert not done.verdict.is_proved
+    assert "8 of 8 greedy flights of this verdict ended otherwise than it states." in str(done)
+    assert "A certificate states" not in str(done)
+    with pytest.raises(InputError, match=r"does not hold: .* ended otherwise than stated"):
+        drone_rl.judge(poor, certificate=path, certificate_flights=100, **few)
+
+
+def test_verdict_on_a_baseline_in_another_task():
+    done = drone_rl.judge("left", task={"num_cubes": 1}, episodes=200, progress=silent)
+    assert done.verdict.kind == "poor"
+    assert done.as_dict()["num_cubes"] == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"episodes": 0}, "episodes=0 is out of range"),
+        ({"episodes": "many"}, "episodes='many'"),
+        ({"good_share": 1.0}, "good_share=1.0 is out of range; give a number above 0 and below 1"),
+        ({"task": {"num_cubes": 0}}, "task.num_cubes=0"),
+        ({"wind": 1}, r"^wind is a setting of dynamics; give dynamics=\{'wind': 1\}$"),
+    ],
+)
+def test_wrong_arguments(change, message):
+    with pytest.raises(InputError, match=f"^{message}"):
+        drone_rl.judge("random", progress=silent, **change)
+
+
+def test_seeds_are_fresh_and_reproduce_a_verdict(good):
+    how = {"episodes": 12, "sampled": True, "task": {"num_cubes": 1}, "progress": silent}
+    one, other = (drone_rl.judge(good, **how) for _ in range(2))
+    first, second = one.verdict.evidence, other.verdict.evidence
+    assert first["seed"] != second["seed"]
+    assert not first["seed_is_fixed"]
+    printed = re.search(r"environments: seed (\d+) \(fresh\)", str(one))
+    assert printed is not None
+    again = drone_rl.judge(good, seed=int(printed[1]), **how).verdict.evidence
+    assert again == {**first, "seed_is_fixed": True}
+    assert one.settings.seed == first["seed"]
+
+
+def test_changes_are_refused_before_any_episode(good):
+    with pytest.raises(InputError, match=r"^task\.num_cubes is unknown"):
+        drone_rl.judge([good, "pillars_good"], task={"num_cubes": 2}, progress=refused)
+    with pytest.raises(InputError, match=r"^policy=oracle sees no images"):
+        drone_rl.judge([good, "oracle"], appearance="fog", progress=refused)
+
+
+def test_task_settings_of_a_baseline():
+    task = drone_rl.TaskSettings(num_cubes=1)
+    done = drone_rl.judge("oracle", task=task, episodes=2, progress=silent)
+    assert done.as_dict()["num_cubes"] == 1
+    with pytest.raises(InputError, match=r"^policy=\(ndarray\) is no policy"):
+        drone_rl.judge(np.zeros(3), progress=refused)
+
+
+def judged(name, kind, certain, share):
+    success = {"share": share, "lower95": share - 0.05, "upper95": share + 0.05}
+    verdict = SimpleNamespace(kind=kind, certain=certain, evidence={"greedy": {"success": success}})
+    return SimpleNamespace(name=name, verdict=verdict)
+
+
+@pytest.fixture
+def both():
+    return Judgements(
+        (judged("a", VerdictKind.GOOD, True, 0.95), judged("<b>", VerdictKind.POOR, False, 0.1))
+    )
+
+
+def test_table_of_judgements(both):
+    assert both.rows() == [
+        ["policy", "verdict", "certain", "success rate (95% CI)"],
+        ["a", "good", "yes", "95.0% (90.0 to 100.0)"],
+        ["<b>", "poor", "no", "10.0% (5.0 to 15.0)"],
+    ]
+    assert [line.split()[0] for line in str(both).splitlines()] == ["policy", "a", "<b>"]

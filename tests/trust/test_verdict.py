@@ -1,0 +1,313 @@
+import dataclasses
+import json
+import math
+
+import pytest
+import torch
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from drone_rl.collectors.complete_episodes import run_episodes
+from drone_rl.config import DynamicsSettings, TaskSettings
+from drone_rl.envs import DroneEnv
+from drone_rl.policies.baselines import constant_policy, oracle_policy
+from drone_rl.sim.actions import Move
+from drone_rl.sim.tasks.collect_cubes import Side
+from drone_rl.sim.vocabulary import TaskVocabulary
+from drone_rl.trust.rounding_sensitivity import Rounding
+from drone_rl.trust.rule import Rule, VerdictKind
+from drone_rl.trust.verdict import apply_rule, judge_policy, measure, observe
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.intervals import mean_bounds, proportion
+from tests.fake_flight import floating
+from tests.second_task import Posts
+
+LEFT, AHEAD, RIGHT = Side
+SHARED = HealthCheck.function_scoped_fixture
+LAYOUTS = [[LEFT, RIGHT], [RIGHT, LEFT], [AHEAD, LEFT], [RIGHT, AHEAD]]
+
+
+@pytest.fixture
+def judged(make_episodes, make_baselines):
+    """The verdict on a policy that collects what `hits` says of the sides of 400 episodes."""
+
+    def judged(hits, number=400, **kwargs):
+        sides = [LAYOUTS[i % 4] for i in range(number)]
+        episodes = make_episodes(sides, [[hits(i, s) for s in row] for i, row in enumerate(sides)])
+        return apply_rule(episodes, make_baselines(episodes), **kwargs)
+
+    return judged
+
+
+@pytest.mark.parametrize(
+    ("hits", "kind", "status"),
+    [
+        (lambda i, side: True, VerdictKind.GOOD, 0),
+        (lambda i, side: False, VerdictKind.POOR, 10),
+        (lambda i, side: side != LEFT, VerdictKind.ONE_SIDED_RIGHT, 11),
+        (lambda i, side: side != RIGHT, VerdictKind.ONE_SIDED_LEFT, 11),
+        (lambda i, side: side != AHEAD, VerdictKind.NONE, 12),
+        (lambda i, side: side == AHEAD, VerdictKind.POOR, 10),  # as flying straight on
+        (lambda i, side: i % 8 < 4, VerdictKind.NONE, 12),
+    ],
+)
+def test_kinds(judged, hits, kind, status):
+    verdict = judged(hits)
+    assert (verdict.kind, verdict.certain, verdict.exit_code) == (kind, True, status)
+    plain = verdict.as_dict()
+    assert (plain["kind"], plain["certain"], plain["exit_code"]) == (kind.value, True, status)
+    assert plain["sentence"] == verdict.sentence
+    json.dumps(plain, allow_nan=False)
+
+
+def test_few_episodes_are_not_certain(judged):
+    verdict = judged(lambda i, side: True, number=5)
+    assert (verdict.kind, verdict.certain, verdict.exit_code) == (VerdictKind.GOOD, False, 13)
+    assert verdict.evidence["enough"] == 100
+    assert judged(lambda i, side: True, number=100).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("number", "missed", "enough"),
+    [
+        (40, None, 2 * 40),
+        (28, None, 3 * 28),
+        (16, None, 5 * 16),
+        (8, None, 10 * 8),
+        (4, None, 20 * 4),
+        (100, 13, 50 * 100),  # one episode in thirteen
+        (40, 14, 100 * 40),
+    ],
+)
+def test_number_of_episodes_that_would_be_enough(judged, number, missed, enough):
+    verdict = judged(lambda i, side: missed is None or i % missed > 0, number=number)
+    assert (verdict.certain, verdict.evidence["enough"]) == (False, enough)
+
+
+def test_margin_above_baselines(make_episodes, make_baselines):
+    episodes = make_episodes([[LEFT, LEFT], [AHEAD, AHEAD]], [[1, 1], [1, 0]])
+    baselines = make_baselines(episodes)
+    baselines["oracle"] = make_episodes([[LEFT, LEFT], [AHEAD, AHEAD]], [[1, 0], [0, 0]])
+    told = dict(zip(Rule().quantities, observe(episodes, baselines, Rule()), strict=True))
+    assert told["success"].tolist() == [1.0, 0.0]  # the oracle never succeeds
+    assert told["above random"].tolist() == pytest.approx([1 - 1 / 6 * 0.5, 0.5])
+    assert told["above forward"].tolist() == pytest.approx([1 - 1 / 6 * 0.5, 0.5 - 5 / 6])
+
+
+def test_success_at_the_threshold_is_not_good(judged):
+    verdict = judged(lambda i, side: i % 10 > 0)
+    assert verdict.evidence["greedy"]["success"]["share"] == 0.9
+    assert (verdict.kind, verdict.certain) == (VerdictKind.NONE, False)
+    assert verdict.evidence["enough"] is None
+    assert judged(lambda i, side: i % 10 > 0, rule=Rule(good_share=0.8)).kind is VerdictKind.GOOD
+
+
+def test_quantities_by_hand(make_episodes, make_baselines):
+    episodes = make_episodes([[LEFT, LEFT], [LEFT, RIGHT], [AHEAD, -1]], [[1, 1], [1, 0], [0, 0]])
+    baselines, rule = make_baselines(episodes), Rule()
+    found = dict(zip(Rule().quantities, measure(episodes, baselines, rule), strict=True))
+    success = mean_bounds([0.1, -0.9, -0.9], -0.9, 1.0, rule.confidence)
+    assert found["success"][:3] == tuple(success[k] for k in ("mean", "lower95", "upper95"))
+    offered = proportion(2, 3, rule.confidence)
+    assert found["offered left"][:3] == tuple(offered[k] for k in ("share", "lower95", "upper95"))
+    assert found["collected left"].value == 1.0
+    assert found["collected right"].value == 0.0
+    assert (
+        found["collected right"].upper == mean_bounds([0.0], confidence=rule.confidence)["upper95"]
+    )
+    # shares 1, 0.5, 0; random 0; straight on 0, 0, 0.5, the oracle 1
+    assert found["above random"].value == pytest.approx(0.5 - 1 / 6)
+    assert found["above forward"].value == pytest.approx(0.5 - 5 / 6 * 0.5 / 3 - 1 / 6)
+
+
+def test_sides_without_goals_do_not_count(make_episodes, make_baselines):
+    episodes = make_episodes([[AHEAD, AHEAD]] * 400, [[1, 1]] * 400)
+    verdict = apply_rule(episodes, make_baselines(episodes))
+    assert (verdict.kind, verdict.certain) == (VerdictKind.TRIVIAL, True)
+    assert verdict.evidence["greedy"]["shares"]["left"]["mean"] is None
+    assert "0%" not in verdict.sentence.replace("100%", "")
+
+
+@pytest.mark.parametrize(
+    ("solved", "kind", "certain", "status"),
+    [(400, VerdictKind.TRIVIAL, True, 18), (360, VerdictKind.TRIVIAL, False, 13),
+     (352, VerdictKind.GOOD, False, 13), (200, VerdictKind.GOOD, True, 0)],
+)  # fmt: skip
+def test_task_that_a_baseline_solves_is_trivial(
+    make_episodes, make_baselines, solved, kind, certain, status
+):
+    """Of 400 episodes the policy succeeds in all; flying straight needs 360 to be good, too."""
+    sides = [[AHEAD, AHEAD if i < solved else LEFT] for i in range(400)]
+    episodes = make_episodes(sides, [[1, 1]] * 400)
+    verdict = apply_rule(episodes, make_baselines(episodes))
+    assert (verdict.kind, verdict.certain, verdict.exit_code) == (kind, certain, status)
+    trivial = "Flying straight on does as well: it collects every cube in 100% of episodes"
+    assert verdict.sentence.startswith(trivial) == (solved == 400)
+
+
+def test_baselines_have_the_dynamics_of_the_environment(monkeypatch):
+    """The baselines of a verdict meet the same wind as the policy."""
+    floating(monkeypatch)
+    task = TaskSettings(num_cubes=1)
+    against = DynamicsSettings(mode="simple_flight", wind=(-2.0, 0.0, 0.0))
+    env = DroneEnv(3, task, pixels=False, dynamics=against)
+    verdict = judge_policy(env, constant_policy(Move.FORWARD), 3, sampled=False)
+    policy, baseline = verdict.evidence["greedy"], verdict.evidence["baselines"]["forward"]
+    assert policy["mean_length"] == baseline["mean_length"]
+    still = judge_policy(DroneEnv(3, task, pixels=False), constant_policy(Move.FORWARD), 3)
+    assert still.evidence["greedy"]["mean_length"] < policy["mean_length"]
+
+
+def test_other_initial_states_are_refused(make_episodes, make_baselines):
+    ours = make_episodes([[LEFT, LEFT]] * 2, [[1, 1]] * 2)
+    theirs = make_episodes([[RIGHT, LEFT]] * 2, [[1, 1]] * 2)
+    with pytest.raises(ValueError, match="different initial states"):
+        apply_rule(ours, make_baselines(theirs))
+    with pytest.raises(ValueError, match="different initial states"):
+        apply_rule(ours, make_baselines(ours), sampled=ours[:1])
+
+
+def test_sampled_episodes_are_compared_pairwise(judged, make_episodes):
+    sides = [LAYOUTS[i % 4] for i in range(400)]
+    drawn = make_episodes(sides, [[i % 2 == 0] * 2 for i in range(400)])
+    verdict = judged(lambda i, side: True, sampled=drawn)
+    assert verdict.evidence["drawing"]["mean"] == -0.5
+    assert verdict.evidence["sampled"]["success"]["share"] == 0.5
+    assert verdict.kind is VerdictKind.GOOD
+
+
+def test_verdict_repeats():
+    task = TaskSettings(num_cubes=1)
+    dicts = []
+    for _ in range(2):
+        env = DroneEnv(16, task, pixels=False)
+        dicts.append(judge_policy(env, oracle_policy(task), 20, sampled=True).as_dict())
+    first, again = dicts
+    assert first == again
+    assert first["greedy"] == first["sampled"] == first["baselines"]["oracle"]
+    assert first["skill"]["oracle"]["mean"] == 0.0
+    assert first["baselines"]["left"]["mean_goals"] == 0.0
+    assert 0 < first["baselines"]["forward"]["mean_goals"] < 1
+    assert math.isclose(
+        first["skill"]["forward"]["mean"], 1 - first["baselines"]["forward"]["mean_goals"]
+    )
+
+
+def mirrored(episodes):
+    """The same episodes in a world where left is right."""
+    swap = torch.tensor([Side.RIGHT, Side.AHEAD, Side.LEFT])
+    goals = episodes.goals
+    side = torch.where(goals.stratum < 0, -1, swap[goals.stratum])
+    turned = {"stratum": side, "lateral": -goals.lateral, "world": -goals.world}
+    return dataclasses.replace(episodes, goals=dataclasses.replace(goals, **turned))
+
+
+@given(st.lists(st.tuples(st.sampled_from(LAYOUTS), st.booleans(), st.booleans()), min_size=1))
+@settings(
+    max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+def test_mirrored_episodes_get_the_mirrored_kind(make_episodes, make_baselines, drawn):
+    sides, hits = [row[0] for row in drawn] * 30, [row[1:] for row in drawn] * 30
+    ours = make_episodes(sides, hits)
+    baselines = make_baselines(ours)
+    theirs = {name: mirrored(flown) for name, flown in baselines.items()}
+    theirs["left"], theirs["right"] = theirs["right"], theirs["left"]
+    verdict, reflected = apply_rule(ours, baselines), apply_rule(mirrored(ours), theirs)
+    assert reflected.kind is verdict.kind.mirrored
+    assert reflected.certain == verdict.certain
+
+
+def test_verdict_on_another_task():
+    env = DroneEnv(20, Posts(), pixels=False)
+    straight = judge_policy(env, constant_policy(Move.FORWARD), 200, sampled=False)
+    assert (straight.kind, straight.certain) == (VerdictKind.TRIVIAL, True)
+    evidence = straight.evidence
+    assert list(evidence["quantities"]) == [
+        "success", "offered left", "offered right", "collected left", "collected right",
+        "above random", "above forward", "unsolved by random", "unsolved by forward",
+    ]  # fmt: skip
+    assert list(evidence["baselines"]) == ["random", "forward", "oracle"]
+    leaving = judge_policy(env, constant_policy(Move.LEFT), 200, sampled=False)
+    assert (leaving.kind, leaving.certain) == (VerdictKind.POOR, True)
+    assert leaving.evidence["failures"]["largest"]["value"] in ("left", "right")
+
+
+def test_greedy_and_sampled_episodes_share_initial_states(monkeypatch):
+    flown = []
+
+    def run(env, actor, episodes, **how):
+        flown.append((how.get("greedy", True), episodes, env.state_dict()))
+        return run_episodes(env, actor, episodes, **how)
+
+    monkeypatch.setattr("drone_rl.trust.verdict.run_episodes", run)
+    task = TaskSettings(num_cubes=1)
+    env = DroneEnv(2, task, pixels=False)
+    before = env.state_dict()
+    judge_policy(env, oracle_policy(task), 3)
+    assert flown == [(True, 3, before), (False, 3, before)]
+    flown.clear()
+    judge_policy(env, oracle_policy(task), 3, sampled=False)
+    assert [greedy for greedy, *_ in flown] == [True]
+
+
+def test_task_without_an_oracle_is_refused(monkeypatch):
+    class Blind(Posts):
+        name, oracle = "fog", None
+
+    def refused(*_, **__):
+        raise AssertionError("episodes were flown")
+
+    for module in ("verdict", "baselines"):
+        monkeypatch.setattr(f"drone_rl.trust.{module}.run_episodes", refused)
+    env = DroneEnv(2, Blind(), pixels=False)
+    with pytest.raises(InputError, match="task=fog has no oracle"):
+        judge_policy(env, constant_policy(Move.LEFT), 2)
+
+
+def rounding(fragile, number=400, unexplained=0):
+    """A check of 40 frames for each of so many episodes, with fragile frames in all of them."""
+    return Rounding(
+        arithmetic="float32 on cpu, PyTorch",
+        is_bound=True,
+        frames=40 * number,
+        fragile=fragile,
+        episodes=number,
+        fragile_episodes=min(fragile, number),
+        compared="fused kernel",
+        compared_episodes=50,
+        differing=unexplained,
+        unexplained=unexplained,
+    )
+
+
+def test_few_fragile_frames_leave_a_verdict_certain(judged):
+    verdict = judged(lambda i, side: True, rounding=rounding(100))
+    assert (verdict.kind, verdict.exit_code) == (VerdictKind.GOOD, 0)
+    assert verdict.sentence.endswith("The verdict holds for float32 on cpu, PyTorch.")
+
+
+@pytest.mark.parametrize("found", [rounding(321), rounding(101), rounding(0, unexplained=1)])
+def test_many_fragile_frames_or_episodes_or_other_actions_make_it_uncertain(judged, found):
+    verdict = judged(lambda i, side: True, rounding=found)
+    assert (verdict.kind, verdict.certain, verdict.exit_code) == (VerdictKind.GOOD, False, 13)
+    assert "Not certain: decisions depend on rounding." in verdict.sentence
+    assert verdict.evidence["rounding"]["decides"]
+
+
+def test_more_episodes_do_not_help_where_rounding_decides(judged):
+    verdict = judged(lambda i, side: True, number=8, rounding=rounding(320, number=8))
+    assert not verdict.certain and verdict.evidence["enough"] is None
+
+
+def test_unusable_vocabulary_is_refused(monkeypatch):
+    class Wordy(Posts):
+        name, vocabulary = "wordy", TaskVocabulary(tested="two posts\nin a row")
+
+    def refused(*_, **__):
+        raise AssertionError("episodes were flown")
+
+    for module in ("verdict", "baselines"):
+        monkeypatch.setattr(f"drone_rl.trust.{module}.run_episodes", refused)
+    env = DroneEnv(2, Wordy(), pixels=False)
+    with pytest.raises(InputError, match=r"terms\.tested="):
+        judge_policy(env, constant_policy(Move.LEFT), 2)
