@@ -5,7 +5,6 @@ import gc
 import pytest
 import torch
 from tensordict.nn import probabilistic
-from torchrl.collectors import Collector
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl.collectors.episodes import SteppingCollector
@@ -24,14 +23,6 @@ def make(num_envs=5, **settings):
     network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,), generator=generator)
     actor = make_actor(network, env.action_spec, generator)
     return SteppingCollector(env, actor, Reasons(["a reason"]), next_keys=KEPT, **settings), env
-
-
-def test_source_names_the_reason():
-    collector, _ = make()
-    assert type(collector._collector) is Collector
-    assert collector.name == "stepping collector: a reason"
-    assert collector.cache_activations() is None
-    collector.close()
 
 
 def test_construction_starts_no_episode():
@@ -80,10 +71,3 @@ def test_no_other_exploration_type_is_set_for_other_threads(monkeypatch):
         )
         collector.collect(5)
         assert kinds == {ExplorationType.DETERMINISTIC}
-
-
-def test_observations_are_omitted_and_extra_entries_kept():
-    collector, _ = make(keep_actor_entries=False, actor_keys=("logits",))
-    batch = collector.collect(5)
-    assert set(batch.keys()) == {"action", "logits", "next", "collector"}
-    assert len(batch["logits"]) == len(batch)

@@ -7,12 +7,9 @@ import torch
 from torchrl.envs import RewardSum
 
 from drone_rl.acceleration import (
-    ActivationCache,
-    BatchedInference,
     DirectCollector,
     DirectStepper,
     FusedCollector,
-    FusedNetwork,
 )
 from drone_rl.collectors import speedups
 from drone_rl.collectors.episodes import EpisodeCollector
@@ -42,14 +39,6 @@ def test_collectors_step_by_torchrl_if_the_package_is_missing(missing):
     env.close()
 
 
-def test_disabled_acceleration_is_the_reason():
-    env = with_transforms(DroneEnv(2, TASK), [GrayPixels()])
-    actor = make_actor(SmallCNN((1, 25, 64), 3), env.action_spec)
-    found = speedups.accelerated_collector(env, actor, "none", next_keys=KEPT)
-    assert found == ("acceleration is off",)
-    env.close()
-
-
 def test_collector_is_fused_direct_or_rejected_with_reasons():
     env = with_transforms(DroneEnv(2, TASK), [GrayPixels()])
     actor = make_actor(SmallCNN((1, 25, 64), 3), env.action_spec)
@@ -70,24 +59,8 @@ def test_collector_is_fused_direct_or_rejected_with_reasons():
     summed.close()
 
 
-def test_supported_networks_are_accelerated():
-    network, cache = SmallCNN((1, 25, 64), 3), ActivationCache(1, 1)
-    assert isinstance(speedups.accelerated_inference(network), BatchedInference)
-    found = speedups.accelerated_gradients(network, cache=lambda: cache)
-    assert isinstance(found, FusedNetwork) and found.in_keys == ("pixels", "activations")
-    assert speedups.accelerated_gradients(network).in_keys == ("pixels",)
-
-
 def test_networks_are_unchanged_if_the_package_is_missing(missing):
     network = SmallCNN((1, 25, 64), 3)
-    assert speedups.accelerated_gradients(network) is network
-    pixels = torch.randn(2, 1, 25, 64)
-    logits = speedups.accelerated_inference(network)(pixels)
-    assert torch.equal(logits, network(pixels)) and not logits.requires_grad
-
-
-def test_unsupported_networks_are_unchanged():
-    network = MLP((1, 25, 64), 3)
     assert speedups.accelerated_gradients(network) is network
     pixels = torch.randn(2, 1, 25, 64)
     logits = speedups.accelerated_inference(network)(pixels)

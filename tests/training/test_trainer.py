@@ -86,15 +86,6 @@ def test_signal_during_confirmation_stops_after_it(make_trainer):
     assert calls == [0]
 
 
-def test_signal_during_the_last_save_is_returned(make_trainer):
-    class Late(Callback):
-        def on_end(self, training, reason):
-            assert reason == "frames"
-            signal.raise_signal(signal.SIGTERM)
-
-    assert run(make_trainer(callbacks=[Late()])) == "SIGTERM"
-
-
 def test_other_threads_install_no_signal_handlers(make_trainer):
     before = signal.getsignal(signal.SIGTERM)
     seen = []
@@ -104,14 +95,6 @@ def test_other_threads_install_no_signal_handlers(make_trainer):
     thread.start()
     thread.join()
     assert seen == [before] and trainer.progress.frames >= trainer.total_frames
-
-
-def test_handler_from_outside_python_is_kept(make_trainer, monkeypatch):
-    installed = []
-    monkeypatch.setattr(signal, "getsignal", lambda number: None)
-    monkeypatch.setattr(signal, "signal", lambda *args: installed.append(args))
-    assert run(make_trainer()) == "frames"
-    assert installed == []
 
 
 class Terminated(BaseException):
@@ -185,20 +168,6 @@ def test_nan_stops_and_keeps_the_last_good_checkpoint(make_trainer, tmp_path, wh
     assert load_checkpoint(tmp_path / "last.pt")["progress"]["updates"] == 2
 
 
-@pytest.mark.parametrize("metrics", [None, 0.5, {"loss/x": None}, {"loss/x": torch.zeros(2)}])
-def test_wrong_metrics_of_a_learner_are_named(make_trainer, metrics):
-    trainer = make_trainer()
-    trainer.learner.update = lambda batch: metrics
-    with pytest.raises(InputError, match=r"update of ReinforceLearner of .* returns .*by name"):
-        run(trainer)
-
-
-def test_stops_when_solved(make_trainer):
-    trainer = make_trainer(target=0.5, running_decay=0.9, total_frames=100_000)
-    assert run(trainer) == "solved"
-    assert trainer.progress.running_reward >= 0.5
-
-
 def test_training_is_solved_only_after_confirmation(make_trainer):
     calls = []
 
@@ -214,16 +183,6 @@ def test_training_is_solved_only_after_confirmation(make_trainer):
     assert run(trainer) == "solved"
     assert calls[0] == first and calls[2] == trainer.progress.updates
     assert calls == sorted(set(calls)) and trainer.progress.running_reward >= 0.5
-
-
-def test_memory_is_released_periodically(make_trainer, monkeypatch):
-    given, trainer = [], make_trainer(total_frames=100_000)
-    monkeypatch.setattr(
-        trainer_module, "return_freed_memory", lambda: given.append(trainer.progress.updates)
-    )
-    trainer.callbacks.append(At(40, lambda t: setattr(t, "stop_request", "enough")))
-    run(trainer)
-    assert given == [16, 32]
 
 
 def test_stops_at_episodes(make_trainer):
@@ -251,31 +210,6 @@ def test_progress_counts_frames_and_episodes(make_trainer):
 class Parity(enum.IntEnum):
     NONE = 0
     ODD = 1
-
-
-def test_end_metrics_use_the_given_names(make_trainer):
-    at, trainer = At(-1, None), make_trainer(ends=Parity)
-    collect, trainer.callbacks = trainer.collector.collect, [at]
-
-    def with_ends():
-        batch = collect()
-        batch["next", "info"] = {"end_reason": batch["next", "done"].long()}
-        return batch
-
-    trainer.collector.collect = with_ends
-    run(trainer)
-    assert {metrics["end/odd"] for metrics in at.metrics} == {1.0}
-
-
-def test_update_has_the_expected_metrics(make_trainer):
-    at = At(-1, None)
-    run(make_trainer(callbacks=[at], max_grad_norm=1e-3))
-    names = {"train/reward", "train/running_reward", "train/length", "loss/loss_actor"}
-    assert names | {"loss/entropy", "loss/grad_norm"} <= set(at.metrics[0])
-    for metrics in at.metrics:
-        seconds = metrics["time/collect_s"] + metrics["time/learn_s"]
-        frames = metrics["time/frames_per_second"] * seconds
-        assert frames == pytest.approx(round(frames), abs=1e-6) and frames > 1
 
 
 @pytest.mark.parametrize("reward", [torch.nan, 3e38])

@@ -2,7 +2,6 @@ import enum
 
 import pytest
 import torch
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from tensordict import TensorDict
 
@@ -36,6 +35,13 @@ def test_episode_rewards_and_batch_metrics_match_hand_computed_values():
         "end/step_limit": 0.0,
         "end/lost_control": 0.0,
     }
+
+
+def make_batch(episodes):
+    reward = torch.tensor([float(r) for episode in episodes for r in episode])[:, None]
+    done = torch.zeros(len(reward), 1, dtype=torch.bool)
+    done[torch.tensor([len(e) for e in episodes]).cumsum(0) - 1] = True
+    return TensorDict({"next": {"reward": reward, "done": done}}, [len(reward)])
 
 
 class End(enum.IntEnum):
@@ -86,46 +92,7 @@ def test_lengths_use_the_step_count():
     assert all(value != value for value in batch_metrics(batch).values())  # NaN
 
 
-def test_metrics_without_completed_episodes_are_nan():
-    batch = make_batch([[0.0, 1.0]])
-    batch["next", "episode_reward"] = batch["next", "reward"]
-    batch["next", "done"][:] = False
-    assert episode_rewards(batch).tolist() == []
-    assert all(value != value for value in batch_metrics(batch).values())  # NaN
-
-
-def make_batch(episodes):
-    reward = torch.tensor([float(r) for episode in episodes for r in episode])[:, None]
-    done = torch.zeros(len(reward), 1, dtype=torch.bool)
-    done[torch.tensor([len(e) for e in episodes]).cumsum(0) - 1] = True
-    return TensorDict({"next": {"reward": reward, "done": done}}, [len(reward)])
-
-
 EPISODES = st.lists(st.lists(st.integers(0, 3), min_size=1, max_size=6), min_size=1, max_size=6)
-
-
-@given(EPISODES)
-@settings(max_examples=40, deadline=None)
-def test_rewards_and_lengths_of_random_batches(episodes):
-    batch = make_batch(episodes)
-    rewards = [sum(e) for e in episodes]
-    assert episode_rewards(batch).tolist() == rewards
-    metrics = batch_metrics(batch)
-    assert metrics == {
-        "train/reward": pytest.approx(sum(rewards) / len(rewards)),
-        "train/length": sum(len(e) for e in episodes) / len(episodes),
-    }
-
-
-@given(st.lists(st.floats(0, 3), max_size=8), st.floats(0, 3), st.floats(0, 1))
-@settings(max_examples=40, deadline=None)
-def test_running_mean_equals_its_closed_form(values, old, decay):
-    """decay^n old + (1 - decay) sum of decay^(n - 1 - i) value_i."""
-    n = len(values)
-    wanted = decay**n * old
-    wanted += (1 - decay) * sum(decay ** (n - 1 - i) * v for i, v in enumerate(values))
-    found = running_mean(old, torch.tensor(values, dtype=torch.float64), decay)
-    assert found == pytest.approx(wanted, abs=1e-9)
 
 
 def test_end_reason_is_read_at_the_last_frame():
