@@ -231,10 +231,6 @@ def test_signal_ends_a_loop_of_trainings(tmp_path, number, statuses):
     assert state["updates"] == len(rows) - 1
 
 
-def contents(folder):
-    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-
 def test_a_finished_run_is_not_replaced(tmp_path):
     (tmp_path / "result.json").write_text("{}")
     with pytest.raises(InputError, match=r"holds a finished run, .*resume=True.*another folder"):

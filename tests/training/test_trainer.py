@@ -1,4 +1,3 @@
-import enum
 import signal
 import threading
 
@@ -205,11 +204,6 @@ def test_progress_counts_frames_and_episodes(make_trainer):
         mean = running_mean(mean, episode_rewards(batch), 0.99)
     assert progress.running_reward == mean
     assert progress.seconds > 0
-
-
-class Parity(enum.IntEnum):
-    NONE = 0
-    ODD = 1
 
 
 @pytest.mark.parametrize("reward", [torch.nan, 3e38])

@@ -2,7 +2,6 @@ import enum
 
 import pytest
 import torch
-from hypothesis import strategies as st
 from tensordict import TensorDict
 
 from drone_rl.sim.tasks.collect_cubes import EndReason
@@ -90,9 +89,6 @@ def test_lengths_use_the_step_count():
     assert batch_metrics(batch) == {"train/reward": 1.5, "train/length": 4.5}
     batch["next", "done"][:] = False
     assert all(value != value for value in batch_metrics(batch).values())  # NaN
-
-
-EPISODES = st.lists(st.lists(st.integers(0, 3), min_size=1, max_size=6), min_size=1, max_size=6)
 
 
 def test_end_reason_is_read_at_the_last_frame():

@@ -145,15 +145,6 @@ def test_episodes_are_counted_once_when_complete(trained):
     assert sum(ended) + under_way == pytest.approx(trained.result["frames"])
 
 
-HOSTILE = {
-    "body.position": (torch.full((3, 3), torch.nan).double(), "holds NaN or infinity"),
-    "cubes": (torch.zeros(3, 7, 3).double(), "is not of shape"),
-    "steps": (torch.zeros(3), "is not of shape"),
-    "lateral": (torch.full((3, 2), torch.inf).double(), "holds NaN or infinity"),
-    "side": ("none", "is not of shape"),
-}
-
-
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
