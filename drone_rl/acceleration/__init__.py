@@ -1,7 +1,7 @@
-"""Faster implementations of collecting, learning and inference. The package is optional.
+"""Faster implementations of collecting, learning and inference.
 
-Without it everything works, only slower. `drone_rl.collectors.speedups` is the one module that
-imports it. Each `try_create` returns an implementation, or the reasons why there is none.
+`drone_rl.collectors.speedups` is the one module that imports it. Each `try_create` returns an
+implementation, or the reasons why there is none.
 """
 
 from drone_rl.acceleration.direct_collector import DirectCollector as DirectCollector

@@ -7,10 +7,9 @@ from typing import Any, NamedTuple
 import torch
 from torchrl.envs import TransformedEnv
 
-from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.config.learning import CompleteEpisodes, Ray
 from drone_rl.config.training import TrainSettings
-from drone_rl.policies import ImageNetwork, make_actor
+from drone_rl.policies import ImageNetwork
 from drone_rl.policies.zoo import describe
 from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.tasks import FailureReplayTask
@@ -95,14 +94,3 @@ def make_learner(settings: TrainSettings, components: Components) -> Any:
             'the policy\'s weights; add "policy": components.network.state_dict()'
         )
     return learner
-
-
-def learning_actor(settings: TrainSettings, components: Components) -> Any:
-    """Return the actor that the loss evaluates, with a fused network if it is supported."""
-    actor, threads = components.collector.actor, settings.trainer.num_threads
-    if components.network.is_recurrent or not settings.trainer.compiled:
-        return actor
-    fused = accelerated_gradients(components.network, threads)
-    if fused is components.network:
-        return actor
-    return make_actor(fused, actor.spec["action"])
