@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
 from drone_rl.acceleration import gradients_kernel
-from drone_rl.acceleration.gradients_kernel import BLOCK, Batch, PackedParams, Workspace
+from drone_rl.acceleration.gradients_kernel import BLOCK, FrameBatch, PackedParams, Workspace
 from drone_rl.acceleration.layers_kernel import WIDTH
 from drone_rl.acceleration.packed_layers import (
     Order,
@@ -151,7 +151,7 @@ class _Engine:
             self._order.pack(self._weights, self._transposed)
         size, spare, self._spare = len(pixels) * self._size, self._spare, None
         outputs = torch.empty(size) if spare is None or len(spare) < size else spare
-        batch: Any = Batch()
+        batch: Any = FrameBatch()
         batch.frames, batch.outputs = wp.from_torch(pixels), wp.from_torch(outputs)
 
         def run_span(member: int, first: int, last: int) -> None:
@@ -171,7 +171,7 @@ class _Engine:
         """Return gradients of parameters or pixels; the next call of `compute` reuses `outputs`."""
         self._gradients.zero_()
         grad_pixels = torch.empty_like(pixels) if self._has_fixed_weights else torch.empty(0, 0)
-        batch: Any = Batch()
+        batch: Any = FrameBatch()
         batch.frames, batch.outputs = wp.from_torch(pixels), wp.from_torch(outputs)
         batch.grad_frames = wp.from_torch(grad_pixels)
         batch.grad_output = wp.from_torch(grad_output.contiguous())

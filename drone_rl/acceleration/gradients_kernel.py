@@ -177,7 +177,7 @@ class PackedParams:
 
 
 @wp.struct
-class Batch:
+class FrameBatch:
     """Frames with outputs and gradients."""
 
     frames: wp.array2d[float]
@@ -205,7 +205,7 @@ class Workspace:
 
 
 @wp.kernel
-def forward(first: int, last: int, params: PackedParams, batch: Batch) -> None:
+def forward(first: int, last: int, params: PackedParams, batch: FrameBatch) -> None:
     """Compute the outputs of all layers of frames `first` to `last` - 1; launch dimension 1."""
     size = _size(params)
     for block in range(first, last, BLOCK):
@@ -245,9 +245,9 @@ def _stride(params: PackedParams, layer: int) -> int:
 
 @wp.kernel
 def backward(
-    first: int, last: int, params: PackedParams, batch: Batch, workspace: Workspace
+    first: int, last: int, params: PackedParams, batch: FrameBatch, workspace: Workspace
 ) -> None:
-    """Run the backward pass of frames `first` to `last` - 1, see `Batch`; launch dimension 1."""
+    """Run the backward pass of frames `first` to `last` - 1; launch dimension 1."""
     for block in range(first, last, BLOCK):
         end = wp.min(block + BLOCK, last)
         for frame in range(block, end):
@@ -263,7 +263,7 @@ def backward(
 
 @wp.func
 def _begin(
-    params: PackedParams, frame: int, block: int, batch: Batch, workspace: Workspace
+    params: PackedParams, frame: int, block: int, batch: FrameBatch, workspace: Workspace
 ) -> None:
     """Write the inputs of a frame's linear layers, and the logits' gradient padded with zeros."""
     inputs_offset = params.kept_offsets[params.num_convolutions - 1]
@@ -310,7 +310,12 @@ def _linear(params: PackedParams, layer: int, count: int, workspace: Workspace) 
 
 @wp.func
 def _convolution(
-    params: PackedParams, layer: int, frame: int, block: int, batch: Batch, workspace: Workspace
+    params: PackedParams,
+    layer: int,
+    frame: int,
+    block: int,
+    batch: FrameBatch,
+    workspace: Workspace,
 ) -> None:
     """Compute the gradients with respect to a convolution's weights and input, for one frame."""
     row = frame - block

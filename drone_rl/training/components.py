@@ -17,7 +17,7 @@ from drone_rl.utils.available_memory import require_memory
 from drone_rl.utils.errors import InputError
 
 
-class Group(NamedTuple):
+class EnvGroup(NamedTuple):
     """The environments of one thread or worker, with the policy."""
 
     env: TransformedEnv
@@ -38,7 +38,7 @@ class Components(NamedTuple):
     """Random streams of this process, by name."""
 
 
-def joined(collector: Any, groups: Sequence[Group]) -> Components:
+def joined(collector: Any, groups: Sequence[EnvGroup]) -> Components:
     """Return the components of a training run whose groups are in this process."""
     generators = {f"actions_{i}": group.generator for i, group in enumerate(groups)}
     return Components(collector, groups[0].network, generators)

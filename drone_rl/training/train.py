@@ -27,7 +27,7 @@ from drone_rl.sim.tasks import FailureReplayTask, as_task
 from drone_rl.training import components, run_folder
 from drone_rl.training.callbacks import Callback, CollapseCheck, CsvCallback, with_progress
 from drone_rl.training.cloning import clone
-from drone_rl.training.components import Components, Group
+from drone_rl.training.components import Components, EnvGroup
 from drone_rl.training.confirmation import Confirmation
 from drone_rl.training.learners import NotANumberError, ReinforceLearner
 from drone_rl.training.run_folder import Judge, RunFolder, Training
@@ -172,7 +172,7 @@ def make_groups(
     sizes: list[int],
     replay: FailureReplayTask | None = None,
     numbers: Iterable[int] | None = None,
-) -> list[Group]:
+) -> list[EnvGroup]:
     """Make the environments of threads or workers, and the policy that acts in them.
 
     `sizes` are the numbers of environments of the groups, `numbers` the indices of those to make.
@@ -197,7 +197,7 @@ def make_groups(
         env = with_transforms(base, description.make_transforms())
         generator = torch_generator(seed, Stream.ACTIONS, number=number, device=device)
         actor = make_actor(network, env.action_spec, generator)
-        groups.append(Group(env, actor, network, generator))
+        groups.append(EnvGroup(env, actor, network, generator))
     return groups
 
 

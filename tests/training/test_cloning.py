@@ -16,7 +16,7 @@ from drone_rl.policies.zoo import describe
 from drone_rl.training import Callback
 from drone_rl.training.cloning import (
     Cloning,
-    Frames,
+    RecordedFrames,
     clone,
     hold_out,
     imitation_loss,
@@ -78,7 +78,7 @@ def test_the_loss_of_continuous_actions_is_the_negative_log_likelihood():
 
 
 def test_frames_are_joined_and_stacked_within_their_flight():
-    frames = Frames.of([flight(0, 2), flight(1, 3)], "cpu")
+    frames = RecordedFrames.of([flight(0, 2), flight(1, 3)], "cpu")
     assert frames.starts.tolist() == [0, 0, 2, 2, 2]
     assert frames.actions.tolist() == [*flight(0, 2).actions, *flight(1, 3).actions]
     level = [float(image[0, 0, 0]) / 255 for image in frames.images]
@@ -103,7 +103,7 @@ def test_observations_are_those_of_an_environment(more):
         seen.append(state["pixels"])
         state = env.step(state.set("action", torch.tensor([action])))["next"]
         image = raw.step(image.set("action", torch.tensor([action])))["next"]
-    frames = Frames(torch.cat(images), torch.zeros(3), torch.zeros(3, dtype=torch.int64))
+    frames = RecordedFrames(torch.cat(images), torch.zeros(3), torch.zeros(3, dtype=torch.int64))
     torch.testing.assert_close(frames.observe(torch.arange(3), steps), torch.cat(seen))
     env.close()
     raw.close()
@@ -136,7 +136,7 @@ def test_a_network_learns_the_actions_of_the_flights():
     assert (done["held_out_demonstrations"], done["held_out_frames"]) == (1, 12)
     assert (done["folder"], done["epochs"]) == ("x", 60) and done["seconds"] > 0
     assert Cloning.read(done, "cloning").values() == done
-    observed = Frames.of(FLIGHTS, "cpu").observe(
+    observed = RecordedFrames.of(FLIGHTS, "cpu").observe(
         torch.arange(60), [t.make() for t in SETTINGS.transforms]
     )
     taken = torch.cat([torch.from_numpy(one.actions) for one in FLIGHTS])
@@ -152,7 +152,7 @@ def test_a_network_learns_continuous_actions():
     own = network(VELOCITY)
     done = clone(VELOCITY, own, flights)["cloning"]
     assert done["accuracy"] == 1.0 and done["held_out_loss"] < 0
-    frames = Frames.of(flights, "cpu")
+    frames = RecordedFrames.of(flights, "cpu")
     observed = frames.observe(torch.arange(60), [t.make() for t in SETTINGS.transforms])
     greedy = own.actions.greedy(own(observed)).detach()
     assert float((greedy - frames.actions).abs().max()) < 0.2
@@ -166,7 +166,7 @@ def test_one_epoch_is_one_step_of_adam_for_each_minibatch():
     own, other = network(), network()
     done = clone(settings, own, FLIGHTS)["cloning"]
     optimizer = torch.optim.Adam(other.parameters(), lr=0.01)
-    frames = Frames.of(FLIGHTS, "cpu")
+    frames = RecordedFrames.of(FLIGHTS, "cpu")
     observed = frames.observe(torch.arange(60), [t.make() for t in SETTINGS.transforms])
     loss = cross_entropy(other(observed), frames.actions)
     loss.backward()
