@@ -185,8 +185,6 @@ def test_continuous_actions_out_of_bounds_are_refused(number):
             },
             "actions=moves_3d needs dynamics=computer_vision",
         ),
-        ({"images": np.array([None, {}], object)}, "images.npy is no array of numbers or texts"),
-        ({"images": np.zeros(3, np.complex64)}, "images.npy is no array of numbers or texts"),
     ],
 )
 def test_crafted_contents_are_refused(tmp_path, changes, message):
