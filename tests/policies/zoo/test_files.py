@@ -23,7 +23,7 @@ from drone_rl.trust.export import export_policy
 from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.errors import InputError
 from tests.policies.zoo.test_description import DEFAULT
-from tests.trust.test_export_card_text import VERDICT
+from tests.trust.cards import VERDICT
 
 DESCRIPTION = {
     **DEFAULT,
