@@ -27,7 +27,7 @@ MUTABLE = {
     "sweeps.figures:Layout",
     "sweeps.manifest:Sweep",
     "sweeps.rows:Row",
-    "sweeps.summary:Group",
+    "sweeps.summary:RunGroup",
     "training.callbacks:Progress",
     "training.learners:ActorCriticLearner",
     "training.learners:GradientLearner",

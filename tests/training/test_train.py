@@ -238,12 +238,10 @@ def test_a_finished_run_is_not_replaced(tmp_path):
     assert (tmp_path / "result.json").read_text() == "{}"
 
 
-def test_plugins_are_imported_in_python():
+def test_names_of_other_projects():
     for name, meant in (("learning_rate", r"Adam\(lr"), ("n_envs", r"Episodes\(num_envs")):
         with pytest.raises(InputError, match=rf"^{name} is unknown; .*did you mean .*{meant}="):
             drone_rl.train(**{name: 1})
-    with pytest.raises(InputError, match=r"^plugins belongs to the command .*import the"):
-        drone_rl.train(plugins=["mine"], progress=silent)
 
 
 def test_a_result_is_forgotten_once_the_run_goes_on(trained, tmp_path):

@@ -47,10 +47,14 @@ def complete(overrides: Sequence[str]) -> list[str]:
     """
     typed = [*overrides]
     refuse_policies(typed)
+    folders = [o.split("=", 1)[1] for o in typed if o.startswith("resume=")]
+    if is_sweep(typed) and folders:
+        raise InputError(
+            "resume= continues one run, not with -m; to continue a sweep, repeat its command"
+        )
     if is_sweep(typed):
         is_named = any(o.startswith("hydra.sweep.dir=") for o in typed)
         return typed if is_named else [*typed, _FOLDER + sweep_name(typed)]
-    folders = [o.split("=", 1)[1] for o in typed if o.startswith("resume=")]
     if not folders or folders[-1] in ("", "null"):
         return typed
     if any(o.startswith("hydra.run.dir=") for o in typed):

@@ -11,7 +11,7 @@ from optuna.distributions import (  # noqa: E402
     IntDistribution,
 )
 
-from drone_rl.cli.hydra.searching import OptunaSweeper, check_params, distribution  # noqa: E402
+from drone_rl.cli.hydra.sweepers import SearchSweeper, check_params, distribution  # noqa: E402
 from drone_rl.utils.errors import InputError  # noqa: E402
 from tests.cli.running import error_line  # noqa: E402
 
@@ -54,7 +54,7 @@ def test_ranges_that_cannot_be_searched_are_refused(text):
 def test_numbers_below_one_are_refused():
     settings = {"seed": 0, "prune": True, "startup_trials": 1, "report_frames": 1, "params": {}}
     with pytest.raises(InputError, match="num_trials=0"):
-        OptunaSweeper(num_trials=0, batch=1, **settings)
+        SearchSweeper(num_trials=0, batch=1, **settings)
 
 
 def test_a_journal_sets_only_what_is_searched():

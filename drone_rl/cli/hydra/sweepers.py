@@ -1,5 +1,6 @@
-"""The sweeper of `hydra/sweeper=optuna`, a Hydra plugin: a search instead of a grid."""
+"""Sweepers: which runs `drone-rl COMMAND -m` makes; `hydra_plugins` names them."""
 
+import itertools
 import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -22,26 +23,15 @@ from drone_rl.utils.schema import Whole, shown
 _log = logging.getLogger(__name__)
 
 
-class OptunaSweeper(Sweeper):
-    """Maximize the final running mean of rewards, see conf/hydra/sweeper/optuna.yaml."""
+class CombiningSweeper(Sweeper):
+    """One run for each combination of values, see conf/hydra/sweeper/grid.yaml."""
 
     config: DictConfig
     hydra_context: HydraContext
     launcher: Launcher
 
-    def __init__(
-        self, *, num_trials: int, batch: int, seed: int, params: dict[str, str], **shared: Any
-    ) -> None:
-        import_optuna()
-        frames = shared["report_frames"]
-        if num_trials < 1 or batch < 1 or frames < 1:
-            raise InputError(
-                f"hydra.sweeper.num_trials={num_trials}, batch={batch} and report_frames={frames} "
-                "must be 1 or more"
-            )
-        seed = Whole(0, 2**31).read(seed, "hydra.sweeper.seed")
-        self.num_trials, self.batch, self.seed = num_trials, batch, seed
-        self.params, self.shared = dict(params), shared
+    def __init__(self, params: Mapping[str, str]) -> None:
+        self.params = params
 
     def setup(
         self, *, hydra_context: HydraContext, task_function: TaskFunction, config: DictConfig
@@ -55,23 +45,65 @@ class OptunaSweeper(Sweeper):
         )
 
     def sweep(self, arguments: list[str]) -> None:
-        """Sample settings, run them and report the results until all trials are done."""
+        """Launch all runs at once; they start if all can be composed."""
+        values = []
+        for key, override in self.overrides(arguments).items():
+            if override.is_interval_sweep():
+                raise InputError(
+                    f"{override.input_line}: only a search tries an interval; add "
+                    "hydra/sweeper=optuna"
+                )
+            several = override.is_sweep_override()
+            texts = override.sweep_string_iterator() if several else [_value(override)]
+            values.append([f"{key}={text}" for text in texts])
+        runs = [*map(list, itertools.product(*values))]
+        if not runs:
+            raise InputError(
+                f"{' '.join(arguments)}: a sweep of no runs; give each setting at least one value"
+            )
+        for job in self.launcher.launch(runs, 0):
+            _ = job.return_value  # raises the error of a job that failed
+
+    def overrides(self, arguments: Sequence[str]) -> dict[str, Override]:
+        """Return the last override of each setting in `params` and on the command line."""
         parser = OverridesParser.create(config_loader=self.hydra_context.config_loader)
-        typed = parser.parse_overrides([f"{k}={v}" for k, v in self.params.items()] + arguments)
-        last = {override.get_key_element(): override for override in typed}
-        space = {k: distribution(o) for k, o in last.items() if o.is_sweep_override()}
-        fixed = [
-            f"{k}={o.get_value_element_as_str()}"
-            for k, o in last.items()
-            if not o.is_sweep_override()
-        ]
+        texts = [*(f"{key}={value}" for key, value in self.params.items()), *arguments]
+        return {override.get_key_element(): override for override in parser.parse_overrides(texts)}
+
+
+def _value(override: Override) -> str:
+    return override.get_value_element_as_str()
+
+
+class SearchSweeper(CombiningSweeper):
+    """Maximize the final running mean of rewards, see conf/hydra/sweeper/optuna.yaml."""
+
+    def __init__(
+        self, *, num_trials: int, batch: int, seed: int, params: dict[str, str], **shared: Any
+    ) -> None:
+        super().__init__(params)
+        import_optuna()
+        frames = shared["report_frames"]
+        if num_trials < 1 or batch < 1 or frames < 1:
+            raise InputError(
+                f"hydra.sweeper.num_trials={num_trials}, batch={batch} and report_frames={frames} "
+                "must be 1 or more"
+            )
+        seed = Whole(0, 2**31).read(seed, "hydra.sweeper.seed")
+        self.num_trials, self.batch, self.seed, self.shared = num_trials, batch, seed, shared
+
+    def sweep(self, arguments: list[str]) -> None:
+        """Sample settings, run them and report the results until all trials are done."""
+        overrides = self.overrides(arguments)
+        space = {key: distribution(o) for key, o in overrides.items() if o.is_sweep_override()}
+        fixed = [f"{key}={_value(o)}" for key, o in overrides.items() if key not in space]
         if not space:
             raise InputError(
                 "there is nothing to search; give a range such as "
                 "'optimizer.lr=tag(log,interval(1e-4,1e-1))' or sweep=search"
             )
         for key, searched in space.items():
-            self._check_task(last[key].input_line, key, searched, [*fixed, *_first(space)])
+            self._check_task(overrides[key].input_line, key, searched, [*fixed, *_first(space)])
         folder = Path(str(self.config.hydra.sweep.dir)).absolute()
         folder.mkdir(parents=True, exist_ok=True)
         refuse_links(folder)
@@ -92,9 +124,8 @@ class OptunaSweeper(Sweeper):
             )
 
     def _search(self, study: Any, space: dict[str, Any], fixed: list[str]) -> None:
-        optuna = import_optuna()
-        done = optuna.trial.TrialState.is_finished
-        while (left := self.num_trials - sum(done(t.state) for t in study.trials)) > 0:
+        states = import_optuna().trial.TrialState
+        while (left := self.num_trials - sum(t.state.is_finished() for t in study.trials)) > 0:
             trials = next_trials(study, space, min(left, self.batch), self.seed)
             for trial in trials:
                 check_params(trial.params, space)
@@ -102,12 +133,10 @@ class OptunaSweeper(Sweeper):
                 [*fixed, *(f"{k}={v}" for k, v in t.params.items()), f"trial={t.number}"]
                 for t in trials
             ]
-            for trial, job in zip(
-                trials, self.launcher.launch(batch, trials[0].number), strict=True
-            ):
+            jobs = self.launcher.launch(batch, trials[0].number)
+            for trial, job in zip(trials, jobs, strict=True):
                 note_outcome(study, trial.number, read_result(Path(str(job.working_dir))))
-        complete = [t for t in study.trials if t.state == optuna.trial.TrialState.COMPLETE]
-        if complete:
+        if any(trial.state == states.COMPLETE for trial in study.trials):
             best = study.best_trial
             _log.info("best: run %d, running reward %.3f, %s", best.number, best.value, best.params)
 
@@ -134,10 +163,9 @@ def check_params(params: Mapping[str, Any], space: Mapping[str, Any]) -> None:
 
 def _contains(searched: Any, value: object) -> bool:
     """Return whether a distribution of Optuna contains a value."""
-    try:
-        return searched._contains(searched.to_internal_repr(value))
-    except ValueError:  # from Optuna, for none of the choices or no number
-        return False
+    if hasattr(searched, "choices"):
+        return value in searched.choices
+    return isinstance(value, int | float) and searched.low <= value <= searched.high
 
 
 def distribution(override: Override) -> Any:
