@@ -147,17 +147,6 @@ def test_a_network_learns_the_actions_of_the_flights():
     assert note.rows[-1][2] == {f"cloning/{name}": done[name] for name in names}
 
 
-def test_a_network_learns_continuous_actions():
-    flights = [flight(seed, settings=VELOCITY) for seed in range(5)]
-    own = network(VELOCITY)
-    done = clone(VELOCITY, own, flights)["cloning"]
-    assert done["accuracy"] == 1.0 and done["held_out_loss"] < 0
-    frames = RecordedFrames.of(flights, "cpu")
-    observed = frames.observe(torch.arange(60), [t.make() for t in SETTINGS.transforms])
-    greedy = own.actions.greedy(own(observed)).detach()
-    assert float((greedy - frames.actions).abs().max()) < 0.2
-
-
 def test_one_epoch_is_one_step_of_adam_for_each_minibatch():
     """With one minibatch, and against PyTorch's own cross-entropy."""
     settings = SETTINGS.replace(
