@@ -7,7 +7,7 @@ import pytest
 import torch
 from torch.nn.functional import cross_entropy
 
-from drone_rl.config import ActionSettings, CameraSettings
+from drone_rl.config import CameraSettings
 from drone_rl.config.networks import Mlp
 from drone_rl.config.training import CloningSettings, TrainSettings
 from drone_rl.config.transforms import Gray, Stack, Standardize
@@ -30,7 +30,6 @@ SETTINGS = TrainSettings(
     network=Mlp(hidden=(8,)),
     cloning=CloningSettings(epochs=60, lr=0.02, minibatch_size=8),
 )
-VELOCITY = SETTINGS.replace(actions=ActionSettings(kind="velocity"))
 LEVELS = np.array([30, 130, 230], np.uint8)
 """Brightness of the images in which actions 0, 1 and 2 are taken."""
 SPEEDS = np.array([[-0.5, 0.6, 0.0], [0.0, 0.0, 0.6], [0.5, -0.6, -0.2]], np.float32)
