@@ -261,7 +261,6 @@ SWEEP: Plain = {
     "finished": 6,
     "failed": 1,
     "damaged": 1,
-    "copies": 1,
     "unfinished": 1,
     "judged": 5,
     "certain": 4,
@@ -272,7 +271,7 @@ SWEEP: Plain = {
     "episodes": [200],
     "sides_not_offered": 1,
     "best": {
-        "run": 3, "verdict": "good", "certain": True, "share": 0.99, "episodes": 200, "equals": 1,
+        "run": 3, "verdict": "good", "certain": True, "share": 0.99, "episodes": 200,
         "report_command": "drone-rl verdict",
     },
     "groups": [

@@ -6,8 +6,7 @@ from drone_rl.explanations.report.explanation import Explanation, Figures, Part
 from drone_rl.sim.vocabulary import shown_actions, terms_of
 from drone_rl.trust import charts
 from drone_rl.trust.plots import images
-from drone_rl.trust.quoted_text import QUOTED, is_quoted, not_evaluated
-from drone_rl.trust.shifts_text import rows
+from drone_rl.trust.shifts_text import QUOTED, is_quoted, not_evaluated, rows
 from drone_rl.trust.verdict_text import SENTENCES, depends_on_rounding
 from drone_rl.utils.text import (
     Claims,

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 from drone_rl.explanations.report.explanation import METHOD_NAMES
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.trust import quoted_text, shifts_text
-from drone_rl.trust.rule import Kind
+from drone_rl.trust import shifts_text
+from drone_rl.trust.rule import VerdictKind
 from drone_rl.trust.verdict_text import is_proved, is_quoted, is_stated
 from drone_rl.utils.text import Claims, Evidence, listed, plural, rate
 
@@ -55,7 +55,7 @@ def say_summary(evidence: Evidence) -> Claims:
 
 def _verdict(verdict: Evidence) -> str:
     kind = verdict["kind"]
-    kind = "neither good nor poor nor one-sided" if kind == str(Kind.NONE) else kind
+    kind = "neither good nor poor nor one-sided" if kind == str(VerdictKind.NONE) else kind
     if not verdict["certain"]:
         return f"Not certain: the evidence suggests {kind}, but does not decide it."
     return (
@@ -68,8 +68,8 @@ def _robustness(evidence: Evidence) -> str:
     shifts = evidence.get("shifts")
     if not shifts:
         return "Not measured; run drone-rl shifts on this policy and explain it again."
-    if not quoted_text.is_quoted(evidence):
-        return f"Measured, but not shown here: {quoted_text.why_not(evidence)}."
+    if not shifts_text.is_quoted(evidence):
+        return f"Measured, but not shown here: {shifts_text.why_not(evidence)}."
     if shifts["domain"] is None:
         return f"Success rates under {plural(len(shifts['axes']), 'perturbation')}."
     tested = [name for name in shifts["axes"] if shifts_text.is_tested(shifts, name)]
@@ -97,7 +97,7 @@ def _certificate(verdict: Evidence) -> str:
 
 def _limits(evidence: Evidence) -> str:
     parts = ["Real cameras and drones"]
-    if evidence.get("verdict") and (names := quoted_text.not_evaluated(evidence)):
+    if evidence.get("verdict") and (names := shifts_text.not_evaluated(evidence)):
         parts.append(f"other {listed(names, 'or')}")
     if left_out := evidence.get("left_out"):
         parts.append(f"what was left out ({', '.join(left_out).replace('_', ' ')})")
