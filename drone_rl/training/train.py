@@ -9,13 +9,14 @@ import contextlib
 import logging
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import torch
 
 from drone_rl.collectors import EpisodeCollector, ThreadedCollector
 from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.config.learning import Episodes, Reinforce
+from drone_rl.config.options import TrainOptions
 from drone_rl.config.registry import implements, modules_of
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv, with_transforms
@@ -50,7 +51,7 @@ def train(
     callbacks: Sequence[Callback] = (),
     progress: Progress | None = None,
     judge: Judge | None = None,
-    **changes: Any,
+    **changes: Unpack[TrainOptions],
 ) -> Training:
     """Train one policy, or resume its training.
 

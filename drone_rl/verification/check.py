@@ -5,10 +5,11 @@ import functools
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 from drone_rl.config.commands import CheckSettings
 from drone_rl.config.configuration import as_changes, from_arguments
+from drone_rl.config.options import CheckOptions
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import policy_names
 from drone_rl.utils.display import Result, table
@@ -100,7 +101,7 @@ def check(
     task: Mapping[str, Any] | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
-    **changes: Any,
+    **changes: Unpack[CheckOptions],
 ) -> Check:
     """Check a certificate independently of the prover: exact sums, and simulated episodes.
 

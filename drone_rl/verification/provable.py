@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Self, Unpack
 
 import numpy as np
 import torch
@@ -19,6 +19,7 @@ from drone_rl.collectors.complete_episodes import episode_batches
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ProvableSettings, ProveSettings
 from drone_rl.config.configuration import as_config, check_same_config, from_arguments
+from drone_rl.config.options import TrainOptions
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import describe, read_checkpoint
@@ -205,7 +206,7 @@ def train_until_proved(
     resume: bool = False,
     callbacks: Sequence[Callback] = (),
     progress: Progress | None = None,
-    **changes: Any,
+    **changes: Unpack[TrainOptions],
 ) -> Training:
     """Train as usual, then in rounds, until the policy succeeds from every placement.
 
