@@ -15,7 +15,7 @@ from benchmarks.simulated_policies import (
     judge_samples,
     policies,
 )
-from drone_rl.trust.rule import Kind, Rule
+from drone_rl.trust.rule import Rule, VerdictKind
 from drone_rl.utils.intervals import proportion
 
 
@@ -84,8 +84,8 @@ def test_policies_are_on_both_sides_of_every_threshold():
     kinds = {name: policy.kind for name, policy in policies().items()}
     for name in {name.rsplit(" ", 1)[0] for name in kinds}:
         assert len({kinds[f"{name} {shift}"] for shift in ("-0.03", "+0.03")}) == 2, name
-    assert set(kinds.values()) >= {*Kind} - {Kind.ONE_SIDED_LEFT}
-    assert kinds["all or nothing, success +0.00"] is Kind.NONE  # exactly 0.9 is not more
+    assert set(kinds.values()) >= {*VerdictKind} - {VerdictKind.ONE_SIDED_LEFT}
+    assert kinds["all or nothing, success +0.00"] is VerdictKind.NONE  # exactly 0.9 is not more
 
 
 def test_intervals_that_are_too_narrow_are_detected(monkeypatch):
@@ -99,9 +99,9 @@ def test_intervals_that_are_too_narrow_are_detected(monkeypatch):
 
     policy = policies()["all or nothing, success +0.00"]
     counts = np.random.default_rng(0).multinomial(400, policy.shares, 100)
-    assert judge_samples(policy, counts).count(Kind.GOOD) == 0
+    assert judge_samples(policy, counts).count(VerdictKind.GOOD) == 0
     monkeypatch.setattr(simulated_policies, "estimate", narrow)
-    assert judge_samples(policy, counts).count(Kind.GOOD) > 20
+    assert judge_samples(policy, counts).count(VerdictKind.GOOD) > 20
 
 
 @pytest.mark.parametrize(
