@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 import torch
@@ -27,6 +27,7 @@ from drone_rl.utils.text import say
 from drone_rl.utils.threads import torch_threads
 from drone_rl.verification.prover.action_map import ActionMap, map_actions
 from drone_rl.verification.prover.arrangement import Window
+from drone_rl.verification.prover.bounds import masks_of
 from drone_rl.verification.prover.policy_spec import make_policy_spec
 
 
@@ -83,6 +84,18 @@ class Places(Result):
         return table(head, lines, [about]) + picture(figure)
 
 
+class PlacesChanges(TypedDict, total=False):
+    """Changes to `PlacesSettings`."""
+
+    nearest: float
+    farthest: float
+    sideways: float
+    logit_gap: float
+    compared: int
+    most_cells: int
+    renderer: str
+
+
 def places(
     policy: str | Path | Policy,
     settings: PlacesSettings | None = None,
@@ -90,7 +103,7 @@ def places(
     task: Mapping[str, Any] | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
-    **changes: Any,
+    **changes: Unpack[PlacesChanges],
 ) -> Places:
     """Map a greedy policy's action over all positions of one cube, exactly.
 
@@ -110,16 +123,15 @@ def places(
     """
     settings = from_arguments(PlacesSettings, settings, changes, places)
     progress = as_progress(progress)
-    policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
-    policy = policy.in_task(**as_changes(task, "task"))
+    policy = load_policy(policy, outputs=outputs).in_task(**as_changes(task, "task"))
     begin = time.perf_counter()
     network, gap = policy.make_network(), settings.logit_gap
     spec = make_policy_spec(policy.description, network, gap, settings.renderer)
-    whole = (slice(None), slice(None))
 
     def render(faces: NDArray[np.uint8]) -> torch.Tensor:
-        shown = [(whole, torch.from_numpy(faces))]
-        return spec.compositor.see(spec.compositor.paint_one(shown, len(faces)))
+        whole, masks = (slice(None), slice(None)), masks_of(torch.from_numpy(faces))
+        images, _ = spec.compositor.paint([(whole, masks, torch.arange(len(faces)))], len(faces))
+        return spec.compositor.see(images)
 
     with torch_threads(1), closing(spec):
         progress("comparing the renderer's images")
