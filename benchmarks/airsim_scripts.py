@@ -51,7 +51,7 @@ def bench_scripts(folder: Path) -> dict[str, Any]:
 
 def run_script(name: str, version: str, folder: Path) -> list[str]:
     """Run one program through one client; return what is wrong, each as a line."""
-    one = PROGRAMS[name]
+    one, folder = PROGRAMS[name], folder.absolute()
     folder.mkdir(parents=True, exist_ok=True)
     settings = parse_settings(one.settings.replace("FOLDER", str(folder)))
     usual = {"scene": "empty", "clock": "lockstep", "patience_s": 0.002}  # programs join at once

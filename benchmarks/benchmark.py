@@ -5,8 +5,6 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Self
 
-import torch
-
 from drone_rl.config.commands import BenchSettings
 
 Figures = Mapping[str, Any]
@@ -24,7 +22,7 @@ class Setup:
     device: str
     """Device of rendering and policies: cpu, cuda or cuda:N."""
     num_envs: int
-    """Environments in a batch of the speed benchmarks, unless quick; see `batch_size`."""
+    """Environments in a batch of the speed benchmarks."""
     seeds: tuple[int, ...]
     """Seeds of the timed trainings."""
     episodes: int
@@ -34,31 +32,22 @@ class Setup:
 
     @classmethod
     def from_settings(cls, settings: BenchSettings, folder: Path) -> Self:
-        """Return the setup that the settings of `drone-rl bench` describe.
+        """Return the setup that the settings of `drone-rl bench` describe; small sizes if quick.
 
         Args:
             settings: Settings of the command.
             folder: Folder of the results.
         """
+        quick = settings.quick
         return cls(
             folder=folder,
-            quick=settings.quick,
+            quick=quick,
             device=settings.device,
-            num_envs=settings.num_envs,
-            seeds=settings.seeds,
-            episodes=settings.episodes,
-            memory_frames=settings.memory_frames,
+            num_envs=64 if quick else settings.num_envs,
+            seeds=settings.seeds[:1] if quick else settings.seeds,
+            episodes=50 if quick else settings.episodes,
+            memory_frames=10_000 if quick else settings.memory_frames,
         )
-
-    @property
-    def batch_size(self) -> int:
-        """Number of environments in a batch: 64 if quick."""
-        return 64 if self.quick else self.num_envs
-
-    @property
-    def threads(self) -> int:
-        """Number of rendering threads."""
-        return 1 if self.device.startswith("cuda") else torch.get_num_threads()
 
     @property
     def runs(self) -> Path:

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from benchmarks.benchmark import Setup
 from benchmarks.commands import call, train
 from benchmarks.original import EPISODES
 from benchmarks.revisions import extract
@@ -26,13 +27,8 @@ _TEST = re.compile(r"`(tests/\S+\.py)`")
 _CONVENTIONS = "tests/flight/commands/test_conventions.py"
 
 
-def bench_chapter(folder: Path, quick: bool, *, root: Path = _ROOT) -> dict[str, Any]:
+def bench_chapter(setup: Setup) -> dict[str, Any]:
     """Time `experiment=original`, and count elements and conventions.
-
-    Args:
-        folder: Folder of the runs.
-        quick: Whether to train for a few episodes.
-        root: Checkout.
 
     Returns:
         "original_minutes": minutes of 30,000 episodes that stop for no criterion;
@@ -43,23 +39,24 @@ def bench_chapter(folder: Path, quick: bool, *, root: Path = _ROOT) -> dict[str,
     Raises:
         RuntimeError: A command or the tests of conventions failed.
     """
-    elements, shown = count_elements(root / "docs" / "chapter.md", root)
+    folder = setup.runs / "chapter"
+    elements, shown = count_elements(_ROOT / "docs" / "chapter.md", _ROOT)
     return {
-        "original_minutes": minutes(folder / "whole", 100 if quick else EPISODES),
-        "original_speedup": speedup(folder / "speed", 1 if quick else 3, root=root),
+        "original_minutes": minutes(folder / "whole", 100 if setup.quick else EPISODES),
+        "original_speedup": speedup(folder / "speed", 1 if setup.quick else 3),
         "chapter_elements": elements,
         "chapter_shown": shown,
-        "convention_cases": count_conventions(root),
-        **memory(folder / "memory", quick, root=root),
+        "convention_cases": count_conventions(),
+        **memory(folder / "memory", setup.quick),
     }
 
 
-def memory(folder: Path, quick: bool, *, root: Path) -> dict[str, float]:
+def memory(folder: Path, quick: bool) -> dict[str, float]:
     """Return the success of an LSTM and of a network without memory, of 1,000 greedy episodes.
 
     The task is that of `examples/recall.py`. Each is the median of three trainings.
     """
-    paths = (str(root), os.environ.get("PYTHONPATH", ""))
+    paths = (str(_ROOT), os.environ.get("PYTHONPATH", ""))
     environment = {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
     found, own = {}, ["plugins=[examples.recall]", "task=recall"]
     limit = ["trainer.total_frames=2000"] if quick else ["trainer.total_frames=400000"]
@@ -84,16 +81,16 @@ def minutes(folder: Path, episodes: int) -> float:
     return seconds / 60 * EPISODES / episodes
 
 
-def speedup(folder: Path, times: int, *, root: Path, episodes: int = 150) -> float:
+def speedup(folder: Path, times: int) -> float:
     """Return frames per second of training, over those of `BEFORE`: medians of alternate runs."""
-    trees = {"before": extract(BEFORE, folder.resolve() / "tree", root), "after": root}
+    trees = {"before": extract(BEFORE, folder.resolve() / "tree"), "after": _ROOT}
     rates: Mapping[str, list[float]] = {name: [] for name in trees}
     settings = ["experiment=original", "seed=0", "trainer.target_share=null"]
+    settings.append("trainer.total_episodes=150")
     for i in range(times):
         for name, tree in trees.items():
             run = folder.resolve() / f"{name}_{i}"
-            limit = f"trainer.total_episodes={episodes}"
-            call("train", *settings, limit, f"hydra.run.dir={run}", tree=tree)
+            call("train", *settings, f"hydra.run.dir={run}", tree=tree)
             result = read_json(run / "result.json")
             rates[name].append(result["frames"] / result["seconds"])
     return statistics.median(rates["after"]) / statistics.median(rates["before"])
@@ -110,14 +107,14 @@ def count_elements(page: Path, root: Path) -> tuple[int, int]:
     return len(rows), shown
 
 
-def count_conventions(root: Path) -> int:
+def count_conventions() -> int:
     """Return the number of hand-computed cases of signs and cameras that agree.
 
     Raises:
         RuntimeError: One does not.
     """
     command = [sys.executable, "-m", "pytest", "-q", _CONVENTIONS]
-    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, cwd=_ROOT, capture_output=True, text=True, check=False)
     passed = re.search(r"(\d+) passed", done.stdout)
     if done.returncode or passed is None:
         raise RuntimeError(f"the tests of conventions failed: {done.stdout.strip()[-500:]}")

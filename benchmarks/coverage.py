@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binom, multinomial
 
+from benchmarks.benchmark import Setup
 from benchmarks.simulated_policies import bench_false_certain
 from drone_rl.utils.intervals import mean_bounds, median_bounds, proportion
 
@@ -80,23 +81,20 @@ TIMES: Mapping[str, Outcome] = {
 """Distributions of times, for medians; infinite if the event never happens."""
 
 
-def bench_coverage(quick: bool) -> dict[str, Any]:
+def bench_coverage(setup: Setup) -> dict[str, Any]:
     """Compute the coverage of all kinds of intervals, and the rate of certain but wrong verdicts.
-
-    Args:
-        quick: Whether to use only the smallest samples and few simulated verdicts.
 
     Returns:
         "interval_coverage_min", the lowest coverage; "interval_coverage_least", its row;
         "interval_coverage", all rows; and the figures of `bench_false_certain`.
     """
-    rows = [*_proportions(quick), *_means(quick), *_medians(quick)]
+    rows = [*_proportions(setup.quick), *_means(setup.quick), *_medians(setup.quick)]
     least = min(rows, key=lambda row: row["coverage"])
     return {
         "interval_coverage_min": least["coverage"],
         "interval_coverage_least": least,
         "interval_coverage": rows,
-        **bench_false_certain(quick),
+        **bench_false_certain(setup.quick),
     }
 
 

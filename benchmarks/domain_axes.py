@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from benchmarks.benchmark import Setup
 from drone_rl.config.commands import JudgeSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.trust.axes import AXES, Axis
@@ -20,12 +21,8 @@ NEAR = 1e-3
 """Relative distance from a limit at which a required range ends inside or outside."""
 
 
-def bench_domain_axes(folder: Path, quick: bool) -> dict[str, Any]:
+def bench_domain_axes(setup: Setup) -> dict[str, Any]:
     """Search the operating domain of a policy and require ranges around its limits.
-
-    Args:
-        folder: Folder of `shifts.json`, `domain.yaml` and the required ranges.
-        quick: Whether to search only two axes, with few episodes.
 
     Returns:
         "domain_axes": number of axes; "domain_axes_right": number of axes on which a range just
@@ -33,19 +30,20 @@ def bench_domain_axes(folder: Path, quick: bool) -> dict[str, Any]:
         accepted; "domain_axes_wrong": problems of the other axes, by name;
         "domain_axes_contradicted": contradictions of new episodes to the program's own file.
     """
+    folder = setup.runs / "domain_axes"
     folder.mkdir(parents=True, exist_ok=True)
     policy = load_policy(POLICY)
     found = shifts(
         policy,
-        axes=["fog", "sun"] if quick else None,
+        axes=["fog", "sun"] if setup.quick else None,
         strengths=[5],
         modes=["constant"],
-        episodes=20 if quick else 50,
-        domain_episodes=200 if quick else 600,
+        episodes=20 if setup.quick else 50,
+        domain_episodes=200 if setup.quick else 600,
         progress=silent,
     )
     found.save(folder)
-    flights = JudgeSettings(domain_flights=20 if quick else 100)
+    flights = JudgeSettings(domain_flights=20 if setup.quick else 100)
     wrong = {name: [*_problems(policy, folder, name)] for name in found.numbers["axes"]}
     needs = _required(policy, folder, folder / "domain.yaml").needs
     reflown = recheck_domain(policy, needs, found.numbers, flights, root_seed(None))

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from benchmarks.benchmark import Setup
 from drone_rl.config import TaskSettings
 from drone_rl.config.learning import Episodes
 from drone_rl.config.training import TrainerSettings
@@ -51,21 +52,18 @@ class Truth:
         return low <= self.success + self.undecided and self.success <= high
 
 
-def bench_exact_coverage(folder: Path, quick: bool) -> dict[str, Any]:
+def bench_exact_coverage(setup: Setup) -> dict[str, Any]:
     """Judge policies with exactly known success rates.
-
-    Args:
-        folder: Folder of the trainings.
-        quick: Whether to judge only one shipped policy, by few episodes.
 
     Returns:
         The figures of `count`, and "verdict_coverage_exact_left_out", numbers of policies that are
         left out, by reason.
     """
-    most, repeats, episodes = (1, 3, 50) if quick else (POLICIES, REPEATS, EPISODES)
+    folder = setup.runs / "exact_coverage"
+    most, repeats, episodes = (1, 3, 50) if setup.quick else (POLICIES, REPEATS, EPISODES)
     rows: list[dict[str, Any]] = []
     left_out = {"always or never": 0, "as another": 0, "undecided": 0}
-    for name, policy in _policies(folder, quick):
+    for name, policy in _policies(folder, setup.quick):
         proof = prove(policy, compared=500, progress=silent)
         truth = Truth(proof.success, proof.undecided)
         reason = _reason_to_leave_out(truth, [row["success"] for row in rows])

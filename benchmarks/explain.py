@@ -2,9 +2,9 @@
 
 import json
 import time
-from pathlib import Path
 from typing import Any
 
+from benchmarks.benchmark import Setup
 from benchmarks.commands import watch
 from benchmarks.pipeline import default_pipeline
 from drone_rl.explanations import embedding
@@ -14,11 +14,12 @@ from drone_rl.explanations.rollouts import collect, render_frames, select_frames
 from drone_rl.explanations.scenes import Scenes
 
 
-def bench_explain(folder: Path, quick: bool) -> dict[str, Any]:
+def bench_explain(setup: Setup) -> dict[str, Any]:
     """Measure `drone-rl explain policy=good` and its slowest parts."""
+    folder = setup.runs
     run = folder / "explain"
-    frames = 100 if quick else 600
-    small = ["frames=100", "episodes=20", "perplexity=10"] if quick else []
+    frames = 100 if setup.quick else 600
+    small = ["frames=100", "episodes=20", "perplexity=10"] if setup.quick else []
     seconds, peak = watch("explain", "policy=good", "seed=0", f"hydra.run.dir={run}", *small)
     numbers = json.loads((run / "0_good" / "explanation.json").read_text())
     reached = numbers["class_model"]["logit"]["probabilities"]
@@ -28,7 +29,7 @@ def bench_explain(folder: Path, quick: bool) -> dict[str, Any]:
         "explain_frames": frames,
         "class_model_probability": reached,
         "report_mib": (run / "report.html").stat().st_size / 2**20,
-        **_parts(1000 if quick else 10_000),
+        **_parts(1000 if setup.quick else 10_000),
     }
 
 

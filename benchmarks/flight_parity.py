@@ -12,11 +12,12 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from benchmarks.benchmark import Setup
+from benchmarks.forces_kernel import forces
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.dynamics import GRAVITY
 from drone_rl.sim.dynamics import FlightState, Goals, Mode, Quadrotor
 from drone_rl.sim.dynamics import state as fs
-from drone_rl.sim.dynamics.forces_kernel import forces
 
 SECONDS = 10.0
 HEIGHT = 1000.0
@@ -59,17 +60,14 @@ def measure_parity(count: int = 100, seed: int = 0, seconds: float = SECONDS) ->
     return [gap_of(manoeuvre) for manoeuvre in manoeuvres(count, seed, seconds)]
 
 
-def bench_flight_parity(quick: bool) -> dict[str, Any]:
+def bench_flight_parity(setup: Setup) -> dict[str, Any]:
     """Compare random manoeuvres of ten seconds in the batched dynamics and in MuJoCo.
-
-    Args:
-        quick: Whether to fly only a few, of one second.
 
     Returns:
         "flight_parity_m", "flight_parity_deg": largest differences of position and attitude;
         "flight_parity": metres and degrees by kind of manoeuvre.
     """
-    gaps = measure_parity(15, seconds=1.0) if quick else measure_parity()
+    gaps = measure_parity(15, seconds=1.0) if setup.quick else measure_parity()
     return {
         "flight_parity_m": max(gap.metres for gap in gaps),
         "flight_parity_deg": max(gap.degrees for gap in gaps),

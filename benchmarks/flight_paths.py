@@ -8,6 +8,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from benchmarks.benchmark import Setup
 from drone_rl.config import DynamicsSettings
 from drone_rl.flight.commands.command import Command, Hover, period_ticks
 from drone_rl.flight.commands.path_following import (
@@ -186,11 +187,8 @@ _DIRECTIONS = 8
 """Number of wind directions."""
 
 
-def bench_flight_paths(quick: bool) -> dict[str, Any]:
+def bench_flight_paths(setup: Setup) -> dict[str, Any]:
     """Measure path following and hovering of the default drone.
-
-    Args:
-        quick: Whether to use only the square and one wind direction.
 
     Returns:
         "path_error_m": mean distance from a square of 10 m at 2 m/s. "path_errors": length, speed,
@@ -198,9 +196,9 @@ def bench_flight_paths(quick: bool) -> dict[str, Any]:
         distance of a hovering drone from its position in wind of 5 m/s, for the worst direction;
         "hover_greatest_m": the largest distance.
     """
-    chosen = {"square": courses()["square"]} if quick else courses()
+    chosen = {"square": courses()["square"]} if setup.quick else courses()
     followed = path_following(chosen)
-    errors = [_wind_error(number) for number in range(1 if quick else _DIRECTIONS)]
+    errors = [_wind_error(number) for number in range(1 if setup.quick else _DIRECTIONS)]
     return {
         "path_error_m": followed["square"].mean,
         "path_errors": {name: vars(following) for name, following in followed.items()},

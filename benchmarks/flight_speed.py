@@ -11,6 +11,7 @@ import mujoco_warp as mjw
 import torch
 import warp as wp
 
+from benchmarks.benchmark import Setup
 from benchmarks.pipeline import default_collector, paired, rate
 from drone_rl.config import CameraSettings, DynamicsSettings
 from drone_rl.sim.dynamics import FlightState, Quadrotor
@@ -34,11 +35,8 @@ _FREE_BODY = """
 """
 
 
-def bench_flight_speed(quick: bool) -> dict[str, Any]:
+def bench_flight_speed(setup: Setup) -> dict[str, Any]:
     """Measure the quadrotor simulation on all cores.
-
-    Args:
-        quick: Whether to take a short, rough measurement.
 
     Returns:
         "flight_moves_per_s": moves per second of 256 drones together; a move has 33 ticks with the
@@ -49,7 +47,7 @@ def bench_flight_speed(quick: bool) -> dict[str, Any]:
         divided by those in computer-vision mode, each at its best batch size;
         "flight_collector_fps": the former.
     """
-    seconds = 0.2 if quick else 3.0
+    seconds = 0.2 if setup.quick else 3.0
     fly, step = partial(_fly, Fleet(_DRONES)), _mujoco_warp_step(_DRONES)
     fly()
     step()

@@ -4,7 +4,8 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from benchmarks.injections import chromium
+from benchmarks.benchmark import Setup
+from benchmarks.browser import chromium
 from drone_rl.flight.fly_page.server import fly
 
 _SIZE = (1300, 900)
@@ -13,12 +14,8 @@ _START_S = 60.0
 _HELD = "send({type: 'hold', controls: arguments[0]})"
 
 
-def bench_fly_page(folder: Path, quick: bool) -> dict[str, float]:
+def bench_fly_page(setup: Setup) -> dict[str, float]:
     """Fly a drone with dynamics in Chromium, so that every image differs from the one before.
-
-    Args:
-        folder: Folder of the browser's profile; created if missing.
-        quick: Whether to watch for a shorter time.
 
     Returns:
         "fly_page_fps": images of 256x144 displayed per second.
@@ -26,6 +23,7 @@ def bench_fly_page(folder: Path, quick: bool) -> dict[str, float]:
     Raises:
         InputError: Chromium, its driver or the extra `fly` is not installed.
     """
+    folder = setup.runs / "fly_page"
     folder.mkdir(parents=True, exist_ok=True)
     with (
         tempfile.TemporaryDirectory(dir=folder) as profile,
@@ -37,7 +35,7 @@ def bench_fly_page(folder: Path, quick: bool) -> dict[str, float]:
         wait_until(browser, "flyStats.displayed > 0")
         browser.execute_script(_HELD, ["forward", "yaw_left"])  # in circles
         watch(browser, 1.0)
-        return {"fly_page_fps": watch(browser, 3.0 if quick else 15.0)}
+        return {"fly_page_fps": watch(browser, 3.0 if setup.quick else 15.0)}
 
 
 def watch(browser: Any, seconds: float) -> float:

@@ -1,9 +1,8 @@
 """Honest policies that become "not certain" because their decisions depend on rounding."""
 
-from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
+from benchmarks.benchmark import Setup
 from benchmarks.commands import train
 from drone_rl.config.commands import JudgeSettings
 from drone_rl.policies.policy import load_policy
@@ -12,26 +11,22 @@ from drone_rl.trust.judge import judge
 from drone_rl.utils.progress import silent
 
 
-def bench_fragile_honest(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, Any]:
+def bench_fragile_honest(setup: Setup) -> dict[str, Any]:
     """Judge the shipped policies and default trainings.
-
-    Args:
-        folder: Folder of the trainings.
-        seeds: Seeds of the trainings.
-        quick: Whether to use only a few policies and episodes.
 
     Returns:
         "fragile_honest": number of policies that are not certain because of rounding, out of
         "fragile_honest_total"; "fragile_frames_most" and "fragile_episodes_most": the largest
         rates of fragile frames, and of episodes with fragile frames.
     """
-    names = ["good", "poor"] if quick else policy_names()
+    folder = setup.runs / "fragile_honest"
+    names = ["good", "poor"] if setup.quick else policy_names()
     policies: list[Any] = [load_policy(name) for name in names]
-    for seed in seeds[:1] if quick else seeds:
+    for seed in setup.seeds:
         run = folder / f"seed_{seed}"
         train(run, f"seed={seed}")
         policies.append(load_policy(run))
-    settings = JudgeSettings(sampled=False, episodes=50 if quick else 400)
+    settings = JudgeSettings(sampled=False, episodes=50 if setup.quick else 400)
     found = [
         judge(policy, settings, progress=silent).verdict.evidence["rounding"] for policy in policies
     ]

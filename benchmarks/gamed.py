@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from benchmarks import gamed_certificates, gamed_memory, gamed_rounding
+from benchmarks.benchmark import Setup
 from benchmarks.gamed_case import GamedCase
 
 _MODULES = (gamed_memory, gamed_rounding, gamed_certificates)
@@ -12,16 +13,14 @@ _MODULES = (gamed_memory, gamed_rounding, gamed_certificates)
 _log = logging.getLogger(__name__)
 
 
-def bench_gamed(folder: Path) -> dict[str, int]:
+def bench_gamed(setup: Setup) -> dict[str, int]:
     """Judge every adversarial policy with default settings.
-
-    Args:
-        folder: Folder of the policies' files; created if missing.
 
     Returns:
         "gamed_verdicts": number of policies that are judged good or proved; "gamed_total": number
         of policies.
     """
+    folder = setup.runs / "gamed"
     found = [(case.name, case.is_judged_good()) for case in all_cases(folder)]
     for name, is_deceived in found:
         if is_deceived:

@@ -1,9 +1,8 @@
 """Success of policies cloned from the oracle's demonstrations, before and after REINFORCE."""
 
-from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
+from benchmarks.benchmark import Setup
 from benchmarks.commands import train
 from benchmarks.training import evaluate
 from drone_rl.training.demonstrations import record_oracle
@@ -14,19 +13,10 @@ _SEED = 2000
 """Added to a training's seed for its demonstrations, so that their scenes are others."""
 
 
-def bench_imitation(
-    folder: Path, seeds: Sequence[int], episodes: int, device: str, quick: bool
-) -> dict[str, Any]:
+def bench_imitation(setup: Setup) -> dict[str, Any]:
     """Clone demonstrations of the oracle by `experiment=imitation`, with and without REINFORCE.
 
     The runs of a seed begin with the same clone; one of them stops there.
-
-    Args:
-        folder: Folder of the demonstrations and runs.
-        seeds: Seeds of the trainings.
-        episodes: Held-out episodes of each greedy policy.
-        device: Device of training and evaluation.
-        quick: Whether to train only one seed, briefly.
 
     Returns:
         For each seed "imitation_success", the success rate of the clone, and
@@ -35,10 +25,7 @@ def bench_imitation(
         "imitation_reinforce_frames", frames that REINFORCE collected; "imitation_solved", the
         number of seeds that reached the target.
     """
-    rows = [
-        _run_seed(folder, seed, 50 if quick else episodes, device, quick)
-        for seed in (seeds[:1] if quick else seeds)
-    ]
+    rows = [_run_seed(setup, seed) for seed in setup.seeds[:3]]
     names = ("success", "reinforce_success", "accuracy", "s", "reinforce_frames")
     return {
         **{f"imitation_{name}": [row[name] for row in rows] for name in names},
@@ -46,18 +33,19 @@ def bench_imitation(
     }
 
 
-def _run_seed(folder: Path, seed: int, episodes: int, device: str, quick: bool) -> dict[str, Any]:
+def _run_seed(setup: Setup, seed: int) -> dict[str, Any]:
     """Record demonstrations, clone and train from one seed; return its figures and the reason."""
-    flights = folder / f"demonstrations_{seed}"
-    record_oracle(flights, flights=DEMONSTRATIONS, seed=_SEED + seed)
-    own = ["experiment=imitation", f"demonstrations={flights}", f"seed={seed}", f"device={device}"]
+    folder = setup.runs / "imitation"
+    demonstrations = folder / f"demonstrations_{seed}"
+    record_oracle(demonstrations, flights=DEMONSTRATIONS, seed=_SEED + seed)
+    settings = ["experiment=imitation", f"demonstrations={demonstrations}", f"seed={seed}"]
+    settings.append(f"device={setup.device}")
     clone, whole = folder / f"clone_{seed}", folder / f"reinforce_{seed}"
-    train(clone, *own, "trainer.total_frames=0")
-    success = evaluate(clone, episodes, device)["share"]
-    _, result = train(whole, *own, *(["trainer.total_frames=4000"] if quick else []))
+    train(clone, *settings, "trainer.total_frames=0")
+    _, result = train(whole, *settings, *(["trainer.total_frames=4000"] if setup.quick else []))
     return {
-        "success": success,
-        "reinforce_success": evaluate(whole, episodes, device)["share"],
+        "success": evaluate(setup, clone)["share"],
+        "reinforce_success": evaluate(setup, whole)["share"],
         "accuracy": result["cloning"]["held_out_accuracy"],
         "s": result["cloning"]["seconds"],
         "reinforce_frames": result["frames"],

@@ -4,7 +4,6 @@ The benchmark counts how many adversarial maps pass the tests, and how many true
 """
 
 import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ import torch
 from torch import Tensor
 
 from benchmarks.adversarial_maps import adversarial_maps
+from benchmarks.benchmark import Setup
 from benchmarks.known_map_policies import make_policies, path_weights
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.scenes import Scenes, alternatives, empty_scene
@@ -25,12 +25,8 @@ NUM_METHODS = 5
 """Number of methods of an explanation, for the correction for multiple tests."""
 
 
-def bench_maps(folder: Path, quick: bool) -> dict[str, Any]:
+def bench_maps(setup: Setup) -> dict[str, Any]:
     """Count trusted adversarial maps, and trusted true maps of policies with known maps.
-
-    Args:
-        folder: Not used.
-        quick: Whether to use only a few policies and episodes.
 
     Returns:
         "placebo_maps_...": trusted adversarial maps, their total, the number of policies and the
@@ -38,11 +34,10 @@ def bench_maps(folder: Path, quick: bool) -> dict[str, Any]:
         trusted, their number, the failed tests of the others, and trusted maps of blind policies;
         "maps_s": seconds.
     """
-    del folder
     begin = time.perf_counter()
     env = make_env(64)
     scenes = Scenes(env)
-    state, episode = imagined(scenes, 14 if quick else 40, 4 if quick else 6)
+    state, episode = imagined(scenes, 14 if setup.quick else 40, 4 if setup.quick else 6)
     seen, absent = scenes.observe(state), scenes.observe(empty_scene(scenes))[0]
     others = list(alternatives(scenes, state).values())
 
@@ -51,12 +46,12 @@ def bench_maps(folder: Path, quick: bool) -> dict[str, Any]:
         return measure(network, greedy, seen, others, absent, episode)
 
     known = make_policies(absent, seen, expert(scenes, state))
-    known = known[::7] if quick else known
+    known = known[::7] if setup.quick else known
     failed = {p.name: failed_tests(trial(p.network)) for p in known}
     seeing = [p for p in known if not p.is_blind]
-    policies = {p.name: p.network for p in seeing[:: 3 if quick else 2]}
-    policies |= shipped(absent) if not quick else {}
-    policies |= untrained(absent, 1 if quick else 4)
+    policies = {p.name: p.network for p in seeing[:: 3 if setup.quick else 2]}
+    policies |= shipped(absent) if not setup.quick else {}
+    policies |= untrained(absent, 1 if setup.quick else 4)
     trusted = {name: trusted_adversarial(trial(n), absent) for name, n in policies.items()}
     env.close()
     return {

@@ -5,11 +5,11 @@ import os
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.benchmark import Setup
 from benchmarks.commands import memory_status
 from drone_rl.utils.imports import leave_compiler_unloaded
 from drone_rl.utils.memory import look_for_garbage_rarely
@@ -18,14 +18,8 @@ SETTLING_FRAMES = 100_000
 """Frames after which a training has met all batch lengths and numbers of active environments."""
 
 
-def bench_memory(folder: Path, frames: int, device: str, quick: bool) -> dict[str, Any]:
+def bench_memory(setup: Setup) -> dict[str, Any]:
     """Train in a separate process without a target and record its resident memory.
-
-    Args:
-        folder: Folder of the run.
-        frames: Number of frames over which growth is measured, after the first `SETTLING_FRAMES`.
-        device: Device of the training.
-        quick: Whether to train a few thousand frames only.
 
     Returns:
         The peak (MiB) and the growth (MiB per million frames).
@@ -33,8 +27,9 @@ def bench_memory(folder: Path, frames: int, device: str, quick: bool) -> dict[st
     Raises:
         RuntimeError: The training failed.
     """
-    settling, frames = (1_000, 10_000) if quick else (SETTLING_FRAMES, frames)
-    arguments = [str(folder / "memory"), str(settling + frames), device]
+    folder = setup.runs
+    settling, frames = 1_000 if setup.quick else SETTLING_FRAMES, setup.memory_frames
+    arguments = [str(folder / "memory"), str(settling + frames), setup.device]
     command = [sys.executable, "-m", __name__, *arguments]
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     if done.returncode != 0:

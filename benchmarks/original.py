@@ -9,7 +9,9 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+from benchmarks.benchmark import Setup
 from benchmarks.commands import call, train
+from benchmarks.ledger import digest_code
 from drone_rl.utils.files import read_json, write_atomically
 from drone_rl.utils.palette import BAD, FAINT, GOOD, INK, ONE_SIDED, css
 
@@ -33,20 +35,16 @@ still passes the criterion does so by chance. At the largest rate, policies soon
 any episode; an episode without a reward has the gradient zero, and the policy stays as it is.
 """
 TARGET = 2.99
-_REWARD = "train/running_reward"
+TRAINED = ("sim", "envs", "policies", "collectors", "objectives", "training", "conf")
+"""Code whose change makes earlier runs void; see `Benchmark.measures`."""
 _COLORS = {"good": GOOD, "one-sided": ONE_SIDED, "poor": BAD, "none of these": INK}
 """Colors of lines by the first words of the verdict on the trained policy."""
 
 
-def bench_original(folder: Path, picture: Path, quick: bool) -> dict[str, Any]:
+def bench_original(setup: Setup) -> dict[str, Any]:
     """Train `experiment=original` at three rates with two schedules, and the default, and plot it.
 
     A seed that an earlier, interrupted call of the same code has trained is not trained again.
-
-    Args:
-        folder: Folder of the runs, kept between calls.
-        picture: Path of the image with the learning curves.
-        quick: Whether to train one seed of each for a few episodes.
 
     Returns:
         "original_runs": for each training, such as "constant 0.0001", and each seed, whether it
@@ -57,9 +55,10 @@ def bench_original(folder: Path, picture: Path, quick: bool) -> dict[str, Any]:
     Raises:
         RuntimeError: A command failed.
     """
-    seeds = SEEDS[:1] if quick else SEEDS
+    folder = setup.folder / "original" / digest_code(TRAINED)  # kept between calls
+    seeds = SEEDS[:1] if setup.quick else SEEDS
     runs = {}
-    for name, settings in trainings(quick).items():
+    for name, settings in trainings(setup.quick).items():
         runs[name] = train_seeds(folder / name, settings, seeds)
     curves = {
         name: [
@@ -68,7 +67,7 @@ def bench_original(folder: Path, picture: Path, quick: bool) -> dict[str, Any]:
         ]
         for name in runs
     }
-    plot(curves, picture)
+    plot(curves, setup.folder / "original.png")
     solved = {name: sum(run["solved"] for run in runs[name]) for name in runs if name != DEFAULT}
     best = max(solved, key=lambda name: solved[name])
     return {

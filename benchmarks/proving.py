@@ -1,17 +1,14 @@
 """Proofs of shipped and newly trained policies: time, decided fraction, and correctness."""
 
-import multiprocessing
 import statistics
 import time
-from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import torch
 
 from benchmarks import commands
-from benchmarks.tampering import count_refused
+from benchmarks.benchmark import Setup
 from drone_rl.config.training import TrainerSettings
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.policy import load_policy
@@ -43,17 +40,10 @@ def network_images_per_s(network: ImageNetwork, shape: tuple[int, ...]) -> float
 
 EPISODES = 105_000
 """Episodes that check all certificates together; the requirement is 100,000."""
-SMALL_PARTS = {4: 2e7, 5: 5e7}
-"""Image combinations of a part of a proof, by number of cubes; small enough to end in time."""
 
 
-def bench_prove(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, Any]:
+def bench_prove(setup: Setup) -> dict[str, Any]:
     """Train the default from each seed, prove the policies, and check every certificate.
-
-    Args:
-        folder: Folder of runs and certificates.
-        seeds: Seeds of the trainings.
-        quick: Whether to use one cube and one seed.
 
     Returns:
         "proof_two_s" of the policy "good" with two cubes; "proof_three_s", "proof_success",
@@ -62,23 +52,24 @@ def bench_prove(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, An
         148,000 images per second; the number of certificates that the checker accepts, and of its
         episodes that contradict them.
     """
-    two, three = (1, 1) if quick else (2, 3)
+    folder = setup.runs / "prove"
+    two, three = (1, 1) if setup.quick else (2, 3)
     policy = load_policy("good")
     camera = policy.description.camera
     images_per_s = network_images_per_s(policy.make_network(), (1, camera.height, camera.width))
     slower = REFERENCE_IMAGES_PER_S / images_per_s
     good, good_s = _timed("good", two, folder / "good")
     proofs, seconds = {"good": good}, []
-    for seed in seeds[:1] if quick else seeds:
+    for seed in setup.seeds:
         run = folder / f"seed_{seed}"
-        limits = TrainerSettings(total_frames=10_000) if quick else TrainerSettings()
+        limits = TrainerSettings(total_frames=10_000) if setup.quick else TrainerSettings()
         train(folder=run, seed=seed, trainer=limits, progress=silent)
         proofs[str(run)], taken = _timed(run, three, run)
         seconds.append(taken)
     trained = list(proofs.values())[1:]
     for name in ("poor", "right_and_forward"):
         proofs[name], _ = _timed(name, two, folder / name)
-    episodes = 100 if quick else -(-EPISODES // len(proofs))
+    episodes = 100 if setup.quick else -(-EPISODES // len(proofs))
     checks = [_check(proof, policy, episodes) for policy, proof in proofs.items()]
     return {
         "proof_two_s": good_s,
@@ -97,63 +88,6 @@ def bench_prove(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, An
     }
 
 
-def bench_many_cubes(folder: Path, hours: float, quick: bool) -> dict[str, Any]:
-    """Measure the decided fraction of proofs with four and five cubes in a given time.
-
-    A proof uses one core, so both run in parallel processes; sequentially if quick.
-
-    Args:
-        folder: Folder of the certificates.
-        hours: Time limit of each proof.
-        quick: Whether to stop after a second.
-
-    Returns:
-        "proof_four" and "proof_five", the decided fractions for the policy "good", and seconds.
-    """
-    limit, names = 1.0 if quick else 3600 * hours, {4: "proof_four", 5: "proof_five"}
-    context = multiprocessing.get_context("spawn")
-    with ThreadPoolExecutor(1) if quick else ProcessPoolExecutor(2, context) as processes:
-        begun = {
-            name: processes.submit(_decided, cubes, folder / name, limit)
-            for cubes, name in names.items()
-        }
-        done = {name: one.result() for name, one in begun.items()}
-    shares = {name: share for name, (share, _) in done.items()}
-    return shares | {f"{name}_s": seconds for name, (_, seconds) in done.items()}
-
-
-def _decided(cubes: int, folder: Path, limit_s: float) -> tuple[float, float]:
-    begin = time.perf_counter()
-    proof = prove(
-        "good",
-        folder=folder,
-        task={"num_cubes": cubes},
-        limit_s=limit_s,
-        most_combinations=int(SMALL_PARTS[cubes]),
-        most_boxes=20_000_000,
-        progress=silent,
-    )
-    return 1.0 - proof.undecided, time.perf_counter() - begin
-
-
-def bench_tampering(folder: Path, quick: bool) -> dict[str, Any]:
-    """Prove a policy in two small tasks and tamper with the certificates in every known way.
-
-    Args:
-        folder: Folder of the certificates.
-        quick: Whether to use only one task.
-
-    Returns:
-        See `count_refused`.
-    """
-    paths = {}
-    for cubes in (1,) if quick else (1, 2):
-        name = "right_and_forward"
-        _timed(name, cubes, folder / f"{name}_{cubes}")
-        paths[folder / f"{name}_{cubes}" / "certificate.json"] = None
-    return count_refused(paths)
-
-
 def _timed(policy: str | Path, num_cubes: int, folder: Path) -> tuple[Proof, float]:
     begin = time.perf_counter()
     task = {"num_cubes": num_cubes}
@@ -167,21 +101,17 @@ def _check(proof: Proof, policy: str, episodes: int) -> Check:
     return check(path, policy, flights=episodes, seed=0, progress=silent)
 
 
-def bench_provable(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, Any]:
+def bench_provable(setup: Setup) -> dict[str, Any]:
     """Train `experiment=provable` from each seed until the policy is proved.
-
-    Args:
-        folder: Folder of the runs.
-        seeds: Seeds of the trainings.
-        quick: Whether to use one cube and one seed.
 
     Returns:
         For each seed the seconds until the command ends, the number of rounds (searches for
         failures), and whether the policy is proved.
     """
+    folder = setup.runs / "provable"
     results: dict[str, list] = {"provable_s": [], "provable_rounds": [], "provable_proved": []}
-    easier = ["task=collect_one", "provable.flights=500"] if quick else []
-    for seed in seeds[:1] if quick else seeds:
+    easier = ["task=collect_one", "provable.flights=500"] if setup.quick else []
+    for seed in setup.seeds[:3]:
         run = folder / f"provable_{seed}"
         seconds, result = commands.train(run, "experiment=provable", f"seed={seed}", *easier)
         results["provable_s"].append(seconds)

@@ -1,13 +1,13 @@
 """The registry of all benchmarks, by name."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any
 
-from benchmarks.accessibility import bench_accessibility
 from benchmarks.airsim import bench_airsim
 from benchmarks.airsim_chapter import bench_airsim_chapter
 from benchmarks.airsim_scripts import bench_scripts
-from benchmarks.benchmark import Benchmark, Setup
+from benchmarks.benchmark import Benchmark, Figures, Setup
 from benchmarks.chapter import bench_chapter
 from benchmarks.coverage import bench_coverage
 from benchmarks.domain_axes import bench_domain_axes
@@ -21,333 +21,143 @@ from benchmarks.fragile_honest import bench_fragile_honest
 from benchmarks.gamed import bench_gamed
 from benchmarks.gymnasium import bench_gymnasium
 from benchmarks.imitation import bench_imitation
-from benchmarks.injections import bench_injections
-from benchmarks.ledger import digest_code
 from benchmarks.maps import bench_maps
 from benchmarks.memory import bench_memory
 from benchmarks.onnx_export import bench_onnx
 from benchmarks.original import bench_original
 from benchmarks.peers.comparison import bench_peers
-from benchmarks.places import bench_places
-from benchmarks.proving import bench_many_cubes, bench_provable, bench_prove, bench_tampering
+from benchmarks.proving import bench_provable, bench_prove
 from benchmarks.render_truth import bench_render_truth
 from benchmarks.revisions import bench_revisions
 from benchmarks.robust import bench_robust
 from benchmarks.scaling import bench_scaling
-from benchmarks.sentences import bench_sentences
 from benchmarks.shifts import bench_shifts
 from benchmarks.speed import bench_collector, bench_dm_control, bench_render
 from benchmarks.startup import bench_startup
-from benchmarks.sweeps import bench_kills, bench_ray, bench_sweeps
-from benchmarks.training import (
-    bench_flight_training,
-    bench_large,
-    bench_pillars,
-    bench_seeds,
-    bench_solve,
-)
+from benchmarks.sweeps import bench_kills, bench_sweeps
+from benchmarks.training import bench_experiment, bench_large, bench_seeds, bench_solve
 from benchmarks.verdicts import bench_verdicts
 from drone_rl.utils.errors import InputError
-from tools.docs.run import measure as measure_pages
 
 _RENDERING = ("sim", "envs")
 _COLLECTING = (*_RENDERING, "policies", "collectors")
-_TRAINING = (*_COLLECTING, "objectives", "training")
+_TRAINING = (*_COLLECTING, "objectives", "training", "conf")
+_SOLVING = (*_TRAINING, "trust")
 _JUDGING = (*_RENDERING, "policies", "trust")
 _PROVING = (*_RENDERING, "policies", "verification/prover", "verification/checker")
 _EXPLAINING = (*_JUDGING, "explanations")
-_ORIGINAL = (*_TRAINING, "conf", "benchmarks/original")
-_CLAIMS = ("trust", "verification", "explanations", "sweeps")
+_COMMANDS = (*_TRAINING, "config", "cli")
 
 
-def _flight_training(setup: Setup, experiment: str, seeds: Sequence[int]) -> dict[str, Any]:
-    runs = setup.runs / experiment
-    return bench_flight_training(experiment, runs, seeds, setup.episodes, setup.device, setup.quick)
+def _benchmark(
+    run: Callable[..., Figures], group: str, *measures: str, **options: Any
+) -> Benchmark:
+    """Return a benchmark that measures packages, and the module of its own function.
+
+    Args:
+        run: Takes a `Setup` and the options; see `Benchmark`.
+        group: See `Benchmark`.
+        measures: See `Benchmark`.
+        options: Further arguments of `run`.
+    """
+    module = run.__module__.replace(".", "/")
+    return Benchmark(partial(run, **options), group, (*measures, module))
 
 
-def _original(setup: Setup) -> dict[str, Any]:
-    runs = setup.folder / "original" / digest_code(_ORIGINAL[:-1])  # plotting may change
-    return bench_original(runs, setup.folder / "original.png", setup.quick)
+def _parts(*names: str) -> tuple[str, ...]:
+    """Return further modules of benchmarks as entries of `Benchmark.measures`."""
+    return tuple(f"benchmarks/{name}" for name in names)
+
+
+def _bench_airsim(setup: Setup) -> Figures:
+    return {
+        **bench_airsim(setup.runs / "airsim", setup.quick),
+        **bench_scripts(setup.runs / "airsim_scripts"),
+        **bench_airsim_chapter(setup.runs / "airsim_chapter", setup.quick),
+    }
 
 
 BENCHMARKS: dict[str, Benchmark] = {
-    "render": Benchmark(
-        lambda s: bench_render(s.batch_size, s.device, s.quick),
-        "main",
-        (*_RENDERING, "benchmarks/speed"),
-    ),
-    "collector": Benchmark(
-        lambda s: bench_collector(s.batch_size, s.device, s.quick),
-        "main",
-        (*_COLLECTING, "benchmarks/speed"),
-    ),
-    "dm_control": Benchmark(
-        lambda s: bench_dm_control(s.batch_size, s.device, s.quick),
-        "main",
-        (*_RENDERING, "benchmarks/speed", "benchmarks/dm_control"),
-    ),
-    "scaling": Benchmark(
-        lambda s: bench_scaling(s.folder, s.device, s.quick),
-        "main",
-        (*_RENDERING, "benchmarks/scaling"),
-    ),
-    "memory": Benchmark(
-        lambda s: bench_memory(s.runs, s.memory_frames, s.device, s.quick),
-        "main",
-        (*_TRAINING, "benchmarks/memory"),
-    ),
-    "solve": Benchmark(
-        lambda s: bench_solve(s.runs, s.seeds, s.episodes, s.device, s.quick),
-        "main",
-        (*_TRAINING, "trust", "conf", "benchmarks/training"),
-    ),
-    "seeds": Benchmark(
-        lambda s: bench_seeds(s.runs / "seeds", s.device, s.quick),
-        "main",
-        (*_TRAINING, "trust", "conf", "benchmarks/training"),
-    ),
-    "large": Benchmark(
-        lambda s: bench_large(s.runs, s.device, s.quick),
-        "main",
-        (*_TRAINING, "conf", "benchmarks/training"),
-    ),
-    "coverage": Benchmark(
-        lambda s: bench_coverage(s.quick),
+    "render": _benchmark(bench_render, "main", *_RENDERING),
+    "collector": _benchmark(bench_collector, "main", *_COLLECTING),
+    "dm_control": _benchmark(bench_dm_control, "main", *_RENDERING, *_parts("dm_control")),
+    "scaling": _benchmark(bench_scaling, "main", *_RENDERING),
+    "memory": _benchmark(bench_memory, "main", *_TRAINING),
+    "solve": _benchmark(bench_solve, "main", *_SOLVING),
+    "seeds": _benchmark(bench_seeds, "main", *_SOLVING),
+    "large": _benchmark(bench_large, "main", *_TRAINING),
+    "coverage": _benchmark(
+        bench_coverage,
         "adversarial",
-        ("utils/intervals", "trust", "benchmarks/coverage", "benchmarks/simulated_policies"),
+        "utils/intervals",
+        "trust",
+        *_parts("simulated_policies"),
     ),
-    "sentences": Benchmark(
-        lambda s: bench_sentences(),
+    "gamed": _benchmark(
+        bench_gamed,
         "adversarial",
-        (
-            *_CLAIMS,
-            "benchmarks/sentences",
-            "benchmarks/evidence",
-            "benchmarks/evidence_changes",
-        ),
-    ),
-    "injections": Benchmark(
-        lambda s: bench_injections(s.runs / "injections"),
-        "adversarial",
-        (
-            *_CLAIMS,
-            "utils/display",
-            "benchmarks/injections",
-            "benchmarks/injected_pages",
-        ),
-    ),
-    "accessibility": Benchmark(
-        lambda s: bench_accessibility(s.runs / "accessibility", s.quick),
-        "adversarial",
-        ("explanations", "utils/display", "benchmarks/accessibility"),
-    ),
-    "gamed": Benchmark(
-        lambda s: bench_gamed(s.runs / "gamed"),
-        "adversarial",
-        (
-            *_JUDGING,
-            "benchmarks/gamed",
-            "benchmarks/gamed_memory",
-            "benchmarks/gamed_rounding",
-            "benchmarks/gamed_certificates",
-        ),
-    ),
-    "maps": Benchmark(
-        lambda s: bench_maps(s.runs, s.quick),
-        "adversarial",
-        (
-            *_EXPLAINING,
-            "benchmarks/maps",
-            "benchmarks/adversarial_maps",
-            "benchmarks/known_map_policies",
-        ),
-    ),
-    "explain": Benchmark(
-        lambda s: bench_explain(s.runs, s.quick),
-        "adversarial",
-        (*_EXPLAINING, "explanations/report", "conf", "benchmarks/explain"),
-    ),
-    "verdicts": Benchmark(
-        lambda s: bench_verdicts(s.runs, s.device, s.quick),
-        "adversarial",
-        (*_JUDGING, "benchmarks/verdicts", "benchmarks/scripted_policies"),
-    ),
-    "fragile_honest": Benchmark(
-        lambda s: bench_fragile_honest(s.runs / "fragile_honest", s.seeds, s.quick),
-        "adversarial",
-        (*_TRAINING, *_JUDGING, "conf", "benchmarks/fragile_honest"),
-    ),
-    "shifts": Benchmark(
-        lambda s: bench_shifts(s.quick),
-        "adversarial",
-        (*_JUDGING, "benchmarks/shifts"),
-    ),
-    "domain_axes": Benchmark(
-        lambda s: bench_domain_axes(s.runs / "domain_axes", s.quick),
-        "adversarial",
-        (*_JUDGING, "benchmarks/domain_axes"),
-    ),
-    "robust": Benchmark(
-        lambda s: bench_robust(s.runs / "robust", s.seeds[:3], s.quick),
-        "adversarial",
-        (
-            *_TRAINING,
-            "trust",
-            "conf",
-            "benchmarks/robust",
-            "benchmarks/robust_comparison",
-        ),
-    ),
-    "render_truth": Benchmark(
-        lambda s: bench_render_truth(s.quick),
-        "adversarial",
-        ("sim/rendering", "benchmarks/render_truth", "benchmarks/random_scenes"),
-    ),
-    "docs": Benchmark(lambda s: measure_pages(), "adversarial", (".", "conf")),
-    "sweeps": Benchmark(
-        lambda s: bench_sweeps(s.runs, s.device, s.quick),
-        "parallel",
-        (*_TRAINING, "sweeps", "conf", "benchmarks/sweeps"),
-    ),
-    "kills": Benchmark(
-        lambda s: bench_kills(s.runs, s.device, s.quick),
-        "parallel",
-        (*_TRAINING, "sweeps", "conf", "benchmarks/sweeps"),
-    ),
-    "ray": Benchmark(
-        lambda s: bench_ray(s.runs, s.device, s.quick),
-        "parallel",
-        (*_COLLECTING, "conf", "benchmarks/sweeps"),
-    ),
-    "prove": Benchmark(
-        lambda s: bench_prove(s.runs / "prove", s.seeds, s.quick),
+        *_JUDGING,
         "verification",
-        (*_PROVING, "benchmarks/proving"),
+        *_parts("gamed_memory", "gamed_rounding", "gamed_certificates"),
     ),
-    "tampering": Benchmark(
-        lambda s: bench_tampering(s.runs / "tampering", s.quick),
-        "verification",
-        (
-            *_PROVING,
-            "benchmarks/tampering",
-            "benchmarks/tampered_inconsistent",
-            "benchmarks/tampered_consistent",
-        ),
+    "maps": _benchmark(
+        bench_maps,
+        "adversarial",
+        *_EXPLAINING,
+        *_parts("adversarial_maps", "known_map_policies"),
     ),
-    "places": Benchmark(
-        lambda s: bench_places(s.quick), "verification", (*_PROVING, "benchmarks/places")
+    "explain": _benchmark(bench_explain, "adversarial", *_EXPLAINING, "conf"),
+    "verdicts": _benchmark(bench_verdicts, "adversarial", *_JUDGING, *_parts("scripted_policies")),
+    "fragile_honest": _benchmark(bench_fragile_honest, "adversarial", *_TRAINING, *_JUDGING),
+    "shifts": _benchmark(bench_shifts, "adversarial", *_JUDGING),
+    "domain_axes": _benchmark(bench_domain_axes, "adversarial", *_JUDGING),
+    "robust": _benchmark(bench_robust, "adversarial", *_SOLVING, *_parts("robust_comparison")),
+    "render_truth": _benchmark(
+        bench_render_truth, "adversarial", "sim/rendering", *_parts("random_scenes")
     ),
-    "exact_coverage": Benchmark(
-        lambda s: bench_exact_coverage(s.runs / "exact_coverage", s.quick),
-        "verification",
-        (*_TRAINING, *_PROVING, "trust", "benchmarks/exact_coverage"),
+    "sweeps": _benchmark(bench_sweeps, "parallel", *_TRAINING, "sweeps"),
+    "kills": _benchmark(bench_kills, "parallel", *_TRAINING, "sweeps"),
+    "prove": _benchmark(bench_prove, "verification", *_PROVING),
+    "exact_coverage": _benchmark(
+        bench_exact_coverage, "verification", *_TRAINING, *_PROVING, "trust"
     ),
-    "provable": Benchmark(
-        lambda s: bench_provable(s.runs / "provable", s.seeds[:3], s.quick),
-        "verification",
-        (*_TRAINING, *_PROVING, "conf", "benchmarks/proving"),
+    "provable": _benchmark(bench_provable, "verification", *_TRAINING, *_PROVING),
+    "pillars": _benchmark(
+        bench_experiment, "libraries", *_SOLVING, experiment="pillars", num_seeds=3
     ),
-    "many_cubes": Benchmark(
-        lambda s: bench_many_cubes(s.runs / "many_cubes", 1.0, s.quick),
-        "long",
-        (*_PROVING, "benchmarks/proving"),
-    ),
-    "pillars": Benchmark(
-        lambda s: bench_pillars(s.runs / "pillars", s.seeds[:3], s.episodes, s.device, s.quick),
-        "libraries",
-        (*_TRAINING, "trust", "conf", "benchmarks/training"),
-    ),
-    "revisions": Benchmark(
-        lambda s: bench_revisions(s.runs / "revisions", s.quick),
-        "system",
-        (*_TRAINING, "trust", "explanations", "cli", "conf", "benchmarks/revisions"),
-    ),
-    "imitation": Benchmark(
-        lambda s: bench_imitation(s.runs / "imitation", s.seeds[:3], s.episodes, s.device, s.quick),
-        "long",
-        (*_TRAINING, "trust", "conf", "benchmarks/imitation", "benchmarks/training"),
-    ),
-    "original": Benchmark(
-        _original,
-        "long",
-        _ORIGINAL,
-    ),
-    "chapter": Benchmark(
-        lambda s: bench_chapter(s.runs / "chapter", s.quick),
-        "long",
-        (*_TRAINING, "acceleration", "flight/commands", "conf", "benchmarks/chapter"),
-    ),
-    "fly_page": Benchmark(
-        lambda s: bench_fly_page(s.runs / "fly_page", s.quick),
+    "revisions": _benchmark(bench_revisions, "system", *_COMMANDS, "trust", "explanations"),
+    "imitation": _benchmark(bench_imitation, "long", *_SOLVING),
+    "original": _benchmark(bench_original, "long", *_TRAINING),
+    "chapter": _benchmark(bench_chapter, "long", *_TRAINING, "acceleration", "flight/commands"),
+    "fly_page": _benchmark(bench_fly_page, "flight", *_RENDERING, "flight", "policies"),
+    "airsim": _benchmark(
+        _bench_airsim,
         "flight",
-        (*_RENDERING, "flight", "policies", "benchmarks/fly_page"),
-    ),
-    "airsim": Benchmark(
-        lambda s: {
-            **bench_airsim(s.runs / "airsim", s.quick),
-            **bench_scripts(s.runs / "airsim_scripts"),
-            **bench_airsim_chapter(s.runs / "airsim_chapter", s.quick),
-        },
+        *_RENDERING,
         "flight",
-        (
-            *_RENDERING,
-            "flight",
-            "benchmarks/airsim",
-            "benchmarks/airsim_chapter",
-            "benchmarks/airsim_programs",
-        ),
+        *_parts("airsim", "airsim_scripts", "airsim_chapter", "airsim_programs"),
     ),
-    "startup": Benchmark(
-        lambda s: bench_startup(s.runs / "startup", s.device, s.quick),
-        "system",
-        (*_TRAINING, "trust", "config", "cli", "conf", "benchmarks/startup"),
+    "startup": _benchmark(bench_startup, "system", *_COMMANDS, "trust"),
+    "onnx": _benchmark(bench_onnx, "libraries", *_JUDGING),
+    "peers": _benchmark(bench_peers, "libraries", *_COMMANDS, *_parts("peers")),
+    "gymnasium": _benchmark(bench_gymnasium, "libraries", *_RENDERING),
+    "flight_speed": _benchmark(bench_flight_speed, "flight", *_COLLECTING),
+    "flight_parity": _benchmark(bench_flight_parity, "flight", "sim"),
+    "flight_paths": _benchmark(bench_flight_paths, "flight", "sim", "flight/commands"),
+    "flight_moves": _benchmark(
+        bench_experiment, "flight", *_SOLVING, experiment="flight", num_seeds=5
     ),
-    "onnx": Benchmark(
-        lambda s: bench_onnx(s.runs / "onnx", s.quick),
-        "libraries",
-        (*_RENDERING, "policies", "trust", "benchmarks/onnx_export"),
+    "flight_velocity": _benchmark(
+        bench_experiment, "flight", *_SOLVING, experiment="flight_velocity", num_seeds=3
     ),
-    "peers": Benchmark(
-        lambda s: bench_peers(s.runs / "peers", s.seeds[:3], s.episodes, s.quick),
-        "libraries",
-        (*_TRAINING, "config", "cli", "conf", "benchmarks/peers"),
-    ),
-    "gymnasium": Benchmark(
-        lambda s: bench_gymnasium(s.batch_size, s.device, s.quick),
-        "libraries",
-        (*_RENDERING, "benchmarks/gymnasium"),
-    ),
-    "flight_speed": Benchmark(
-        lambda s: bench_flight_speed(s.quick), "flight", (*_COLLECTING, "benchmarks/flight_speed")
-    ),
-    "flight_parity": Benchmark(
-        lambda s: bench_flight_parity(s.quick), "flight", ("sim", "benchmarks/flight_parity")
-    ),
-    "flight_paths": Benchmark(
-        lambda s: bench_flight_paths(s.quick),
-        "flight",
-        ("sim", "flight/commands", "benchmarks/flight_paths"),
-    ),
-    "flight_moves": Benchmark(
-        lambda s: _flight_training(s, "flight", s.seeds),
-        "flight",
-        (*_TRAINING, "trust", "conf", "benchmarks/training"),
-    ),
-    "flight_velocity": Benchmark(
-        lambda s: _flight_training(s, "flight_velocity", s.seeds[:3]),
-        "flight",
-        (*_TRAINING, "trust", "conf", "benchmarks/training"),
-    ),
-    "flight_pillars": Benchmark(
-        lambda s: _flight_training(s, "flight_pillars", s.seeds[:3]),
-        "flight",
-        (*_TRAINING, "trust", "conf", "benchmarks/training"),
+    "flight_pillars": _benchmark(
+        bench_experiment, "flight", *_SOLVING, experiment="flight_pillars", num_seeds=3
     ),
 }
 GROUPS = tuple(dict.fromkeys(benchmark.group for benchmark in BENCHMARKS.values()))
 """Names of groups of benchmarks: main (speed and training), adversarial (correctness of claims),
-parallel (sweeps), verification, long (proofs of hours), libraries (third-party software), system
-(revisions and start-up time), flight (vehicle dynamics)."""
+parallel (sweeps), verification, libraries (third-party software), system (revisions and start-up
+time), long (trainings of hours), flight (vehicle dynamics)."""
 
 
 def find_benchmarks(names: Iterable[str]) -> list[str]:
@@ -359,11 +169,11 @@ def find_benchmarks(names: Iterable[str]) -> list[str]:
     Raises:
         InputError: A name is neither a benchmark's nor a group's.
     """
-    found: dict[str, None] = {}
+    selected: dict[str, None] = {}
     for name in names:
         matches = [n for n, b in BENCHMARKS.items() if name in (n, b.group)]
         if not matches:
-            known = ", ".join((*GROUPS, *BENCHMARKS))
-            raise InputError(f"benchmark {name!r} is unknown; use some of: {known}")
-        found |= dict.fromkeys(matches)
-    return list(found)
+            options = ", ".join((*GROUPS, *BENCHMARKS))
+            raise InputError(f"benchmark {name!r} is unknown; use some of: {options}")
+        selected |= dict.fromkeys(matches)
+    return list(selected)

@@ -20,6 +20,7 @@ import torch
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from benchmarks.benchmark import Setup
 from benchmarks.random_scenes import CAMERA, NEAR, NUDGED, SLICES, RandomScenes
 from drone_rl.sim.rendering import Poses, Raytracer, Scene, View
 from drone_rl.utils.errors import InputError
@@ -188,13 +189,13 @@ def summary(differences: Iterable[Difference]) -> dict[str, Any]:
     }
 
 
-def bench_render_truth(quick: bool) -> dict[str, Any]:
+def bench_render_truth(setup: Setup) -> dict[str, Any]:
     """Compare the renderers in 1,000 random scenes, 50 if quick.
 
     Raises:
         InputError: OpenGL is not available; an empty result could pass for a measurement.
     """
-    command = [sys.executable, "-m", "benchmarks.render_truth", "50" if quick else "1000"]
+    command = [sys.executable, "-m", "benchmarks.render_truth", "50" if setup.quick else "1000"]
     environment = {**os.environ, "MUJOCO_GL": "egl"}
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     if done.returncode != 0:

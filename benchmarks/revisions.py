@@ -7,12 +7,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from benchmarks.benchmark import Setup
 from benchmarks.commands import call
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_json
 
-BEFORE = "b3e55cd"
-"""The last revision before modules moved into packages by feature."""
+BEFORE = "c6d2d6dd"
+"""The last revision before the code base was made smaller."""
 NAMES = ("collector", "solve", "large", "memory", "explain", "startup")
 """Compared benchmarks."""
 COSTS = (
@@ -27,19 +28,11 @@ Pair = tuple[Mapping[str, float], Mapping[str, float]]
 _ROOT = Path(__file__).resolve().parents[1]
 
 
-def bench_revisions(
-    folder: Path, quick: bool, *, before: str = BEFORE, root: Path = _ROOT
-) -> dict[str, Any]:
+def bench_revisions(setup: Setup) -> dict[str, Any]:
     """Run each benchmark of both revisions, one after the other, and compare the pairs.
 
     Each revision runs its own benchmarks in separate processes. The two measurements of a pair
     are minutes apart, because the speed of a shared machine changes within an hour.
-
-    Args:
-        folder: Folder of the earlier tree and all results.
-        quick: Whether to run once in quick mode instead of three times.
-        before: The earlier revision, as git names it.
-        root: Checkout of the later revision.
 
     Returns:
         "ratio_before_after": cost ratio of each figure, see `compare`; "revisions": the figures
@@ -49,21 +42,21 @@ def bench_revisions(
         InputError: The earlier revision does not exist.
         RuntimeError: A benchmark failed.
     """
-    folder = folder.resolve()  # each revision runs in its own tree
-    trees = {"before": extract(before, folder / "before", root), "after": root}
+    folder = (setup.runs / "revisions").resolve()  # each revision runs in its own tree
+    trees = {"before": extract(BEFORE, folder / "before"), "after": _ROOT}
     pairs: list[Pair] = []
-    for i in range(1 if quick else 3):
-        for name in NAMES[:1] if quick else NAMES:
+    for i in range(1 if setup.quick else 3):
+        for name in NAMES[:1] if setup.quick else NAMES:
             of = {tree: folder / f"{name}_{tree}_{i}" for tree in trees}
-            both = {tree: measure(trees[tree], name, of[tree], quick) for tree in trees}
+            both = {tree: measure(trees[tree], name, of[tree], setup.quick) for tree in trees}
             pairs.append((both["before"], both["after"]))
     return {
         "ratio_before_after": compare(pairs),
-        "revisions": {"before": before, "pairs": [list(pair) for pair in pairs]},
+        "revisions": {"before": BEFORE, "pairs": [list(pair) for pair in pairs]},
     }
 
 
-def extract(revision: str, target: Path, root: Path = _ROOT) -> Path:
+def extract(revision: str, target: Path) -> Path:
     """Write the files of a revision into a folder, unless the folder exists.
 
     Raises:
@@ -74,7 +67,7 @@ def extract(revision: str, target: Path, root: Path = _ROOT) -> Path:
     archive = target.with_suffix(".tar")
     archive.parent.mkdir(parents=True, exist_ok=True)
     command = ["git", "archive", "--output", str(archive), revision]
-    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, cwd=_ROOT, capture_output=True, text=True, check=False)
     if done.returncode:
         raise InputError(f"git has no revision {revision}: {done.stderr.strip()}")
     with tarfile.open(archive) as files:

@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+from benchmarks.benchmark import Setup
 from benchmarks.commands import train
 from benchmarks.robust_comparison import PLAIN, by_kind, compare, mean, untouched_kinds
 from drone_rl.config import MINIMAL
@@ -41,13 +42,8 @@ _PARALLEL = 2
 _BRIEF = ("trainer.total_frames=1000", "trainer.confirm_episodes=0")
 
 
-def bench_robust(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, Any]:
+def bench_robust(setup: Setup) -> dict[str, Any]:
     """Train each arm from each seed and evaluate all policies along all axes.
-
-    Args:
-        folder: Folder of the runs.
-        seeds: Seeds of the trainings; a gain compares two policies of the same seed.
-        quick: Whether to train only one seed, briefly.
 
     Returns:
         In percentage points, means over seeds: "robust_gain_points" under new kinds of shift,
@@ -56,7 +52,8 @@ def bench_robust(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, A
         "robust_arms": by arm, lists over seeds of "frames", "plain", "untouched" and the mean
         success rate under each kind.
     """
-    seeds, brief = (seeds[:1], _BRIEF) if quick else (seeds, ())
+    folder = setup.runs / "robust"
+    seeds, brief = setup.seeds[:3], _BRIEF if setup.quick else ()
     runs = {
         (arm, seed): folder / f"{arm.replace(' ', '_')}_{seed}" for arm in ARMS for seed in seeds
     }
@@ -68,7 +65,7 @@ def bench_robust(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, A
     with ThreadPoolExecutor(_PARALLEL) as pool:
         frames = dict(zip(runs, pool.map(train_run, runs), strict=True))
     kinds = untouched_kinds(settings_of(read_checkpoint(last_of(runs[ALL, seeds[0]]))["config"]))
-    shares = success_rates(runs.values(), 5, 1) if quick else success_rates(runs.values(), 100)
+    shares = success_rates(runs.values(), *((5, 1) if setup.quick else (100,)))
     rows = {arm: [_row(shares[runs[arm, s]], kinds) for s in seeds] for arm in ARMS}
     return {
         **_points(rows[DEFAULT], rows[ALL]),

@@ -7,42 +7,44 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.benchmark import Setup
 from benchmarks.pipeline import make_drone_env, random_walk
 from drone_rl.config import CameraSettings
 from drone_rl.utils.palette import INK, MUTED, css
 
 
-def bench_scaling(folder: Path, device: str, quick: bool) -> dict[str, Any]:
+def bench_scaling(setup: Setup) -> dict[str, Any]:
     """Measure the time of random rollouts for several sizes and plot it to scaling.png.
 
     Time must grow linearly with the numbers of environments, frames, cubes and pixels.
 
-    Args:
-        folder: Folder of the plot.
-        device: See `Setup`.
-        quick: See `Setup`.
-
     Returns:
         For each of the four the sizes, the seconds and the R² of a straight line.
     """
-    num_envs = (32, 64, 128) if quick else (32, 64, 128, 256, 512)
-    cubes = (1, 4, 8) if quick else (1, 2, 4, 8, 16)
-    larger = range(1, 4 if quick else 6)
+    num_envs = (32, 64, 128) if setup.quick else (32, 64, 128, 256, 512)
+    cubes = (1, 4, 8) if setup.quick else (1, 2, 4, 8, 16)
+    larger = range(1, 4 if setup.quick else 6)
     cameras = [CameraSettings(width=64 * k, height=25 * k) for k in larger]
-    steps = 5 if quick else 20
+    steps = 5 if setup.quick else 20
     series = {
-        "environments": {n: _seconds(make_drone_env(n, device), steps, quick) for n in num_envs},
-        "frames": {
-            64 * k * steps: _seconds(make_drone_env(64, device), k * steps, quick)
-            for k in ((1, 2, 3) if quick else (1, 2, 4, 8))
+        "environments": {
+            n: _seconds(make_drone_env(n, setup.device), steps, setup.quick) for n in num_envs
         },
-        "cubes": {n: _seconds(make_drone_env(128, device, n), steps, quick) for n in cubes},
+        "frames": {
+            64 * k * steps: _seconds(make_drone_env(64, setup.device), k * steps, setup.quick)
+            for k in ((1, 2, 3) if setup.quick else (1, 2, 4, 8))
+        },
+        "cubes": {
+            n: _seconds(make_drone_env(128, setup.device, n), steps, setup.quick) for n in cubes
+        },
         "pixels": {
-            c.width * c.height: _seconds(make_drone_env(128, device, camera=c), steps, quick)
+            c.width * c.height: _seconds(
+                make_drone_env(128, setup.device, camera=c), steps, setup.quick
+            )
             for c in cameras
         },
     }
-    _plot(series, folder / "scaling.png")
+    _plot(series, setup.folder / "scaling.png")
     results = {}
     for name, points in series.items():
         sizes, seconds = list(points), list(points.values())

@@ -3,16 +3,14 @@
 import time
 from typing import Any
 
+from benchmarks.benchmark import Setup
 from drone_rl.config.commands import ShiftSettings
 from drone_rl.trust.shifts import shifts
 from drone_rl.utils.progress import silent
 
 
-def bench_shifts(quick: bool) -> dict[str, Any]:
+def bench_shifts(setup: Setup) -> dict[str, Any]:
     """Evaluate the shipped good policy under every perturbation.
-
-    Args:
-        quick: Whether to run few episodes and skip the operating domain.
 
     Returns:
         "shift_suite_s": seconds to load the policy and evaluate all axes at five constant strengths
@@ -21,7 +19,7 @@ def bench_shifts(quick: bool) -> dict[str, Any]:
         about the operating domain.
     """
     begin = time.perf_counter()
-    episodes = 20 if quick else 200
+    episodes = 20 if setup.quick else 200
     settings = ShiftSettings(seed=0, modes=("constant",))
     suite = shifts("good", settings, episodes=episodes, domain=False, progress=silent)
     seconds = time.perf_counter() - begin
@@ -30,7 +28,7 @@ def bench_shifts(quick: bool) -> dict[str, Any]:
         "shift_suite_axes": len(suite.numbers["axes"]),
         "shift_area": suite.area,
     }
-    if not quick:
+    if not setup.quick:
         complete = shifts("good", settings, strengths=[5], progress=silent)
         found["shift_domain"] = complete.sentence
     return found

@@ -10,6 +10,7 @@ from typing import Any
 
 import torch
 
+from benchmarks.benchmark import Setup
 from benchmarks.pipeline import default_collector, make_drone_env, paired, random_walk, rate
 from drone_rl.config import AppearanceSettings
 from drone_rl.envs import DroneEnv
@@ -41,27 +42,22 @@ _COLLECTED = (16, 32, 64, 128, 256)
 """Batch sizes at which the collector is measured."""
 
 
-def bench_render(num_envs: int, device: str, quick: bool) -> dict[str, Any]:
+def bench_render(setup: Setup) -> dict[str, Any]:
     """Measure the renderer on a batch of environments, on all cores.
-
-    Args:
-        num_envs: Number of environments in the batch.
-        device: See `Setup`.
-        quick: See `Setup`.
 
     Returns:
         Frames per second at 25x64 and 64x64 pixels, and at 64x64 with `appearance=blocks`; the
         speed relative to MuJoCo Warp's renderer; the time of a pass with all modalities divided by
         that of an RGB pass.
     """
-    seconds = 0.5 if quick else 10.0
-    env = make_drone_env(num_envs, device)
+    seconds = 0.5 if setup.quick else 10.0
+    env = make_drone_env(setup.num_envs, setup.device)
     env.reset()
     frames = rate(partial(_render, env.worlds), seconds)
     larger = partial(_render, env.worlds, env.worlds.view(height=64, width=64))
     frames_64 = rate(larger, seconds)
     env.close()
-    blocks = make_drone_env(num_envs, device, appearance=BLOCKS)
+    blocks = make_drone_env(setup.num_envs, setup.device, appearance=BLOCKS)
     blocks.reset()
     frames_blocks = rate(partial(_render_appearance, blocks), seconds)
     blocks.close()
@@ -69,8 +65,10 @@ def bench_render(num_envs: int, device: str, quick: bool) -> dict[str, Any]:
         "raw_render_fps": frames,
         "raw_render_fps_64": frames_64,
         "raw_render_blocks_fps_64": frames_blocks,
-        "render_over_warp": {f"{h}x{w}": _over_warp(h, w, device, seconds / 10) for h, w in SIZES},
-        "render_all_over_rgb": _all_over_rgb(device, seconds / 20),
+        "render_over_warp": {
+            f"{h}x{w}": _over_warp(h, w, setup.device, seconds / 10) for h, w in SIZES
+        },
+        "render_all_over_rgb": _all_over_rgb(setup.device, seconds / 20),
     }
 
 
@@ -118,32 +116,27 @@ def _render(worlds: Worlds, view: View | None = None) -> int:
     return len(next(iter(images.values())))
 
 
-def bench_collector(num_envs: int, device: str, quick: bool) -> dict[str, Any]:
+def bench_collector(setup: Setup) -> dict[str, Any]:
     """Measure the default collector, with policy and transforms.
 
     It is compared with MuJoCo Warp's renderer, which limited the speed before the ray tracer.
-
-    Args:
-        num_envs: Number of environments that MuJoCo Warp renders.
-        device: See `Setup`.
-        quick: See `Setup`.
 
     Returns:
         Frames per second at the fastest batch size, this size, frames per second with 16
         environments, those of MuJoCo Warp, and the ratio to these.
     """
-    seconds = 0.5 if quick else 4.0
-    rates = {count: _collected(count, device, seconds) for count in _COLLECTED}
+    seconds = 0.5 if setup.quick else 4.0
+    rates = {count: _collected(count, setup.device, seconds) for count in _COLLECTED}
     best = max(rates, key=lambda count: rates[count])
-    env = make_drone_env(num_envs, device, renderer="mujoco_warp")
+    env = make_drone_env(setup.num_envs, setup.device, renderer="mujoco_warp")
     env.reset()
-    collector = default_collector(best, device)
+    collector = default_collector(best, setup.device)
     collector.collect()
     collected, rendered, ratio = paired(
         lambda: len(collector.collect()),
         lambda: _render(env.worlds),
         seconds=seconds,
-        rounds=1 if quick else 9,
+        rounds=1 if setup.quick else 9,
     )
     collector.shutdown()
     env.close()
@@ -165,10 +158,10 @@ def _collected(num_envs: int, device: str, seconds: float) -> float:
     return collected
 
 
-def bench_dm_control(num_envs: int, device: str, quick: bool) -> dict[str, Any]:
+def bench_dm_control(setup: Setup) -> dict[str, Any]:
     """Compare the batched environment with dm_control's pixel observations, default and tuned."""
-    env = make_drone_env(num_envs, device)
-    seconds = 0.5 if quick else 5.0
+    env = make_drone_env(setup.num_envs, setup.device)
+    seconds = 0.5 if setup.quick else 5.0
     results: dict[str, Any] = {}
     random_walk(env, 2)
     for quality, name in (("default", ""), ("tuned", "_tuned")):

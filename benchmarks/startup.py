@@ -7,6 +7,7 @@ import sys
 import time
 from pathlib import Path
 
+from benchmarks.benchmark import Setup
 from benchmarks.commands import PROGRAM, call
 
 _IMPORT = "import time; t = time.perf_counter(); import {}; print(time.perf_counter() - t)"
@@ -16,13 +17,8 @@ _POLL_S = 0.005
 """Seconds between two checks for the first update."""
 
 
-def bench_startup(folder: Path, device: str, quick: bool) -> dict[str, float]:
+def bench_startup(setup: Setup) -> dict[str, float]:
     """Measure start-up times with cached kernels; medians of three.
-
-    Args:
-        folder: Working folder of the commands.
-        device: Device of the commands.
-        quick: Whether to measure once.
 
     Returns:
         "import_s" of the package, "start_to_first_update_s" of `drone-rl train`, "first_compile_s"
@@ -30,12 +26,13 @@ def bench_startup(folder: Path, device: str, quick: bool) -> dict[str, float]:
         with its 400 episodes; "import_torch_s", a measure of the machine's speed, and the three
         times scaled to a machine on which it is 1 s.
     """
-    times = range(1 if quick else 3)
+    folder = setup.runs / "startup"
+    times = range(1 if setup.quick else 3)
     import_seconds()  # compiles Python files
-    first_update_seconds(folder / "warm", device)  # compiles kernels
-    cold = first_update_seconds(folder / "cold", device, folder / "kernels")
-    updates = [first_update_seconds(folder / f"update_{i}", device) for i in times]
-    verdicts = [verdict_seconds(folder / f"verdict_{i}", device) for i in times]
+    first_update_seconds(folder / "warm", setup.device)  # compiles kernels
+    cold = first_update_seconds(folder / "cold", setup.device, folder / "kernels")
+    updates = [first_update_seconds(folder / f"update_{i}", setup.device) for i in times]
+    verdicts = [verdict_seconds(folder / f"verdict_{i}", setup.device) for i in times]
     torch_s = statistics.median(import_seconds("torch") for _ in times)
     update_s, verdict_s = statistics.median(updates), statistics.median(verdicts)
     return {

@@ -20,7 +20,7 @@ def view(outputs):
     camera = structs_kernel.Camera()
     camera.attitude = wp.vec4(1.0, 0.0, 0.0, 0.0)
     camera.half_width = camera.half_height = 1.0
-    result = structs_kernel.View()
+    result = structs_kernel.ViewArrays()
     result.count = 1
     rays = make_rays(camera, SIZE, SIZE).reshape(1, -1, 3)
     result.cameras = array([camera], structs_kernel.Camera)
@@ -41,7 +41,7 @@ def geoms(*depths, numbers=(3,)):
 
 
 def poses():
-    result = structs_kernel.Poses()
+    result = structs_kernel.PoseArrays()
     result.positions = array([[[0.0, 0.0, 0.0]]], wp.vec3)
     result.attitudes = array([[1.0, 0.0, 0.0, 0.0]], wp.vec4)
     return result

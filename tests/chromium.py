@@ -4,7 +4,7 @@ from contextlib import ExitStack, contextmanager
 
 import pytest
 
-from benchmarks.injections import chromium
+from benchmarks.browser import chromium
 from drone_rl.utils.errors import InputError
 
 

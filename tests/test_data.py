@@ -13,8 +13,8 @@ from drone_rl.utils.batch import Batch
 from tools.readme.settings import list_commands, list_groups, list_parts
 
 MUTABLE = {
-    "evaluation.metrics:Episodes",
-    "evaluation.rollouts:StepLog",
+    "collectors.complete_episodes:CompleteEpisodes",
+    "collectors.complete_episodes:StepLog",
     "explanations.class_models:Attempts",
     "explanations.class_models:ClassModel",
     "explanations.heat_maps:Explainer",
@@ -23,11 +23,11 @@ MUTABLE = {
     "explanations.response:OutcomeMap",
     "explanations.response:ResponseMap",
     "explanations.rollouts:RolloutDataset",
-    "robustness.domain:End",
+    "trust.domain:End",
     "sweeps.figures:Layout",
     "sweeps.manifest:Sweep",
     "sweeps.rows:Row",
-    "sweeps.summary:Group",
+    "sweeps.summary:RunGroup",
     "training.callbacks:Progress",
     "training.learners:ActorCriticLearner",
     "training.learners:GradientLearner",

@@ -15,7 +15,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
 import drone_rl
-from benchmarks.injections import chromium
+from benchmarks.browser import chromium
 
 SIZE, WIDTH = (1300, 1040), 800
 """Pixels of the browser's window, and the width of the film."""

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from benchmarks.benchmark import Setup
 from benchmarks.commands import train
 from benchmarks.peers.plot import plot
 from benchmarks.peers.program import success_lower95
@@ -19,7 +20,7 @@ from drone_rl.training.run_folder import Training
 Measured = dict[str, Any]
 
 
-def bench_peers(folder: Path, seeds: Sequence[int], episodes: int, quick: bool) -> dict[str, Any]:
+def bench_peers(setup: Setup) -> dict[str, Any]:
     """Train each learner from each seed until solved, and evaluate it on held-out episodes.
 
     The time of this project's learners is that of the whole command with all its files. The time of
@@ -27,24 +28,19 @@ def bench_peers(folder: Path, seeds: Sequence[int], episodes: int, quick: bool) 
     that all have their files in the disk cache. The learners alternate for each seed, so that a
     drift of the machine's speed affects all of them.
 
-    Args:
-        folder: Folder of the runs; the plot is written two levels above.
-        seeds: Seeds of environments, weights and actions.
-        episodes: Number of held-out episodes.
-        quick: Whether to train only a few frames.
-
     Returns:
         "peers": by name, lists by seed of "seconds" from the start of the process,
         "seconds_without_imports", "frames", "is_solved", "success_lower95".
         "solve_over_best_peer": mean "seconds" of the default divided by that of the fastest
         third-party learner.
     """
-    if not quick:  # fill the disk cache
+    folder = setup.runs / "peers"
+    if not setup.quick:  # fill the disk cache
         for start in _trainings(folder / "starts", 0, quick=True).values():
-            start(seed=seeds[0])
-    trainings = _trainings(folder, episodes, quick)
+            start(seed=setup.seeds[0])
+    trainings = _trainings(folder, setup.episodes, setup.quick)
     found: dict[str, dict[str, list]] = {name: {} for name in trainings}
-    for seed in seeds[:1] if quick else seeds:
+    for seed in setup.seeds[:3]:
         for name, measure in trainings.items():
             for key, value in measure(seed=seed).items():
                 found[name].setdefault(key, []).append(value)

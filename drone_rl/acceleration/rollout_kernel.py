@@ -15,9 +15,9 @@ from drone_rl.sim.rendering.raytrace.structs_kernel import (
     Geoms,
     Images,
     Materials,
-    Poses,
+    PoseArrays,
     Scratch,
-    View,
+    ViewArrays,
 )
 
 TOGETHER = wp.constant(16)
@@ -31,11 +31,11 @@ wp.set_module_options(_OPTIONS)
 class CameraView:
     """What is needed to render a frame and standardize it."""
 
-    view: View
+    view: ViewArrays
     geoms: Geoms
     materials: Materials
     scratch: Scratch
-    poses: Poses
+    poses: PoseArrays
     mean: float
     """Subtracted from each pixel."""
     deviation: float

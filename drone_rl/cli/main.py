@@ -95,7 +95,7 @@ def _main(args: list[str]) -> int:
         return 0
     name, overrides = args[0], args[1:]
     if name not in ("demo", *COMMANDS):
-        from drone_rl.cli.hydra.words import no_command  # slow: imports Hydra
+        from drone_rl.cli.hydra.mistakes import no_command  # slow: imports Hydra
 
         print(f"error: {no_command(name, overrides, ['demo', *COMMANDS])}", file=sys.stderr)
         return USER_ERROR

@@ -1,4 +1,4 @@
-"""`drone-rl policies`: list policies and their verdicts."""
+"""`drone-rl policies` and `convert`: list policies and their verdicts; convert older files."""
 
 import time
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import drone_rl
-from drone_rl.cli.settings import CommandSettings
+from drone_rl.cli.settings import CommandSettings, with_name
 from drone_rl.utils.display import aligned
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import trained_policies
@@ -55,6 +55,30 @@ class PoliciesCommand(CommandSettings):
         if not newest:
             print(f"no trained policies under {self.paths.outputs}/train; run drone-rl train")
         return 0, None
+
+
+class ConvertCommand(CommandSettings):
+    """Settings of `drone-rl convert`."""
+
+    policy: str = "latest"
+    """Policy of an older version: a .pt or .safetensors file, the folder of a run, or latest."""
+    output: str | None = None
+    """The new file; null for NAME_converted next to the old one."""
+
+    @classmethod
+    def prepare(cls, overrides: Sequence[str]) -> list[str]:
+        """Translate `drone-rl convert FILE` to `policy=FILE`; the command has no folder."""
+        return [*with_name(overrides, "policy"), *_NO_RUN_FOLDER]
+
+    def run(self, folder: Path) -> tuple[int, str]:
+        """Convert one file; return the exit status and the path of the new file."""
+        from drone_rl.policies.convert import convert_policy  # imports torch
+        from drone_rl.policies.zoo import find_policy
+
+        output = None if self.output is None else Path(self.output)
+        output = convert_policy(find_policy(self.policy, self.paths.outputs), output)
+        print(f"written: {output}")
+        return 0, str(output)
 
 
 def _short(row: Sequence[str]) -> Sequence[str]:

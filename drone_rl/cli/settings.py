@@ -1,16 +1,14 @@
 """Base classes of the commands and their settings."""
 
 import logging
-import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import drone_rl
 from drone_rl.config.commands import PathsSettings
 from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.utils.files import trained_policies
-from drone_rl.utils.overrides import with_current_name
 from drone_rl.utils.settings import Settings
 
 _log = logging.getLogger(__name__)
@@ -24,8 +22,8 @@ class CommandSettings(Settings):
 
     @classmethod
     def prepare(cls, overrides: Sequence[str]) -> list[str]:
-        """Translate former names on a command line before Hydra composes it."""
-        return [re.sub(r"^checkpoint=", "policy=", with_current_name(o)) for o in overrides]
+        """Return the command line that Hydra composes."""
+        return [*overrides]
 
     def run(self, folder: Path) -> tuple[int, object]:
         """Run the command; return the exit status and the value that a sweep maximises."""
@@ -42,6 +40,24 @@ class CommandSettings(Settings):
         which = which if isinstance(which, str) else which[0]
         trained = trained_policies(self.paths.outputs) if which == "latest" else []
         return str(trained[0].parents[1]) if trained else which
+
+    def with_policy_of_now(self, folder: Path) -> Self:
+        """Replace policy=latest by the run that it selects now: another may be the newest soon."""
+        which, used = getattr(self, "policy", None), self.used_policy(folder)
+        if which not in ("latest", ("latest",)) or used == "latest":
+            return self
+        _log.info("policy=latest is %s", used)
+        return self.replace(policy=used if which == "latest" else (used,))
+
+
+def with_name(overrides: Sequence[str], setting: str) -> list[str]:
+    """Return a command line on which a value without a name is that of `setting`."""
+    from drone_rl.sweeps.manifest import quoted
+
+    return [
+        o if "=" in o.split("/")[0] or o.startswith("-") else f"{setting}={quoted(o)}"
+        for o in overrides
+    ]
 
 
 class PolicyCommandSettings(CommandSettings):

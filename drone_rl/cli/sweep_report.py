@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
-from drone_rl.cli.settings import CommandSettings
+from drone_rl.cli.settings import CommandSettings, with_name
 from drone_rl.utils.schema import Whole
 
 _log = logging.getLogger(__name__)
@@ -28,12 +28,7 @@ class SweepReportCommand(CommandSettings):
     @classmethod
     def prepare(cls, overrides: Sequence[str]) -> list[str]:
         """Translate `drone-rl sweep-report FOLDER` to `folder=FOLDER`."""
-        from drone_rl.sweeps.manifest import quoted
-
-        return [
-            o if "=" in o.split("/")[0] or o.startswith("-") else f"folder={quoted(o)}"
-            for o in overrides
-        ]
+        return with_name(overrides, "folder")
 
     def run(self, folder: Path) -> tuple[int, None]:
         """Report on a sweep, finished or not; return the exit status."""

@@ -24,7 +24,6 @@ from drone_rl.utils.schema import as_mapping, shown
 from drone_rl.utils.settings import (
     Settings,
     check_names,
-    current_names,
     kinds_of,
     plain,
     prefixed_errors,
@@ -81,11 +80,11 @@ class Variant(Settings):
     @classmethod
     def variants(cls) -> tuple[type[Self], ...]:
         """Return all variants of this part."""
-        found = []
+        variants = []
         for sub in cls.__subclasses__():
-            found += [sub] if "target" in vars(sub) and sub.is_known else []
-            found += sub.variants()
-        return tuple(found)
+            variants += [sub] if "target" in vars(sub) and sub.is_known else []
+            variants += sub.variants()
+        return tuple(variants)
 
     @classmethod
     def named(cls, name: object, where: str) -> type[Self]:
@@ -150,7 +149,7 @@ def from_config(cls: type[S], config: Any, where: str = "") -> S:
     Raises:
         InputError: A name is unknown or a value invalid; the message begins with its place.
     """
-    given = current_names(cls, as_mapping(config, where or "settings"))
+    given = as_mapping(config, where or "settings")
     prefix = f"{where}." if where else ""
     check_names(cls, given, prefix)
     values = {name: _read(types_of(cls)[name], given[name], prefix + name) for name in given}
@@ -175,13 +174,13 @@ def variant_of(part: type[Variant], config: Any, where: str) -> Variant:
     if not isinstance(target, str):
         must = "must be a registered name or a dotted class name"
         raise InputError(f"{where}._target_ {must}, got {shown(target)}")
-    known = next((v for v in part.variants() if v.target == target), part)
-    if known is part and "." not in target:
-        known = part.named(target, f"{where}._target_")
-    if known is not part and values.keys() <= kinds_of(known).keys():
-        return from_config(known, values, where)
+    variant = next((v for v in part.variants() if v.target == target), part)
+    if variant is part and "." not in target:
+        variant = part.named(target, f"{where}._target_")
+    if variant is not part and values.keys() <= kinds_of(variant).keys():
+        return from_config(variant, values, where)
     with prefixed_errors(where):
-        return _unregistered(known, target, values)
+        return _unregistered(variant, target, values)
 
 
 def _plain(value: Any, is_several: bool) -> Any:
@@ -233,8 +232,8 @@ def _with_target(part: type[Variant], name: str, value: Any) -> Any:
     """Add "_target_" to an entry of `transforms` or `logger` whose key is a registered name."""
     if not isinstance(value, Mapping) or "_target_" in value:
         return value
-    known = next((v for v in part.variants() if v.registered_name() == name), None)
-    return value if known is None else {"_target_": known.target, **value}
+    variant = next((v for v in part.variants() if v.registered_name() == name), None)
+    return value if variant is None else {"_target_": variant.target, **value}
 
 
 def _unregistered(part: type[Variant], target: str, given: Mapping[str, Any]) -> Variant:
@@ -266,24 +265,24 @@ class Changes:
 
     def read(self, value: Any, where: str) -> dict[str, Any]:
         """See `drone_rl.utils.schema.Kind`."""
-        given = as_mapping(value, where)
+        changes = as_mapping(value, where)
         own = getattr(self.of, "name", None)
-        if own and "name" in given and "name" not in self.types:
-            if given["name"] != own:
+        if own and "name" in changes and "name" not in self.types:
+            if changes["name"] != own:
                 raise InputError(
-                    f"{where}.name={shown(given['name'])} would replace the task, which is {own}; "
-                    "give values of that task's settings"
+                    f"{where}.name={shown(changes['name'])} would replace the task, which is "
+                    f"{own}; give values of that task's settings"
                 )
-            given = {name: v for name, v in given.items() if name != "name"}
-        for name in given:
+            changes = {name: v for name, v in changes.items() if name != "name"}
+        for name in changes:
             if name not in self.types:
-                known, meant = ", ".join(self.types), did_you_mean(name, self.types)
-                raise InputError(f"{where}.{name} is unknown; valid names: {known}{meant}")
-        given = {name: v for name, v in given.items() if v is not None}
+                names, meant = ", ".join(self.types), did_you_mean(name, self.types)
+                raise InputError(f"{where}.{name} is unknown; valid names: {names}{meant}")
+        changes = {name: v for name, v in changes.items() if v is not None}
         if self.of is None:
-            return given
+            return changes
         kinds = kinds_of(self.of)
-        return {name: kinds[name].read(v, f"{where}.{name}") for name, v in given.items()}
+        return {name: kinds[name].read(v, f"{where}.{name}") for name, v in changes.items()}
 
 
 def as_changes(value: Any, where: str) -> Mapping[str, Any]:
@@ -320,7 +319,7 @@ def from_arguments(
             f"settings={shown(settings)} is no {of.__name__}; give settings by name, such as "
             f"{next(iter(kinds_of(of)))}=...{several}"
         )
-    given = of() if settings is None else settings
+    base = of() if settings is None else settings
     parameters = inspect.signature(function).parameters.values()
     others = [p.name for p in parameters if p.kind is inspect.Parameter.KEYWORD_ONLY]
     groups = {"task": Changes(), "dynamics": Changes(DynamicsSettings)}
@@ -329,13 +328,8 @@ def from_arguments(
         if group in others:
             text = f"{group}={{{name!r}: {shown(changes[name])}}}"
             raise InputError(f"{name} is a setting of {group}; give {text}")
-        if group and any(p.name == "policy" for p in parameters):
-            text = f"load_policy(...).in_{group}({name}={shown(changes[name])})"
-            raise InputError(f"{name} is a setting of {group}; give {text}")
-    if "plugins" in changes:
-        raise InputError("plugins belongs to the command line; in Python, import the modules")
     check_names(of, changes, others=others, synonyms=read_other_names()["settings"])
-    return given.replace(**changes)
+    return base.replace(**changes)
 
 
 TaskChanges = Annotated[Mapping[str, Any], Changes()]

@@ -19,7 +19,7 @@ import math
 import re
 import types
 import typing
-from collections.abc import Callable, Set
+from collections.abc import Callable, Mapping, Set
 from typing import Annotated, Any, NamedTuple, TypeVar, cast
 
 from drone_rl.config.configuration import Variant
@@ -105,8 +105,8 @@ def register_transform(
     `output` maps the input's `Frame` and the settings to the output's `Frame`. By default, the
     shape is that of two transformed images. See `register_network` for errors.
     """
-    own = {"output": lambda self, frame: output(frame, self) if output else None}
-    return _decorator(Transform, name, 0, _KEYS, own)
+    methods = {"output": lambda self, frame: output(frame, self) if output else None}
+    return _decorator(Transform, name, 0, _KEYS, methods)
 
 
 def register_returns(name: str) -> Callable[[F], F]:
@@ -156,8 +156,8 @@ def modules_of(settings: Any) -> set[str]:
     if not isinstance(settings, Settings):
         return set()
     values = (getattr(settings, field.name) for field in dataclasses.fields(settings))
-    own = type(settings).__module__
-    return modules_of(tuple(values)) | ({own} if not own.startswith("drone_rl.") else set())
+    module = type(settings).__module__
+    return modules_of(tuple(values)) | ({module} if not module.startswith("drone_rl.") else set())
 
 
 def _decorator(
@@ -165,9 +165,14 @@ def _decorator(
     name: Any,
     positional: int,
     skipped: Set[str] = frozenset(),
-    own: dict[str, Any] | None = None,
+    methods: Mapping[str, Any] | None = None,
 ) -> Callable[[F], F]:
-    """Return the decorator of a part; the arguments are those of `_register`."""
+    """Return a decorator that creates the settings class of a part and connects it with the part.
+
+    `positional` are the number of arguments of the factory that are no settings, `skipped` the
+    names of further ones, and `methods` those of the settings class.
+    """
+    kind = part.__name__.lower()
     if not isinstance(name, str):
         example = f'@drone_rl.{_BASES[part].decorator}("mine")'
         raise InputError(f"give a name in brackets, as in {example}")
@@ -175,58 +180,51 @@ def _decorator(
         raise InputError(f"name={name!r} is invalid; give lower-case letters, digits and _")
 
     def register(factory: F) -> F:
-        given, base = cast(Any, factory), _BASES[part]
-        if base.own and isinstance(given, type) and not hasattr(given, base.own):
+        code, base = cast(Any, factory), _BASES[part]
+        if base.own and isinstance(code, type) and not hasattr(code, base.own):
             raise InputError(
-                f"{given.__name__} does not derive from {base.name}; derive it from there"
+                f"{code.__name__} does not derive from {base.name}; derive it from there"
             )
-        return _register(part, name, factory, positional, skipped, own)
+        _free_name(part, name, factory.__module__)
+        fields = _fields(name, factory, positional, skipped)
+        taken = {*dir(part), "target"} - {field.name for field in dataclasses.fields(part)}
+        for field, _, _ in fields:
+            if field in taken:
+                raise InputError(
+                    f"{name}: the parameter {field} has the name of an attribute of settings; "
+                    "rename it"
+                )
+        inherited = part.__dataclass_fields__.keys() if part is Returns else set()
+        names = {*(field for field, _, _ in fields), *inherited}
+        namespace = {
+            **{field: default for field, _, default in fields},
+            **(methods or {}),
+            "__annotations__": {field: hint for field, hint, _ in fields},
+            "__doc__": (inspect.getdoc(factory) or name).split("\n")[0],
+            "__module__": factory.__module__,
+            "target": name,
+            "factory": staticmethod(_checked(factory, f"{kind}={name}", base)),
+            "arguments": lambda self: {n: v for n, v in self.values().items() if n in names},
+        }
+        code.Settings = type(name.title().replace("_", ""), (part,), namespace)
+        return factory
 
     return register
 
 
-def _register(
-    part: type[Variant],
-    name: str,
-    factory: F,
-    positional: int,
-    skipped: Set[str] = frozenset(),
-    own: dict[str, Any] | None = None,
-) -> F:
-    """Create the settings class of a part and connect it with its factory."""
+def _free_name(part: type[Variant], name: str, module: str) -> None:
+    """Remove a part of this name whose module is imported again; refuse the names of others."""
     for variant in part.variants():
-        if variant.registered_name() == name:
-            if variant.__module__.startswith("drone_rl."):
-                raise InputError(f"{part.__name__.lower()}={name} is built in; give another name")
-            modules = {variant.__module__, factory.__module__}
-            if len(modules) > 1 and "__main__" not in modules:
-                raise InputError(
-                    f"{part.__name__.lower()}={name} is registered by {variant.__module__}, too; "
-                    "give another name"
-                )
-            del variant.target  # its module was imported again; the new part replaces the old one
-    fields = _fields(name, factory, positional, skipped)
-    for field, _, _ in fields:
-        if field in {*dir(part), "target"} - {own.name for own in dataclasses.fields(part)}:
+        if variant.registered_name() != name:
+            continue
+        kind = part.__name__.lower()
+        if variant.__module__.startswith("drone_rl."):
+            raise InputError(f"{kind}={name} is built in; give another name")
+        if len({variant.__module__, module}) > 1 and "__main__" not in (variant.__module__, module):
             raise InputError(
-                f"{name}: the parameter {field} has the name of an attribute of settings; rename it"
+                f"{kind}={name} is registered by {variant.__module__}, too; give another name"
             )
-    inherited = part.__dataclass_fields__.keys() if part is Returns else set()
-    names = {*(field for field, _, _ in fields), *inherited}
-    namespace = {
-        **{field: default for field, _, default in fields},
-        **(own or {}),
-        "__annotations__": {field: hint for field, hint, _ in fields},
-        "__doc__": (inspect.getdoc(factory) or name).split("\n")[0],
-        "__module__": factory.__module__,
-        "target": name,
-        "factory": staticmethod(_checked(factory, f"{part.__name__.lower()}={name}", _BASES[part])),
-        "arguments": lambda self: {n: v for n, v in self.values().items() if n in names},
-    }
-    settings = type(name.title().replace("_", ""), (part,), namespace)
-    vars_of: Any = factory
-    vars_of.Settings = settings
-    return factory
+        del variant.target
 
 
 def _checked(factory: Callable[..., Any], what: str, base: _Base) -> Callable[..., Any]:
@@ -258,7 +256,7 @@ def _fields(
     every = list(inspect.signature(factory).parameters.values())
     plain = [p for p in every if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
     parameters = [p for p in every if p not in plain[:positional]]
-    found = []
+    fields = []
     for parameter in parameters:
         is_star = parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
         if is_star or parameter.name in skipped:
@@ -270,8 +268,8 @@ def _fields(
             )
         hint = _annotated(hints[parameter.name], f"{name}: the parameter {parameter.name}")
         default = parameter.default
-        found.append((parameter.name, hint, tuple(default) if type(default) is list else default))
-    return found
+        fields.append((parameter.name, hint, tuple(default) if type(default) is list else default))
+    return fields
 
 
 def _annotated(hint: Any, where: str) -> Any:

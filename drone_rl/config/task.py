@@ -70,9 +70,9 @@ def add_task(settings: S) -> S:
 def settings_of(name: object, where: str = "task.name") -> type[BaseTaskSettings]:
     """Return the class of a task's settings; `where` is the setting's name for messages."""
     if not isinstance(name, str) or name not in TASKS:
-        known, meant = ", ".join(TASKS), did_you_mean(name, TASKS)
+        names, meant = ", ".join(TASKS), did_you_mean(name, TASKS)
         raise InputError(
-            f"{where}={shown(name)} is unknown; valid names: {known}; if a module of yours "
+            f"{where}={shown(name)} is unknown; valid names: {names}; if a module of yours "
             f"registers it, add plugins=[MODULE], or import it in Python{meant}"
         )
     return TASKS[name]

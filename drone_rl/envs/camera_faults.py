@@ -1,8 +1,7 @@
 """Camera faults as TorchRL transforms."""
 
-import dataclasses
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -61,17 +60,17 @@ class CameraFault(ObservationTransform):
         images = self._checked(tensordict_reset.get("pixels"))
         mask = tensordict.get("_reset", None) if self._fits(images) else None
         self._begin(_indices(mask, images), images)
-        return self._shown(tensordict_reset, images)
+        return self._show(tensordict_reset, images)
 
     def _step(self, tensordict: TensorDictBase, next_tensordict: TensorDictBase) -> TensorDictBase:
         images = next_tensordict.get("pixels")
         if self._memory is None or not self._fits(images):
             raise InputError(f"{type(self).__name__} got a step before any reset; call reset()")
         envs = _indices(tensordict.get("_step", None), images)
-        before = _rows(self._memory.to(images.device), envs)
+        before = self._memory.to(images.device)[envs]
         sample = _sampler([self._streams[i] for i in envs.tolist()], images.device)
-        self._remember(envs, self.model.update(before, _rows(images, envs), sample))
-        return self._shown(next_tensordict, images)
+        self._remember(envs, self.model.update(before, images[envs], sample))
+        return self._show(next_tensordict, images)
 
     def _fits(self, images: Tensor) -> bool:
         """Return whether the memory has as many environments as the images."""
@@ -83,7 +82,7 @@ class CameraFault(ObservationTransform):
         self._streams = [begun.get(i) or self._streams[i] for i in range(len(images))]
         if begun:
             sample = _sampler(fresh, images.device)
-            self._remember(envs, self.model.begin(_rows(images, envs), sample))
+            self._remember(envs, self.model.begin(images[envs], sample))
 
     def _remember(self, envs: Tensor, memory: Tensor) -> None:
         """Store the memory, never in place: images that were shown or saved may share it."""
@@ -92,10 +91,10 @@ class CameraFault(ObservationTransform):
         else:
             self._memory = self._memory.to(memory.device).index_copy(0, envs, memory)
 
-    def _shown(self, tensordict: TensorDictBase, images: Tensor) -> TensorDictBase:
+    def _show(self, tensordict: TensorDictBase, images: Tensor) -> TensorDictBase:
         assert self._memory is not None
-        shown = self.model.show(images, self._memory.to(images.device), 0.0)
-        return tensordict.set("pixels", shown)
+        faulty = self.model.show(images, self._memory.to(images.device), 0.0)
+        return tensordict.set("pixels", faulty)
 
     def _checked(self, images: Tensor) -> Tensor:
         name = type(self).__name__
@@ -152,61 +151,53 @@ class _BuiltInFault(CameraFault):
     """A fault with the fields of its settings as arguments, in order or by name."""
 
     Settings: ClassVar[type[settings.Fault]]
+    make_model: ClassVar[Callable[..., FaultModel]]
+    """Returns the model for the fields of the settings."""
 
-    def __init__(self, *args: Any, **values: Any) -> None:
+    def __init__(self, *args: Any, **fields: Any) -> None:
         names = list(kinds_of(self.Settings))[: len(args)]
-        given = dict(zip(names, args, strict=True))
-        own = self.Settings(**given, **values)
-        super().__init__(self._model(own), own)
-
-    def _model(self, own: Any) -> FaultModel:
-        raise NotImplementedError
+        values = self.Settings(**dict(zip(names, args, strict=True)), **fields)
+        super().__init__(self.make_model(**vars(values)), values)
 
 
 @implements(settings.Noise)
 class Noise(_BuiltInFault):
     """Add noise to each pixel; see `drone_rl.config.transforms.Noise`."""
 
-    def _model(self, own: settings.Noise) -> FaultModel:
-        return noise(own.strength, own.correlation_time)
+    make_model = staticmethod(noise)
 
 
 @implements(settings.DeadRows)
 class DeadRows(_BuiltInFault):
     """Blank `rows` and `count` random rows per episode; see `config.transforms.DeadRows`."""
 
-    def _model(self, own: settings.DeadRows) -> FaultModel:
-        model = dead_rows(own.count, own.rows, own.level)
+    make_model = staticmethod(dead_rows)
 
-        def begin(images: Tensor, sample: Sample) -> Tensor:
-            own.check_height(images.shape[-2])
-            return model.begin(images, sample)
-
-        return dataclasses.replace(model, begin=begin)
+    def _checked(self, images: Tensor) -> Tensor:
+        assert isinstance(self.values, settings.DeadRows)
+        self.values.check_height(super()._checked(images).shape[-2])
+        return images
 
 
 @implements(settings.FrozenFrames)
 class FrozenFrames(_BuiltInFault):
     """Repeat the previous frame at random; see `drone_rl.config.transforms.FrozenFrames`."""
 
-    def _model(self, own: settings.FrozenFrames) -> FaultModel:
-        return frozen_frames(own.share)
+    make_model = staticmethod(frozen_frames)
 
 
 @implements(settings.LateFrames)
 class LateFrames(_BuiltInFault):
     """Delay frames; see `drone_rl.config.transforms.LateFrames`."""
 
-    def _model(self, own: settings.LateFrames) -> FaultModel:
-        return late_frames(own.frames)
+    make_model = staticmethod(late_frames)
 
 
 @implements(settings.Shift)
 class Shift(_BuiltInFault):
     """Shift the frames of an episode; see `drone_rl.config.transforms.Shift`."""
 
-    def _model(self, own: settings.Shift) -> FaultModel:
-        return random_shift(own.down, own.across)
+    make_model = staticmethod(random_shift)
 
 
 @implements(settings.Blur)
@@ -242,7 +233,3 @@ def _indices(mask: Tensor | None, images: Tensor) -> Tensor:
     if mask is None:
         return torch.arange(count, device=images.device)
     return mask.reshape(count).nonzero()[:, 0].to(images.device)
-
-
-def _rows(values: Tensor, envs: Tensor) -> Tensor:
-    return values if len(envs) == len(values) else values[envs]

@@ -77,8 +77,8 @@ class DirectRenderer:
         transforms: list[Any] = list(one) if isinstance(one, (Compose, tuple)) else [one]
         observed = tuple(observed)
         readable = {"pixels", "done", *(("info", name) for name in base.worlds.entries)}
-        known = {("next", name) for name in STEP_NAMES}
-        known |= {("next", "info", name) for name in base.worlds.entries}
+        available = {("next", name) for name in STEP_NAMES}
+        available |= {("next", "info", name) for name in base.worlds.entries}
         reasons = [
             f"transform {type(t).__name__} is not fused"
             for t in transforms
@@ -87,7 +87,7 @@ class DirectRenderer:
         if "pixels" in observed and not base.pixels:
             reasons.append("the environment renders no pixels")
         reasons += [f"the policy reads {key}" for key in observed if key not in readable]
-        reasons += [f"entry {key} needs a step of TorchRL" for key in kept if key not in known]
+        reasons += [f"entry {key} needs a step of TorchRL" for key in kept if key not in available]
         return Reasons(reasons) if reasons else cls(base, transforms, observed, kept)
 
     def observe(self, state: State, rows: Tensor | None = None) -> TensorDictBase:

@@ -166,11 +166,11 @@ class DroneEnv(EnvBase):
 
     def to(self, device: torch.device | str) -> Self:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the environment itself; raise an `InputError` for another device."""
-        wanted, own = torch.device(device), self.device or torch.device("cpu")
-        if wanted.type != own.type or len({wanted.index, own.index} - {None}) > 1:
+        target, source = torch.device(device), self.device or torch.device("cpu")
+        if target.type != source.type or len({target.index, source.index} - {None}) > 1:
             raise InputError(
-                f"a DroneEnv on {own} can't move to {wanted}; make it with "
-                f"device={str(wanted)!r} or give TorchRL's collector env_device={str(own)!r}"
+                f"a DroneEnv on {source} can't move to {target}; make it with "
+                f"device={str(target)!r} or give TorchRL's collector env_device={str(source)!r}"
             )
         return self
 

@@ -66,11 +66,11 @@ def dead_rows(count: int, rows: Sequence[int] = (), level: float | None = None) 
     return FaultModel(show, begin, hides=True)
 
 
-def frozen_frames(rate: float) -> FaultModel:
+def frozen_frames(share: float) -> FaultModel:
     """Repeat the previous image with this probability at each step."""
 
     def update(memory: Tensor, images: Tensor, sample: Sample) -> Tensor:
-        return torch.where((sample(1)[:, 0] < rate)[..., None, None, None], memory, images)
+        return torch.where((sample(1)[:, 0] < share)[..., None, None, None], memory, images)
 
     return FaultModel(
         lambda images, memory, _: memory, lambda images, _: images, update, hides=True

@@ -1,7 +1,6 @@
 """The three-state Markov decision process of Fig. 3, whose exact gradient is known."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import torch
 from tensordict import TensorDict, TensorDictBase
@@ -10,31 +9,6 @@ from torchrl.envs import EnvBase
 
 SUCCESS_PROBABILITY = 0.75
 """Probability that action 1 in state 0 leads to state 2 and reward 1, else to state 1 and 0."""
-
-
-class Outcome(NamedTuple):
-    """One possible episode."""
-
-    probability: float
-    actions: tuple[int, ...]
-    rewards: tuple[float, ...]
-
-
-def outcomes(leaving: Sequence[float]) -> list[Outcome]:
-    """Return every possible episode, so expectations become sums.
-
-    Args:
-        leaving: The policy's probability of action 1 in state 0 at each step; as many as `horizon`.
-    """
-    found, still_there = [], 1.0
-    for t, leave in enumerate(leaving):
-        actions, waited = (*[0] * t, 1), (0.0,) * t
-        success, failure = SUCCESS_PROBABILITY, 1 - SUCCESS_PROBABILITY
-        found.append(Outcome(still_there * leave * success, actions, (*waited, 1.0)))
-        found.append(Outcome(still_there * leave * failure, actions, (*waited, 0.0)))
-        still_there *= 1 - leave
-    stayed = len(leaving)
-    return [*found, Outcome(still_there, (0,) * stayed, (0.0,) * stayed)]
 
 
 def exact_gradient(leaving: Sequence[float], gamma: float = 1.0) -> torch.Tensor:
@@ -46,7 +20,7 @@ def exact_gradient(leaving: Sequence[float], gamma: float = 1.0) -> torch.Tensor
     gradient of any objective.
 
     Args:
-        leaving: As in `outcomes`.
+        leaving: The policy's probability of action 1 in state 0 at each step.
         gamma: Discount rate of Q.
 
     Returns:

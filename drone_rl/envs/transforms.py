@@ -15,7 +15,7 @@ from drone_rl.config import transforms as settings
 from drone_rl.config.registry import implements
 from drone_rl.sim.rendering.view import to_gray
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.settings import Settings, kinds_of
+from drone_rl.utils.settings import Settings
 
 Keys = list[NestedKey] | None
 
@@ -88,8 +88,8 @@ class ChromaticityPixels(PixelTransform):
     and `floor`, which suppresses the color noise of dark pixels. Range: -1/3 to 2/3.
     """
 
-    def __init__(self, floor: float = settings.Chromaticity.floor, **keys: Keys) -> None:
-        super().__init__(**keys)
+    def __init__(self, floor: float = settings.Chromaticity.floor) -> None:
+        super().__init__()
         self.values = settings.Chromaticity(floor=floor)
         self.floor = float(floor)
 
@@ -107,8 +107,8 @@ class ChromaticityPixels(PixelTransform):
 class CropRows(PixelTransform):
     """Keep the rows `top` to `bottom` (exclusive) of frames (*, C, H, W)."""
 
-    def __init__(self, top: int, bottom: int, **keys: Keys) -> None:
-        super().__init__(**keys)
+    def __init__(self, top: int, bottom: int) -> None:
+        super().__init__()
         self.values = settings.Crop(top=top, bottom=bottom)
         if not top < bottom:
             raise InputError(f"CropRows({top}, {bottom}) keeps no row; give 0 <= top < bottom")
@@ -127,8 +127,8 @@ class CropRows(PixelTransform):
 class Resize(PixelTransform):
     """Resize frames (*, C, H, W) by averaging over areas; those of the size stay as they are."""
 
-    def __init__(self, *, height: int, width: int, **keys: Keys) -> None:
-        super().__init__(**keys)
+    def __init__(self, *, height: int, width: int) -> None:
+        super().__init__()
         self.values = settings.Resize(height=height, width=width)
         self.height, self.width = height, width
 
@@ -146,12 +146,9 @@ class StandardizePixels(PixelTransform):
     """Standardize pixels: (x - mean) / std. The defaults are the original study's."""
 
     def __init__(
-        self,
-        mean: float = settings.Standardize.mean,
-        std: float = settings.Standardize.std,
-        **keys: Keys,
+        self, mean: float = settings.Standardize.mean, std: float = settings.Standardize.std
     ) -> None:
-        super().__init__(**keys)
+        super().__init__()
         self.values = settings.Standardize(mean=mean, std=std)
         self.mean, self.std = float(mean), float(std)
 
@@ -161,9 +158,11 @@ class StandardizePixels(PixelTransform):
 
 def call_text(transform: Transform, values: Settings) -> str:
     """Return the text of a constructor call."""
-    given = ((name, getattr(values, name)) for name in kinds_of(type(values)))
-    shown = (f"{k}={v:g}" if isinstance(v, float) else f"{k}={v}" for k, v in given)
-    return f"{type(transform).__name__}({', '.join(shown)})"
+    arguments = (
+        f"{name}={value:g}" if isinstance(value, float) else f"{name}={value}"
+        for name, value in vars(values).items()
+    )
+    return f"{type(transform).__name__}({', '.join(arguments)})"
 
 
 def _check_bytes(transform: PixelTransform, obs: Tensor) -> None:
@@ -188,13 +187,7 @@ def pixel_transforms(transforms: Iterable[Transform]) -> list[Transform]:
 def on_pixels(transforms: Iterable[Transform]) -> Callable[[Tensor], Tensor]:
     """Return a function that applies transforms of "pixels" to images without an environment."""
     of_images = pixel_transforms(transforms)
-
-    def apply(images: Tensor) -> Tensor:
-        for transform in of_images:
-            images = transform._apply_transform(images)
-        return images
-
-    return apply
+    return lambda images: apply_to_frames(of_images, [images])
 
 
 def without_identities(transforms: Iterable[Transform], images: Tensor) -> list[Transform]:

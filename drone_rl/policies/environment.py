@@ -1,8 +1,7 @@
 """Environments for training, with the transforms of policies."""
 
-import inspect
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, TypedDict, Unpack
 
 from torchrl.envs import TransformedEnv
 
@@ -16,21 +15,42 @@ from drone_rl.config import (
 )
 from drone_rl.config.transforms import DEFAULT_TRANSFORMS, Transform, as_transforms
 from drone_rl.sim.dynamics import Dynamics
+from drone_rl.sim.rendering.renderer import RendererFactory
+from drone_rl.sim.tasks import Task
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Instance, shown
+from drone_rl.utils.schema import Instance, Maybe, shown
+from drone_rl.utils.seeding import Stream
+
+
+class EnvOptions(TypedDict, total=False):
+    """Further arguments of all functions that make environments; see `drone_rl.envs.DroneEnv`."""
+
+    dynamics: DynamicsSettings | Dynamics | None
+    """Vehicle dynamics; the task's or the policy's by default."""
+    actions: ActionSettings | None
+    """Action space, if `dynamics` are settings; the moves or the policy's by default."""
+    appearance: AppearanceSettings | str | None
+    """Appearance of the scenes, or the name of one such as "fog"."""
+    renderer: str | RendererFactory
+    """"raytrace", "mujoco_warp" or a function that makes a renderer."""
+    pixels: bool
+    """Whether to render."""
+    first_world: int
+    """Number of the first environment."""
+    num_shards: int | None
+    """Threads that render on the CPU; the number of cores by default."""
 
 
 def make_env(
     num_envs: int = 1,
     *,
-    task: BaseTaskSettings | str | None = None,
+    task: BaseTaskSettings | Task[Any] | str | None = None,
     camera: CameraSettings | None = None,
-    dynamics: DynamicsSettings | Dynamics | None = None,
-    actions: ActionSettings | None = None,
     transforms: Transform | Sequence[Transform] = DEFAULT_TRANSFORMS,
     seed: int = 0,
+    stream: Stream = Stream.WORLDS,
     device: str = "cpu",
-    **kwargs: Any,
+    **options: Unpack[EnvOptions],
 ) -> TransformedEnv:
     """Return environments to train in, as one batched TorchRL environment.
 
@@ -38,36 +58,23 @@ def make_env(
         num_envs: Batch size.
         task: Settings of the task, or a name such as "pillars" for its defaults.
         camera: The policy's camera.
-        dynamics: Vehicle dynamics; computer-vision mode by default.
-        actions: Action space, if `dynamics` are settings; the moves by default.
         transforms: Transform of the image, or several in this order.
         seed: Root of the environments' random streams.
+        stream: Purpose of the environments.
         device: Device of the renderer: "cpu", "cuda" or "cuda:N".
-        kwargs: See `drone_rl.envs.DroneEnv`, such as renderer="mujoco_warp", and `appearance`, also
-            as a name such as "fog".
+        options: See `EnvOptions`.
 
     Raises:
         InputError: A setting is out of range; the message begins with its name.
     """
-    _check(camera, "camera", CameraSettings)
-    _check(actions, "actions", ActionSettings)
-    if isinstance(dynamics, str | Mapping):
-        _check(dynamics, "dynamics", DynamicsSettings)
+    Maybe(Instance(CameraSettings)).read(camera, "camera")
+    Maybe(Instance(ActionSettings)).read(options.get("actions"), "actions")
+    dynamics = options.get("dynamics")
+    if isinstance(dynamics, str | dict):
+        raise InputError(f"dynamics={shown(dynamics)} is no DynamicsSettings; give one")
     if isinstance(dynamics, DynamicsSettings):
         dynamics.check_air()
-    if kwargs.get("appearance") is not None:
-        kwargs["appearance"] = Instance(AppearanceSettings).read(kwargs["appearance"], "appearance")
-    steps = as_transforms(transforms)
-    for unknown in kwargs.keys() - inspect.signature(envs.DroneEnv.__init__).parameters.keys():
-        raise InputError(
-            f"{unknown} is no argument of make_env; settings of the task are given as "
-            "task=drone_rl.TaskSettings(num_cubes=2), for example"
-        )
-    motion = {"dynamics": dynamics, "actions": actions}
-    base = envs.DroneEnv(num_envs, task, camera, seed=seed, device=device, **motion, **kwargs)
-    return envs.with_transforms(base, [transform.make() for transform in steps])
-
-
-def _check(value: Any, name: str, kind: type) -> None:
-    if value is not None and not isinstance(value, kind):
-        raise InputError(f"{name}={shown(value)} is not of type {kind.__name__}; give one")
+    appearance = Maybe(Instance(AppearanceSettings)).read(options.get("appearance"), "appearance")
+    others: Any = {**options, "appearance": appearance}
+    base = envs.DroneEnv(num_envs, task, camera, seed=seed, stream=stream, device=device, **others)
+    return envs.with_transforms(base, [step.make() for step in as_transforms(transforms)])

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from drone_rl.policies.networks import ImageNetwork
 from drone_rl.sim.actions import Actions
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.plugins import line_of
+from drone_rl.utils.plugins import described, line_of
 
 Function = Callable[[Any], Any]
 """From a batch of frames to logits (N, number of actions), a tensor or an array."""
@@ -65,8 +65,8 @@ class ExternalNetwork(ImageNetwork):
         self._logit_factor = torch.ones(self.num_actions, device=device)
         self._logit_bias = torch.zeros(self.num_actions, device=device)
         image = torch.full((1, *self.in_shape), 0.5, device=device)
-        found = self(image)
-        if not torch.allclose(found, self(image), atol=_TOLERANCE):
+        logits_of_image = self(image)
+        if not torch.allclose(logits_of_image, self(image), atol=_TOLERANCE):
             raise InputError(
                 "the network returned different logits for one image; give a deterministic network"
             )
@@ -81,18 +81,14 @@ class ExternalNetwork(ImageNetwork):
         """See `ImageNetwork`; raise an `InputError` if the result is not finite logits."""
         flat = pixels.reshape(-1, *self.in_shape)
         outputs = self._outputs(self._given(flat))
-        wanted, names = (len(flat), self.num_actions), ", ".join(self.actions.output_names)
-        if not isinstance(outputs, Tensor | np.ndarray):
+        wanted = (len(flat), self.num_actions)
+        is_array = isinstance(outputs, Tensor | np.ndarray)
+        if not is_array or tuple(outputs.shape) != wanted:
             raise InputError(
-                f"the network returned a {type(outputs).__name__}; give a callable that returns "
-                f"logits of shape {wanted}, one for each of {names}"
+                f"the network returned {described(outputs)}; give a callable that returns logits "
+                f"of shape {wanted}, one for each of {', '.join(self.actions.output_names)}"
             )
         logits = torch.as_tensor(outputs).to(flat.device, flat.dtype)
-        if tuple(logits.shape) != wanted:
-            raise InputError(
-                f"the network returned logits of shape {tuple(logits.shape)}; give one that "
-                f"returns {wanted}, one for each of {names}"
-            )
         if not torch.isfinite(logits).all():
             raise InputError("the network returned logits that are not finite; give another one")
         logits = logits * self._logit_factor + self._logit_bias
@@ -113,7 +109,8 @@ class ExternalNetwork(ImageNetwork):
             where = line_of(error) or type(self._logits).__name__
             raise InputError(
                 f"the network failed in {where} on images of shape {tuple(images.shape)}, "
-                f"{images.dtype} ({what}); {_remedy(self.parts)}"
+                f"{images.dtype} ({what}); correct it, give drone_rl.policy_from the camera= and "
+                "transforms= that it needs, or network.float() if its weights are of another type"
             ) from error
 
     def _given(self, flat: Tensor) -> Tensor:
@@ -122,30 +119,19 @@ class ExternalNetwork(ImageNetwork):
         return (flat * 255).round().to(torch.uint8).movedim(-3, -1)
 
 
-def _remedy(module: nn.Module) -> str:
-    """Return what to do about a network that fails."""
-    for parameter in module.parameters():
-        if parameter.dtype != torch.float32:
-            return f"give network.float(), since its parameters are {parameter.dtype}"
-    return (
-        "correct it, or give drone_rl.policy_from the camera= and transforms= that it needs, such "
-        "as transforms=[Rgb()] for color images"
-    )
-
-
 def copied(module: nn.Module, memo: dict[int, Any] | None = None) -> nn.Module:
     """Return a copy in evaluation mode; `memo` has what replaces parts, by their `id`."""
     try:
-        own = copy.deepcopy(module, memo).eval()
+        module_copy = copy.deepcopy(module, memo).eval()
     except Exception as error:
         raise InputError(
             f"the network {type(module).__name__} can't be copied ({type(error).__name__}); give a "
             "function that calls it"
         ) from error
-    for part in own.modules():
+    for part in module_copy.modules():
         if hasattr(part, "inplace"):  # explanations read the outputs of layers
             vars(part)["inplace"] = False
-    return own
+    return module_copy
 
 
 @torch.enable_grad()

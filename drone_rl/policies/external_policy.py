@@ -5,7 +5,7 @@ import functools
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import torch
 from torchrl.envs import TransformedEnv
@@ -25,7 +25,7 @@ from drone_rl.config import (
 from drone_rl.config.configuration import Changes, as_changes
 from drone_rl.config.transforms import Frame, Gray, Rgb, Standardize, Transform, as_transforms
 from drone_rl.policies import ExternalNetwork
-from drone_rl.policies.environment import make_env
+from drone_rl.policies.environment import EnvOptions, make_env
 from drone_rl.policies.external_network import Function, Logits
 from drone_rl.policies.policy import BasePolicy, load_policy
 from drone_rl.policies.self_check import check_on_episodes
@@ -35,10 +35,13 @@ from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.display import table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance, shown
+from drone_rl.utils.seeding import Stream
 from drone_rl.utils.settings import Settings, prefixed_errors
 
+_TASK = TaskSettings()
 
-@dataclasses.dataclass(frozen=True)
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class ExternalPolicy(BasePolicy):
     """A third-party network with its task, camera and transforms; see `policy_from`.
 
@@ -47,35 +50,20 @@ class ExternalPolicy(BasePolicy):
 
     name: str
     logits: Function = dataclasses.field(repr=False)
-    own_task: BaseTaskSettings | Task[Any]
+    task: BaseTaskSettings | Task[Any] = _TASK  # pyright: ignore[reportIncompatibleMethodOverride] (here and below: a field)
     camera: CameraSettings
     transforms: tuple[Transform, ...]
     """If empty, the callable gets the camera's RGB bytes."""
-    own_dynamics: DynamicsSettings = COMPUTER_VISION  # pyright: ignore[reportIncompatibleMethodOverride] (a field)
-    """The vehicle dynamics in training."""
-    actions: ActionSettings = MOVES_SETTINGS  # pyright: ignore[reportIncompatibleMethodOverride] (a field)
+    actions: ActionSettings = MOVES_SETTINGS  # pyright: ignore[reportIncompatibleMethodOverride]
     """One action for each logit."""
-    used_dynamics: DynamicsSettings | None = None
-    """Vehicle dynamics of the evaluation; those in training by default."""
-    own_appearance: AppearanceSettings = MINIMAL  # pyright: ignore[reportIncompatibleMethodOverride] (a field)
+    own_dynamics: DynamicsSettings = COMPUTER_VISION  # pyright: ignore[reportIncompatibleMethodOverride]
+    """The vehicle dynamics in training."""
+    dynamics: DynamicsSettings = COMPUTER_VISION  # pyright: ignore[reportIncompatibleMethodOverride]
+    """The vehicle dynamics of the evaluation."""
+    own_appearance: AppearanceSettings = MINIMAL  # pyright: ignore[reportIncompatibleMethodOverride]
     """The appearance of the scenes in training."""
-    used_appearance: AppearanceSettings | None = None
-    """Appearance of the scenes in the evaluation; that in training by default."""
-
-    @property
-    def dynamics(self) -> DynamicsSettings:
-        """The vehicle dynamics."""
-        return self.used_dynamics or self.own_dynamics
-
-    @property
-    def appearance(self) -> AppearanceSettings:
-        """The appearance of the scenes."""
-        return self.used_appearance or self.own_appearance
-
-    @property
-    def task(self) -> BaseTaskSettings | Task[Any]:
-        """The task."""
-        return self.own_task
+    appearance: AppearanceSettings = MINIMAL  # pyright: ignore[reportIncompatibleMethodOverride]
+    """The appearance of the scenes in the evaluation."""
 
     @property
     def origin(self) -> dict[str, Any]:
@@ -93,29 +81,45 @@ class ExternalPolicy(BasePolicy):
             return self
         changed = Changes(type(self.task)).read(changes, "task")
         with prefixed_errors("task"):
-            return dataclasses.replace(self, own_task=self.task.replace(**changed))
+            return dataclasses.replace(self, task=self.task.replace(**changed))
 
     def in_dynamics(self, **changes: Any) -> "ExternalPolicy":
         """Return the same policy with other dynamics, such as `in_dynamics(wind=(5, 0, 0))`."""
         changed = Changes(DynamicsSettings).read(changes, "dynamics")
         with prefixed_errors("dynamics"):
-            used_dynamics = self.dynamics.replace(**changed)
-        used_dynamics.check_air()
-        return dataclasses.replace(self, used_dynamics=used_dynamics)
+            dynamics = self.dynamics.replace(**changed)
+        dynamics.check_air()
+        return dataclasses.replace(self, dynamics=dynamics)
 
     def in_appearance(self, appearance: AppearanceSettings | str) -> "ExternalPolicy":
         """Return the same policy in scenes of another appearance, which may be a name."""
-        used = Instance(AppearanceSettings).read(appearance, "appearance")
-        return dataclasses.replace(self, used_appearance=used)
+        appearance = Instance(AppearanceSettings).read(appearance, "appearance")
+        return dataclasses.replace(self, appearance=appearance)
 
-    def _make_env(self, num_envs: int, options: dict[str, Any]) -> TransformedEnv:
-        task: Any = self.task
+    def make_env(
+        self,
+        num_envs: int,
+        *,
+        seed: int = 0,
+        stream: Stream = Stream.REPORT,
+        device: str = "cpu",
+        **options: Unpack[EnvOptions],
+    ) -> TransformedEnv:
+        """See `BasePolicy`."""
+        dynamics = options["dynamics"] = options.get("dynamics") or self.dynamics
         options.setdefault("appearance", self.appearance)
-        dynamics = options.pop("dynamics", None) or self.dynamics
         if isinstance(dynamics, DynamicsSettings):
             options.setdefault("actions", self.actions)
-        parts = {"task": task, "dynamics": dynamics, "transforms": self.transforms or (Rgb(),)}
-        return make_env(num_envs, camera=self.camera, **parts, **options)
+        return make_env(
+            num_envs,
+            task=self.task,
+            camera=self.camera,
+            transforms=self.transforms or (Rgb(),),
+            seed=seed,
+            stream=stream,
+            device=device,
+            **options,
+        )
 
     def make_network(self, device: str | torch.device = "cpu") -> ExternalNetwork:
         """Return its network; raise an `InputError` as `ExternalNetwork` does."""
@@ -189,30 +193,33 @@ def policy_from(
     Instance(ActionSettings).read(actions, "actions")
     if isinstance(task, str):
         task = settings_of(task, "task")()
-    given = None if transforms is None else as_transforms(transforms)
-    own: Mapping[str, Any] = getattr(network, "conditions", {})
+    before_wrappers = None if transforms is None else as_transforms(transforms)
+    of_env: Mapping[str, Any] = getattr(network, "conditions", {})
     observations: Any = getattr(network, "observations", None)
-    is_default = dynamics is COMPUTER_VISION, actions is MOVES_SETTINGS
+    dynamics = of_env.get("dynamics", dynamics) if dynamics is COMPUTER_VISION else dynamics
+    appearance = Instance(AppearanceSettings).read(appearance, "appearance")
     policy = ExternalPolicy(
-        name=name or own.get("name") or getattr(network, "__name__", type(network).__name__),
+        name=name or of_env.get("name") or getattr(network, "__name__", type(network).__name__),
         logits=network,
-        own_task=task or own.get("task") or TaskSettings(),
-        camera=camera or own.get("camera") or _camera_of(network),
+        task=task or of_env.get("task") or _TASK,
+        camera=camera or of_env.get("camera") or _camera_of(network),
         transforms=(
-            _transforms_of(network, given)
+            _transforms_of(network, before_wrappers)
             if observations is None
-            else observations.all_transforms(given)
+            else observations.all_transforms(before_wrappers)
         ),
-        own_dynamics=own.get("dynamics", dynamics) if is_default[0] else dynamics,
-        actions=own.get("actions", actions) if is_default[1] else actions,
-        own_appearance=Instance(AppearanceSettings).read(appearance, "appearance"),
+        actions=of_env.get("actions", actions) if actions is MOVES_SETTINGS else actions,
+        own_dynamics=dynamics,
+        dynamics=dynamics,
+        own_appearance=appearance,
+        appearance=appearance,
     )
     policy.make_network()  # raises errors early
     if observations is None:
         check_on_episodes(policy)
     else:
         model: Any = network
-        predict = functools.partial(model.predict, transforms=given)
+        predict = functools.partial(model.predict, transforms=before_wrappers)
         check_on_episodes(policy, predict, observations.names)
     return policy
 
@@ -232,11 +239,7 @@ def _checked_logits(logits: Any, env: Any) -> Function:
             f"env= is of models of Stable-Baselines3, but policy={shown(logits)} is none; give "
             "task=, camera= and transforms="
         )
-    if isinstance(logits, type):
-        raise InputError(
-            f"policy={logits.__name__} is a class; give an instance, such as {logits.__name__}()"
-        )
-    if not callable(logits):
+    if isinstance(logits, type) or not callable(logits):
         raise InputError(
             f"policy={shown(logits)} is no policy; give a callable from images to logits, or the "
             "name or file of a policy"

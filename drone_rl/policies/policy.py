@@ -6,7 +6,7 @@ import dataclasses
 import functools
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, Unpack
 
 import numpy as np
 import torch
@@ -24,6 +24,7 @@ from drone_rl.config import (
 from drone_rl.config.configuration import Changes
 from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transforms
 from drone_rl.policies import ImageNetwork, RecurrentNetwork, make_actor
+from drone_rl.policies.environment import EnvOptions
 from drone_rl.policies.recurrent import Memory
 from drone_rl.policies.zoo import PolicyDescription, find_policy, parse, read_policy
 from drone_rl.sim.rendering.devices import check_defaults
@@ -76,16 +77,16 @@ class BasePolicy(abc.ABC):
 
         Names are of `dynamics`, or "appearance.NAME".
         """
-        own, used = self.own_dynamics.values(), self.dynamics.values()
+        trained, flown = self.own_dynamics.values(), self.dynamics.values()
         if self.dynamics.is_computer_vision:  # where little else counts
             timing = ("control_ticks", "tick") if self.actions.kind == "velocity" else ()
-            own, used = ({n: of[n] for n in ("mode", *timing)} for of in (own, used))
+            trained, flown = ({n: of[n] for n in ("mode", *timing)} for of in (trained, flown))
         looks = (self.own_appearance.values(), self.appearance.values())
-        own, used = (
+        trained, flown = (
             {**of, **{f"appearance.{name}": value for name, value in look.items()}}
-            for of, look in zip((own, used), looks, strict=True)
+            for of, look in zip((trained, flown), looks, strict=True)
         )
-        return {n: {"own": own[n], "flown": v} for n, v in used.items() if own[n] != v}
+        return {n: {"own": trained[n], "flown": v} for n, v in flown.items() if trained[n] != v}
 
     @abc.abstractmethod
     def in_appearance(self, appearance: AppearanceSettings | str) -> Self:
@@ -116,6 +117,7 @@ class BasePolicy(abc.ABC):
             InputError: A setting is unknown or out of range.
         """
 
+    @abc.abstractmethod
     def make_env(
         self,
         num_envs: int,
@@ -123,18 +125,12 @@ class BasePolicy(abc.ABC):
         seed: int = 0,
         stream: Stream = Stream.REPORT,
         device: str = "cpu",
-        **kwargs: Any,
+        **options: Unpack[EnvOptions],
     ) -> TransformedEnv:
         """Return environments like those of its training, with its camera and transforms.
 
-        The default `stream` has the environments to report on, which training never sees. The
-        other arguments are those of `drone_rl.envs.DroneEnv`.
+        The default `stream` has the environments to report on, which training never sees.
         """
-        options = {"seed": seed, "stream": stream, "device": device, **kwargs}
-        return self._make_env(num_envs, options)
-
-    @abc.abstractmethod
-    def _make_env(self, num_envs: int, options: dict[str, Any]) -> TransformedEnv: ...
 
     @abc.abstractmethod
     def make_network(self, device: str | torch.device = "cpu") -> ImageNetwork:
@@ -163,10 +159,16 @@ class BasePolicy(abc.ABC):
 
     @contextlib.contextmanager
     def flying(
-        self, num_envs: int, *, seed: int = 0, stream: Stream = Stream.REPORT, **kwargs: Any
+        self,
+        num_envs: int,
+        *,
+        seed: int = 0,
+        stream: Stream = Stream.REPORT,
+        device: str = "cpu",
+        **options: Unpack[EnvOptions],
     ) -> Iterator[tuple[TransformedEnv, TensorDictModuleBase]]:
         """Yield environments and its actor; close them afterwards. See `make_env`."""
-        env = self.make_env(num_envs, seed=seed, stream=stream, **kwargs)
+        env = self.make_env(num_envs, seed=seed, stream=stream, device=device, **options)
         try:
             yield env, self.make_actor(env, seed=seed, stream=stream)
         finally:
@@ -254,8 +256,19 @@ class Policy(BasePolicy):
         described = dataclasses.replace(self.description, appearance=appearance)
         return dataclasses.replace(self, description=described)
 
-    def _make_env(self, num_envs: int, options: dict[str, Any]) -> TransformedEnv:
-        return self.description.build_env(num_envs, **options)
+    def make_env(
+        self,
+        num_envs: int,
+        *,
+        seed: int = 0,
+        stream: Stream = Stream.REPORT,
+        device: str = "cpu",
+        **options: Unpack[EnvOptions],
+    ) -> TransformedEnv:
+        """See `BasePolicy`."""
+        return self.description.build_env(
+            num_envs, seed=seed, stream=stream, device=device, **options
+        )
 
     def make_network(self, device: str | torch.device = "cpu") -> ImageNetwork:
         """Return its network."""
@@ -272,14 +285,7 @@ class Policy(BasePolicy):
         Returns:
             The index of the action, or the values of a continuous one.
         """
-        image, camera = _copied(image), self.description.camera
-        size = (camera.height, camera.width, 3)
-        if image.dtype != torch.uint8 or image.shape != size:
-            raise InputError(
-                f"an image of shape {tuple(image.shape)} and type {image.dtype} does not fit the "
-                f"policy's camera; give one uint8 image of shape {size}; act_batch takes several"
-            )
-        action = self.act_batch(image[None])[0].numpy()
+        action = self.act_batch(_copied(image)[None])[0].numpy()
         return action if action.ndim else int(action)
 
     @torch.no_grad()
@@ -305,10 +311,10 @@ class Policy(BasePolicy):
                 f"images of shape {tuple(images.shape)} and type {images.dtype} do not fit the "
                 f"policy's camera; give uint8 of shape (N, {camera.height}, {camera.width}, 3)"
             )
-        known = [*self._earlier_frames[-1:], *(memory.hidden for memory in self._memory)]
-        if known and len(known[0]) != len(images):
+        remembered = [*self._earlier_frames[-1:], *(memory.hidden for memory in self._memory)]
+        if remembered and len(remembered[0]) != len(images):
             raise InputError(
-                f"{len(images)} images follow {len(known[0])}; call reset() before images of "
+                f"{len(images)} images follow {len(remembered[0])}; call reset() before images of "
                 "another number of drones"
             )
         network, transforms = self._network_and_transforms
@@ -374,12 +380,10 @@ def load_policy(which: str | Path | Policy, *, outputs: str | Path = "outputs") 
     if isinstance(which, Policy):
         return which
     if not isinstance(which, str | Path):
-        if not isinstance(which, BasePolicy) and not callable(which):
-            raise InputError(f"policy={shown(which)} is no name and no path; give one of them")
-        name = getattr(which, "name", type(which).__name__)
+        name = getattr(which, "name", shown(which))
         raise InputError(
             f"policy={name} is in no file of drone_rl's, which this function needs (judge, "
-            "evaluate, explain and shifts do not); give a policy that drone-rl trained"
+            "evaluate, explain and shifts do not); give the name or path of a trained policy"
         )
     path = find_policy(which, outputs)
     state = read_policy(path)

@@ -93,10 +93,10 @@ class _Affine(Layer):
         if self._stride is None:
             return slope @ self._weight
         flat = slope.flatten(0, 1)
-        found = functional.conv_transpose2d(flat, self._weight, stride=self._stride)
-        rows, columns = (a - b for a, b in zip(note.shape[-2:], found.shape[-2:], strict=True))
-        found = functional.pad(found, (0, columns, 0, rows))  # pixels that no patch reaches
-        return found.view(*slope.shape[:2], *note.shape[1:])
+        gradients = functional.conv_transpose2d(flat, self._weight, stride=self._stride)
+        rows, columns = (a - b for a, b in zip(note.shape[-2:], gradients.shape[-2:], strict=True))
+        gradients = functional.pad(gradients, (0, columns, 0, rows))  # pixels that no patch reaches
+        return gradients.view(*slope.shape[:2], *note.shape[1:])
 
     def _apply(self, value: Tensor, weight: Tensor, bias: Tensor | None) -> Tensor:
         if self._stride is None:

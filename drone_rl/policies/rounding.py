@@ -70,8 +70,8 @@ class RoundingBound:
         if not isinstance(network, PolicyNetwork) or not network.is_sequential:
             return None
         layers = [layer_of(layer) for layer in network.layers]
-        known = [layer for layer in layers if layer is not None]
-        return cls(known, network.actions) if len(known) == len(layers) else None
+        supported = [layer for layer in layers if layer is not None]
+        return cls(supported, network.actions) if len(supported) == len(layers) else None
 
     @torch.no_grad()
     def decide(self, pixels: Tensor) -> Decisions:
@@ -265,8 +265,8 @@ class Regrouped(ImageNetwork):
             rows, order = order[:size], order[size:]
             repeats = self._sample_size(size + 1) - 1
             again = torch.randint(size, (repeats,), generator=self._generator)
-            given = torch.cat([rows, rows[again]]).to(pixels.device)
-            outputs[rows.to(pixels.device)] = self.network(pixels[given])[:size]
+            repeated = torch.cat([rows, rows[again]]).to(pixels.device)
+            outputs[rows.to(pixels.device)] = self.network(pixels[repeated])[:size]
         return outputs
 
     def _sample_size(self, most: int) -> int:

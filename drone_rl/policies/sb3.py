@@ -69,15 +69,15 @@ class Sb3Logits(nn.Module):
                 f"the policy of {kind} is recurrent: it needs its state of the frames before; give "
                 "a policy of single images, or of a stack of them (VecFrameStack)"
             )
-        given = model.get_env() if env is None else _as_vec_env(env)
-        self.observations = Observations(given, space)
+        vec_env = model.get_env() if env is None else _as_vec_env(env)
+        self.observations = Observations(vec_env, space)
         if model.get_vec_normalize_env() and "VecNormalize" not in self.observations.names:
             raise InputError(
                 f"{kind} was trained with VecNormalize, which its environment lacks; give "
                 "drone_rl.policy_from env=, the environment of the training with its wrappers"
             )
-        if given is not None:
-            _check_spaces(given, model.policy)
+        if vec_env is not None:
+            _check_spaces(vec_env, model.policy)
         self.conditions = {"name": f"{kind} of Stable-Baselines3", **self.observations.conditions}
 
     conditions: dict[str, Any]

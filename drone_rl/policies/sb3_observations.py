@@ -355,22 +355,24 @@ def _function(wrapper: Any) -> Function:
         return VecTransposeImage.transpose_image
     if isinstance(wrapper, VecNormalize):
         return copy.deepcopy(wrapper).normalize_obs  # pyright: ignore[reportReturnType] (a Box)
-    own: Any = copy.deepcopy(wrapper, {id(env): _Spaces(env) for env in _layers(wrapper.env)})
-    if hasattr(own, "update_running_mean"):
-        own.update_running_mean = False
-    return lambda batch: np.stack([own.observation(one) for one in batch])
+    wrapper_copy: Any = copy.deepcopy(
+        wrapper, {id(env): _Spaces(env) for env in _layers(wrapper.env)}
+    )
+    if hasattr(wrapper_copy, "update_running_mean"):
+        wrapper_copy.update_running_mean = False
+    return lambda batch: np.stack([wrapper_copy.observation(one) for one in batch])
 
 
 def _stack(wrapper: VecFrameStack) -> StackedFrames:
-    own = wrapper.stacked_obs
-    dim = -len(own.stacked_shape) if own.channels_first else -1
-    return StackedFrames(N=own.n_stack, dim=dim)
+    stacked = wrapper.stacked_obs
+    dim = -len(stacked.stacked_shape) if stacked.channels_first else -1
+    return StackedFrames(N=stacked.n_stack, dim=dim)
 
 
 def _stacked(wrapper: VecFrameStack, seen: list[NDArray[Any]]) -> list[NDArray[Any]]:
-    own = wrapper.stacked_obs
-    order = "first" if own.channels_first else "last"
-    stack: Any = StackedObservations(1, own.n_stack, own.observation_space, order)
+    stacked = wrapper.stacked_obs
+    order = "first" if stacked.channels_first else "last"
+    stack: Any = StackedObservations(1, stacked.n_stack, stacked.observation_space, order)
     running = np.zeros(1, bool)
     later = (stack.update(one, running, [{}])[0].copy() for one in seen[1:])
     return [stack.reset(seen[0]).copy(), *later]

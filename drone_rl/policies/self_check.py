@@ -43,15 +43,15 @@ def check_on_episodes(
         return
     theirs = [predict(frames) for frames, _ in episodes]
     actions, logits = (torch.cat(parts) for parts in zip(*theirs, strict=True))
-    own = network(pixels)
-    is_other = (own.softmax(-1) - logits.softmax(-1)).abs().amax(-1) > _PROBABILITY
-    lead = own.amax(-1) - own.gather(1, actions[:, None])[:, 0]
-    is_other |= lead > TOLERANCE * (1 + own.abs().amax(-1))
+    network_logits = network(pixels)
+    is_other = (network_logits.softmax(-1) - logits.softmax(-1)).abs().amax(-1) > _PROBABILITY
+    lead = network_logits.amax(-1) - network_logits.gather(1, actions[:, None])[:, 0]
+    is_other |= lead > TOLERANCE * (1 + network_logits.abs().amax(-1))
     if is_other.any():
         names = ", ".join(wrappers) or "none"
         raise InputError(
             f"{network.owner} acts otherwise than by its library's predict on "
-            f"{int(is_other.sum())} of {len(own)} frames; the wrappers of its environment that "
+            f"{int(is_other.sum())} of {len(pixels)} frames; the wrappers of its environment that "
             f"change observations are: {names}; give drone_rl.policy_from transforms= that make "
             "the same observations, or leave them out, and wrappers whose result depends on the "
             "current observation alone"

@@ -35,14 +35,12 @@ class Entry(NamedTuple):
 class Actions(abc.ABC):
     """A set of actions and its numbered parts; probabilities are a tensor or a NumPy array.
 
-    An *action* is what dynamics take, shaped as `entry` says; a *part* is a number, int64. Raises a
-    `ValueError` if mirror images or opposites are not mutual, or `order`, `arrows`, `colors` or
-    `left` do not fit.
+    An *action* is what dynamics take, shaped as `entry` says; a *part* is a number, int64.
     """
 
     names: tuple[str, ...]
     mirrored: tuple[int, ...]
-    """Mirror image of each."""
+    """Mirror image of each; that of its mirror image is itself."""
     opposite: tuple[int, ...]
     """The part that undoes each; itself where none does."""
     left: int
@@ -52,19 +50,6 @@ class Actions(abc.ABC):
     arrows: tuple[tuple[float, float], ...]
     """Direction of each on a page, right and up: length 1, or 0 for none."""
     colors: tuple[Rgb, ...]
-
-    def __post_init__(self) -> None:
-        every = list(range(len(self)))
-        for name in ("mirrored", "opposite"):
-            pairs = getattr(self, name)
-            if sorted(pairs) != every or [pairs[pairs[i]] for i in every] != every:
-                raise ValueError(f"{name}={pairs} must pair actions, or an action with itself")
-        if sorted(self.order) != every:
-            raise ValueError(f"order={self.order} must name every action once")
-        if not len(self.arrows) == len(self.colors) == len(every):
-            raise ValueError(f"give an arrow and a color to each of {len(every)} actions")
-        if self.mirrored[self.left] == self.left:
-            raise ValueError(f"left={self.left} is its own mirror image; give one that turns")
 
     def __len__(self) -> int:
         return len(self.names)

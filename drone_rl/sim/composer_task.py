@@ -1,5 +1,7 @@
-"""A dm_control task for any `Task`: rules with a batch of one, rendered by OpenGL."""
+"""A dm_control task for any `Task`: its rules and dynamics with a batch of one."""
 
+import dataclasses
+import functools
 from typing import Any
 
 import numpy as np
@@ -16,20 +18,16 @@ from drone_rl.config import (
     DynamicsSettings,
 )
 from drone_rl.sim import entities
-from drone_rl.sim.dynamics import BodyState, Dynamics, Quadrotor, draw_seeds, make_dynamics
+from drone_rl.sim.dynamics import BodyState, Dynamics, draw_seeds, make_dynamics
 from drone_rl.sim.dynamics.state import twist_about_z
-from drone_rl.sim.mujoco_flight import MujocoFlight
-from drone_rl.sim.rendering import Appearance, opengl
-from drone_rl.sim.rendering.opengl import OpenGlAppearance
+from drone_rl.sim.rendering import Appearance, Poses, Raytracer, View
 from drone_rl.sim.rendering.scene import Scene, SemanticClass, compiled
 from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
-from drone_rl.sim.visual_randomization import AppearanceSampler, object_region_of
+from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.plugins import errors_of, place_of
 
-_SKY = 0.69 * entities.DRAW_DISTANCE
-"""Metres beyond which only sky is rendered, a ball of 0.7 of MuJoCo's drawing distance."""
 CONTROL_TIMESTEP_S = 0.1
 """Simulated time of one step, seconds. Computer-vision mode has no physics to depend on it."""
 
@@ -42,7 +40,7 @@ def seconds_per_step(dynamics: Dynamics) -> float:
 class ComposerTask(composer.Task):
     """A field with the drone and a task's props. The discount is 0 at termination, 1 at truncation.
 
-    Dynamics move the drone without MuJoCo's physics, except a quadrotor: see `MujocoFlight`.
+    Dynamics move the drone, as in `Worlds`; MuJoCo's physics does not.
     """
 
     def __init__(
@@ -63,9 +61,10 @@ class ComposerTask(composer.Task):
             camera: The policy's camera.
             dynamics: Vehicle dynamics; the task's default if None.
             actions: Action space, if `dynamics` are settings; the moves by default.
-            pixels: Whether to observe the front-center camera, which needs OpenGL.
+            pixels: Whether to observe the front-center camera, "drone/front_center". OpenGL renders
+                it, or the ray tracer if there is an appearance.
             distractors: Number of distractors in the model; only an appearance places them.
-            appearance: Visual appearance, see `OpenGlAppearance`; the task's by default.
+            appearance: Visual appearance, sampled for each episode; the task's by default.
 
         Raises:
             InputError: A texture can't be read, camera or distractors do not fit, or dynamics with
@@ -75,14 +74,15 @@ class ComposerTask(composer.Task):
         self.dynamics = make_dynamics(self.rules.make_dynamics, dynamics, actions)
         self.rules.check_actions(self.dynamics.actions)
         self.camera = camera or CameraSettings()
-        self._sampler = self._opengl = None
+        self._sampler = None
         if appearance is not None and not appearance.is_minimal:
             self._sampler = AppearanceSampler(appearance, 1, task=self.rules, camera=self.camera)
             distractors = self._sampler.distractors
+        self._distractors = distractors
         self._arena = entities.Field()
         model: Any = self._arena.mjcf_model
         model.option.gravity = (0, 0, 0)
-        self.drone = entities.Drone(size=self.rules.drone_size, camera=self.camera)
+        self.drone = entities.DroneEntity(size=self.rules.drone_size, camera=self.camera)
         self._arena.add_free_entity(self.drone)
         with errors_of(f"task={self.rules.name}", place_of(self.rules.make_props)):
             props = self.rules.make_props()
@@ -90,21 +90,18 @@ class ComposerTask(composer.Task):
         self._frames = [self._arena.attach(prop) for prop in self._props]
         for frame in self._frames:
             frame.mocap = True
-        self._flight = self._make_flight()
-        self._begin(np.random.RandomState(0))
-        self._pixels = self.drone.observables.front_center.enabled = pixels  # pyright: ignore[reportAttributeAccessIssue]
         self.appearance: Appearance | None = None
         """Appearance of the running episode; None for the task's own."""
-        if self._sampler is not None:
-            self._prepare()
-        self._task_observables = {
+        self._begin(np.random.RandomState(0))
+        self._task_observables: dict[str, observable.Observable] = {
             name: observable.Generic(lambda _, name=name: self._read(name))
             for name in self.rules.observed
         }
+        if pixels:
+            self._task_observables["drone/front_center"] = self._camera_observable()
         for info in self._task_observables.values():
             info.enabled = True
-        steps = (seconds_per_step(self.dynamics),) * 2
-        self.set_timesteps(*(steps if self._flight is None else self._flight.timesteps))
+        self.set_timesteps(*(seconds_per_step(self.dynamics),) * 2)
 
     def __getstate__(self) -> dict[str, Any]:
         """Refuse to copy or pickle, which dm_control's models do not support."""
@@ -119,8 +116,8 @@ class ComposerTask(composer.Task):
         return self._arena
 
     @property
-    def task_observables(self) -> dict[str, observable.Generic]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """The entries `Task.observed` of `Task.info`."""
+    def task_observables(self) -> dict[str, observable.Observable]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """The entries `Task.observed` of `Task.info`, and the policy's camera."""
         return self._task_observables
 
     def action_spec(self, physics: mjcf.Physics) -> specs.Array:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -150,43 +147,23 @@ class ComposerTask(composer.Task):
             self._sampler.reset(torch.arange(1), [random_state])
             self.appearance = self._sampler.current() or self._sampler.middle
         self._begin(random_state)
-        if self._flight is not None:
-            self._flight.begin(physics, self.state.body)
-        if self.appearance is not None:
-            self._apply(physics, self.appearance)
         self._show(physics)
 
     def before_step(
         self, physics: mjcf.Physics, action: np.ndarray, random_state: np.random.RandomState
     ) -> None:
         """Move the drone."""
-        given = torch.as_tensor(action).reshape(1, *self.dynamics.actions.entry.shape)
-        given = given.to(self.dynamics.actions.entry.dtype)
-        if self._flight is not None:
-            self.state.body = self._flight.command(physics, given)
-            return
+        entry = self.dynamics.actions.entry
+        actions = torch.as_tensor(action).reshape(1, *entry.shape).to(entry.dtype)
         around = [self.rules.obstacles(self.state)] if self.dynamics.needs_obstacles else []
-        self.state.body = self.dynamics.step(self._found(physics), given, *around)
+        self.state.body = self._locate(physics)
+        self._body = self.dynamics.step(self.state.body, actions, *around)
         self._show(physics)
-
-    def before_substep(
-        self, physics: mjcf.Physics, action: np.ndarray, random_state: np.random.RandomState
-    ) -> None:
-        """Apply the forces on a quadrotor."""
-        if self._flight is not None:
-            self._flight.push(physics)
-
-    def after_substep(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
-        """Record the contacts of a quadrotor."""
-        if self._flight is not None:
-            self._flight.record_contacts(physics)
 
     def after_step(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
         """Apply the task's rules."""
-        flight = self._flight
-        body = self._found(physics) if flight is None else flight.finished(physics)
-        self.state, reward = self.rules.step(self.state, body)
-        self._reward = float(reward)
+        self.state, reward = self.rules.step(self.state, self._locate(physics))
+        self._body, self._reward = self.state.body, float(reward)
         self._show(physics)
         physics.forward()  # what is observed next must not show things that have just vanished
 
@@ -208,67 +185,73 @@ class ComposerTask(composer.Task):
         seeds = [draw_seeds([random_state])] if self.dynamics.is_random else []
         self.state: State = self.rules.start(sampled[None], self.dynamics.start(origin, *seeds))
         """State of the running episode, as a batch of one."""
-        self._reward = 0.0
+        self._body, self._reward = self.state.body, 0.0
 
-    def _found(self, physics: mjcf.Physics) -> BodyState:
+    def _locate(self, physics: mjcf.Physics) -> BodyState:
         """Return the drone at MuJoCo's pose, which users may have set."""
-        body = self.state.body
+        body, expected = self._body, camera_attitude(self.dynamics, self._body)
         place, turn = (torch.from_numpy(np.array(p))[None] for p in self.drone.get_pose(physics))
-        is_same_turn = 1.0 - float((turn * self._shown(body)).sum().abs()) < 1e-12  # up to sign
-        is_same = is_same_turn and torch.equal(place, body.position)
+        cosine = torch.cosine_similarity(turn, expected).abs()  # MuJoCo normalizes quaternions
+        is_same = bool(cosine > 1.0 - 1e-12) and torch.equal(place, body.position)
         return body if is_same else body.moved(place, turn)
 
-    def _shown(self, body: BodyState) -> torch.Tensor:
-        """Return the cameras' attitude. Shape: (1, 4)."""
-        return twist_about_z(body.attitude) if self.dynamics.mount == "gimbal" else body.attitude
+    def _poses(self) -> Poses:
+        state = dataclasses.replace(self.state, body=self._body)
+        return poses_of(self.rules, self.dynamics, state, self._distractors, self.appearance)
 
     def _show(self, physics: mjcf.Physics) -> None:
-        body = self.state.body
-        if self._flight is None:
-            self.drone.set_pose(physics, body.position[0].numpy(), self._shown(body)[0].numpy())
-        places = self.rules.places(self.state)[0]
-        shown = None if self.appearance is None else self.appearance.distractors
-        if count := len(self._frames) - len(places):  # without an appearance out of sight
-            hidden = places.new_tensor([0.0, 0.0, -HIDDEN_DEPTH]).expand(count, 3)
-            places = torch.cat([places, hidden if shown is None else shown.expand(1).places[0]])
-        for frame, place in zip(self._frames, places, strict=True):
+        poses = self._poses()
+        self.drone.set_pose(physics, poses.position[0].numpy(), poses.attitude[0].numpy())
+        for frame, place in zip(self._frames, poses.props[0], strict=True):
             physics.bind(frame).mocap_pos = place.numpy()
 
-    def _make_flight(self) -> MujocoFlight | None:
-        """Return the integration by MuJoCo of a quadrotor; before the model is compiled."""
-        if not isinstance(self.dynamics, Quadrotor):
-            return None
-        solid = [p.mjcf_model for p in self._props if p.semantic_class == SemanticClass.OBSTACLE]
-        return MujocoFlight(self.dynamics, self._arena, self.drone, solid)
+    def _camera_observable(self) -> observable.Observable:
+        """Return the policy's camera, rendered by OpenGL or with an appearance by ray tracing."""
+        if self._sampler is not None:
+            return observable.Generic(lambda _: self._render())
+        return observable.MJCFCamera(
+            self.drone.front_center,
+            height=self.camera.height,
+            width=self.camera.width,
+            scene_option=entities.hide_drone(),
+        )
 
-    def _prepare(self) -> None:
-        root: Any = self._arena.mjcf_model
-        opengl.prepare(root)
-        camera = self.drone.observables.front_center  # pyright: ignore[reportAttributeAccessIssue]
-        camera.render_flag_overrides = opengl.RENDER_FLAGS
-        camera.corruptor = self._in_fog
+    @functools.cached_property
+    def _renderer(self) -> Raytracer:
+        return Raytracer(self.compile(), num_envs=1, num_shards=1)
 
-    def _apply(self, physics: mjcf.Physics, appearance: Appearance) -> None:
-        if self._opengl is None:
-            region = object_region_of(self.rules)
-            middle = 0.0 if region is None else (region.first + region.last) / 2
-            self._opengl = OpenGlAppearance(self.compile(), middle)
-        self._opengl.apply(physics, appearance, self._pixels)
-        self._physics = physics
-
-    def _in_fog(self, image: np.ndarray, random_state: np.random.RandomState) -> np.ndarray:
-        if self.appearance is None or self.appearance.fog_visibility is None:
-            return image
-        model, camera = self._physics.model, self.drone.front_center.full_identifier
-        number = model.name2id(camera, "camera")
-        height, width = image.shape[:2]
-        option = entities.hide_drone()
-        depth = self._physics.render(height, width, number, depth=True, scene_option=option)
-        fovy = float(model.cam_fovy[number])
-        return opengl.apply_fog(image, depth, self.appearance, fovy, _SKY)
+    def _render(self) -> np.ndarray:
+        height, width = self.camera.height, self.camera.width
+        view = View(cameras=("drone/front_center",), height=height, width=width)
+        return self._renderer.render(view, self._poses(), self.appearance)["rgb"][0, 0].numpy()
 
     def _read(self, name: str) -> np.ndarray:
         return self.rules.info(self.state)[name][0].numpy().copy()
+
+
+def camera_attitude(dynamics: Dynamics, body: BodyState) -> torch.Tensor:
+    """Return the attitude of drones' cameras, which is level on a gimbal. Shape: (num_envs, 4)."""
+    return twist_about_z(body.attitude) if dynamics.mount == "gimbal" else body.attitude
+
+
+def poses_of(
+    task: Task[Any],
+    dynamics: Dynamics,
+    state: State,
+    distractors: int,
+    appearance: Appearance | None = None,
+) -> Poses:
+    """Return the poses to render: drones, a task's props, and distractors.
+
+    Without an appearance that positions them, the distractors are out of sight.
+    """
+    props = task.places(state)
+    if distractors:
+        places = torch.tensor([0.0, 0.0, -HIDDEN_DEPTH]).expand(len(props), distractors, 3)
+        if appearance is not None and appearance.distractors is not None:
+            places = appearance.distractors.expand(len(props)).places
+        props = torch.cat([props, places.to(props)], 1)
+    return Poses(state.body.position, camera_attitude(dynamics, state.body), props)
 
 
 def make_environment(
@@ -276,11 +259,24 @@ def make_environment(
     camera: CameraSettings | None = None,
     *,
     random_state: np.random.RandomState | int | None = None,
-    **options: Any,
+    dynamics: Dynamics | DynamicsSettings | None = None,
+    actions: ActionSettings | None = None,
+    pixels: bool = True,
+    distractors: int = 0,
+    appearance: AppearanceSettings | None = None,
 ) -> composer.Environment:
-    """Return the task as a dm_control environment; `options` are those of `ComposerTask`."""
+    """Return the task as a dm_control environment; see `ComposerTask` for the arguments."""
+    made = ComposerTask(
+        task,
+        camera,
+        dynamics=dynamics,
+        actions=actions,
+        pixels=pixels,
+        distractors=distractors,
+        appearance=appearance,
+    )
     return composer.Environment(
-        ComposerTask(task, camera, **options),
+        made,
         random_state=random_state,
         strip_singleton_obs_buffer_dim=True,
         recompile_mjcf_every_episode=False,

@@ -131,13 +131,13 @@ class ContinuousActions(Actions):
 
     def always(self, name: str) -> Tensor:
         """Return the full-speed action of a part; those to a side do not go forward."""
-        given = ((1, 0, 0), (-1, 1, 0), (-1, -1, 0), (-1, 0, 1), (-1, 0, -1))
-        return torch.tensor(given[self.names.index(name)], dtype=torch.float32)
+        actions = ((1, 0, 0), (-1, 1, 0), (-1, -1, 0), (-1, 0, 1), (-1, 0, -1))
+        return torch.tensor(actions[self.names.index(name)], dtype=torch.float32)
 
     def sample(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
         """See `Actions.sample`."""
-        given = torch.rand(*shape, 3, generator=generator, device=generator.device)
-        return 2 * given - 1
+        actions = torch.rand(*shape, 3, generator=generator, device=generator.device)
+        return 2 * actions - 1
 
     def fields(self) -> dict[str, str]:
         """Return the entries of part and rates."""

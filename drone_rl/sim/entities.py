@@ -3,7 +3,6 @@
 from typing import Any, NamedTuple
 
 from dm_control import composer, mjcf
-from dm_control.composer.observation import observable
 from dm_control.mujoco import engine
 
 from drone_rl.config import CameraSettings
@@ -142,29 +141,13 @@ def make_distractors(count: int) -> list[Distractor]:
     return [Distractor(kind, name=f"distractor_{i}") for i, kind in enumerate(kinds)]
 
 
-class DroneObservables(composer.Observables):
-    """What the drone can observe; a task enables what it needs."""
-
-    @composer.observable
-    def front_center(self) -> observable.MJCFCamera:
-        """RGB image of the policy's camera. Shape: (height, width, 3), uint8."""
-        camera = self._entity.camera_settings
-        return observable.MJCFCamera(
-            self._entity.front_center,
-            height=camera.height,
-            width=camera.width,
-            scene_option=hide_drone(),
-        )
-
-
-class Drone(composer.Entity):
+class DroneEntity(composer.Entity):
     """A quadrotor's shape with AirSim's five cameras and a chase camera; dynamics move it."""
 
     semantic_class = SemanticClass.DRONE
 
     def _build(self, size: float, camera: CameraSettings, name: str = "drone") -> None:
         """Make the drone, with a bounding box of so many metres, and its cameras."""
-        self.camera_settings = camera
         self._mjcf_root: Any = mjcf.RootElement(model=name)
         self.body: Any = self._mjcf_root.worldbody.add("body", name="body")
         visual = {"group": BODY_GROUP, "contype": 0, "conaffinity": 0}
@@ -174,14 +157,11 @@ class Drone(composer.Entity):
         for x, end in ((-1, "rear"), (1, "front")):
             for y, side in ((-1, "right"), (1, "left")):
                 place = (x * size * 0.3, y * size * 0.3, size * 0.12)
-                own = {"name": f"rotor_{end}_{side}", "pos": place, "rgba": _DARK, **rotor}
-                self.body.add("geom", type="cylinder", **own)
+                rotor_place = {"name": f"rotor_{end}_{side}", "pos": place, "rgba": _DARK, **rotor}
+                self.body.add("geom", type="cylinder", **rotor_place)
         for spec in DRONE_CAMERAS:
             add_camera(self.body, spec, camera.vertical_fov)
         add_camera(self.body, CHASE, vertical_fov=60.0)
-
-    def _build_observables(self) -> DroneObservables:
-        return DroneObservables(self)
 
     @property
     def mjcf_model(self) -> Any:

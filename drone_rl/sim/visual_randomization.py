@@ -95,11 +95,11 @@ def _uniform(value: Any, source: np.random.RandomState | None, shape: tuple[int,
 def _color(
     settings: AppearanceSettings, source: np.random.RandomState | None, number: int
 ) -> Tensor:
-    given = settings.distractor_color
-    if given is None:
+    color_range = settings.distractor_color
+    if color_range is None:
         turn = number + number // len(PALETTE)  # otherwise each shape would have only two colors
         return torch.tensor(PALETTE[turn % len(PALETTE)], dtype=torch.float64)
-    return torch.stack([_uniform(pair, source, ()) for pair in _pairs(given)])
+    return torch.stack([_uniform(pair, source, ()) for pair in _pairs(color_range)])
 
 
 _OBJECTS = (SemanticClass.TARGET, SemanticClass.OBSTACLE)
@@ -252,9 +252,9 @@ def _sample_numbers(
     def texture(names: Names | None) -> int:
         if not names:
             return -1
-        chosen = 0 if source is None else source.randint(len(names))
-        known = [name for name in names if name != NO_TEXTURE]
-        return -1 if names[chosen] == NO_TEXTURE else known.index(names[chosen])
+        number = 0 if source is None else source.randint(len(names))
+        images = [name for name in names if name != NO_TEXTURE]
+        return -1 if names[number] == NO_TEXTURE else images.index(names[number])
 
     s, fog = settings, settings.fog_visibility
     share = 0.5 if source is None or s.shadows in (0.0, 1.0) else source.uniform()
@@ -281,5 +281,5 @@ def _appearance_stream(random_state: np.random.RandomState) -> np.random.RandomS
 
 
 def _cover(names: Names | None, choice: Tensor, tile: Tensor) -> Texture | None:
-    known = tuple(name for name in names or () if name != NO_TEXTURE)
-    return Texture(images=known, size=tile, choice=choice) if known else None
+    images = tuple(name for name in names or () if name != NO_TEXTURE)
+    return Texture(images=images, size=tile, choice=choice) if images else None

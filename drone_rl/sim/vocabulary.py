@@ -1,7 +1,6 @@
 """Terms of reports; `vocabulary.toml` has those of the built-in tasks."""
 
 import dataclasses
-import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -124,11 +123,11 @@ class _Phrases:
     """Schema of phrases by name; see `drone_rl.utils.schema.Kind`."""
 
     def read(self, value: Any, where: str) -> dict[str, str]:
-        given = as_mapping(value, where)
-        if len(given) > MOST:
-            raise InputError(f"{where} holds {len(given)} phrases; give at most {MOST}")
+        values = as_mapping(value, where)
+        if len(values) > MOST:
+            raise InputError(f"{where} holds {len(values)} phrases; give at most {MOST}")
         phrase = Text(LONGEST)
-        return {phrase.read(k, where): phrase.read(v, f"{where}.{k}") for k, v in given.items()}
+        return {phrase.read(k, where): phrase.read(v, f"{where}.{k}") for k, v in values.items()}
 
 
 def _kind(field: dataclasses.Field) -> Kind:
@@ -151,7 +150,6 @@ def some_cubes(task: Mapping[str, Any]) -> str:
 
 
 MOST_ACTIONS = 16
-_NAME = re.compile(r"[a-z][a-z0-9 _-]{0,23}")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -183,35 +181,23 @@ def shown_actions(numbers: Mapping[str, Any]) -> ShownActions:
     """Return the actions of `explanation.json`; raises `InputError` if they are invalid."""
     if "actions" not in numbers:
         return SHOWN_MOVES
-    given = _ACTION_FIELDS.read(numbers["actions"], "actions")
-    names, count = given["names"], len(given["names"])
-    if len(set(names)) < count or sorted(given["order"]) != list(range(count)):
+    values = _ACTION_FIELDS.read(numbers["actions"], "actions")
+    names, count = values["names"], len(values["names"])
+    if len(set(names)) < count or sorted(values["order"]) != list(range(count)):
         raise InputError(
-            f"actions.order={shown(str(given['order']))} or a name is invalid; give {count} "
+            f"actions.order={shown(str(values['order']))} or a name is invalid; give {count} "
             "different names, and the index of each once"
         )
-    if not len(given["arrows"]) == len(given["colors"]) == count:
+    if not len(values["arrows"]) == len(values["colors"]) == count:
         raise InputError(f"actions have {count} names; give each an arrow and a color")
-    speeds = given.get("speeds")
-    return ShownActions(names, given["order"], given["arrows"], given["colors"], speeds)
-
-
-class _Name:
-    """Schema of an action's name, which pages and tables show."""
-
-    def read(self, value: Any, where: str) -> str:
-        text = Text(24).read(value, where)
-        if not _NAME.fullmatch(text):
-            raise InputError(
-                f"{where}={shown(value)} is not an action's name; give lower-case letters"
-            )
-        return text
+    speeds = values.get("speeds")
+    return ShownActions(names, values["order"], values["arrows"], values["colors"], speeds)
 
 
 _INDICES = Several(Whole(0, MOST_ACTIONS - 1), 1, MOST_ACTIONS)
 _ACTION_FIELDS = Record(
     {
-        "names": Several(_Name(), 1, MOST_ACTIONS),
+        "names": Several(Text(24), 1, MOST_ACTIONS),
         "order": _INDICES,
         "arrows": Several(Several(Real(-1.0, 1.0), 2, 2), 1, MOST_ACTIONS),
         "colors": Several(Several(Whole(0, 255), 3, 3), 1, MOST_ACTIONS),

@@ -10,9 +10,8 @@ from torch import Tensor
 
 from drone_rl.config import ActionSettings, BaseTaskSettings, CameraSettings, DynamicsSettings
 from drone_rl.sim.actions import Entry
-from drone_rl.sim.composer_task import ComposerTask
+from drone_rl.sim.composer_task import ComposerTask, poses_of
 from drone_rl.sim.dynamics import BodyState, Dynamics, draw_seeds, make_dynamics
-from drone_rl.sim.dynamics.state import twist_about_z
 from drone_rl.sim.entities import FRONT_CENTER
 from drone_rl.sim.rendering import (
     Appearance,
@@ -26,9 +25,8 @@ from drone_rl.sim.rendering import (
 from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.tasks import State, Task, as_task
-from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Instance, Maybe, Text, Whole
+from drone_rl.utils.schema import Instance, Maybe
 
 LARGEST_REWARD = 1e10
 """Largest reward of a step, so that sums of rewards and of their squares are finite in float32."""
@@ -84,8 +82,6 @@ class Worlds:
         Raises:
             InputError: An argument is unusable.
         """
-        Whole(1).read(num_envs, "num_envs")
-        device = Text().read(device, "device")  # torch's, too
         check_device(device)
         Maybe(Instance(Appearance)).read(appearance, "appearance")
         self.appearance, self.distractors = appearance, distractors
@@ -134,8 +130,8 @@ class Worlds:
     @functools.cached_property
     def scene(self) -> Scene:
         """The compiled model of dm_control."""
-        own: dict[str, Any] = {"dynamics": self.dynamics, "distractors": self.distractors}
-        return ComposerTask(self.task, self.camera, pixels=False, **own).compile()
+        options: dict[str, Any] = {"dynamics": self.dynamics, "distractors": self.distractors}
+        return ComposerTask(self.task, self.camera, pixels=False, **options).compile()
 
     @functools.cached_property
     def renderer(self) -> Renderer:
@@ -195,20 +191,20 @@ class Worlds:
     def advance(self, state: State, action: Tensor) -> tuple[State, Tensor]:
         """Return states a step later, and rewards; the environments stay as they are."""
         around = [self.task.obstacles(state)] if self.dynamics.needs_obstacles else []
-        found: Any = self.task.step(state, self.dynamics.step(state.body, action, *around))
-        is_pair = isinstance(found, tuple) and len(found) == 2
-        if not is_pair or getattr(found[1], "shape", None) != action.shape[:1]:
+        outcome: Any = self.task.step(state, self.dynamics.step(state.body, action, *around))
+        reward: Any = outcome[1] if isinstance(outcome, tuple) and len(outcome) == 2 else None
+        if getattr(reward, "shape", None) != action.shape[:1]:
             raise InputError(
                 f"{type(self.task).__name__}.step must return two things: the states after the "
                 "step, and the rewards, a tensor with one number for each environment"
             )
-        is_usable = (found[1] <= LARGEST_REWARD) & (found[1] >= -LARGEST_REWARD)  # nor NaN
+        is_usable = (reward <= LARGEST_REWARD) & (reward >= -LARGEST_REWARD)  # nor NaN
         if not bool(is_usable.all()):
             raise InputError(
-                f"{type(self.task).__name__}.step returns a reward of {found[1][~is_usable][0]:g}; "
+                f"{type(self.task).__name__}.step returns a reward of {reward[~is_usable][0]:g}; "
                 f"scale rewards to at most {LARGEST_REWARD:g}, so that their sums stay finite"
             )
-        return found
+        return outcome
 
     def render(
         self, state: State, view: View | None = None, appearance: Appearance | None = None
@@ -238,24 +234,15 @@ class Worlds:
         """Return the combined appearance; the same object as before if nothing has changed."""
         if appearance is None:
             return self.appearance
-        known = self._combined
-        if known is None or known[0] is not appearance or known[1] is not self.appearance:
+        combined = self._combined
+        if combined is None or combined[0] is not appearance or combined[1] is not self.appearance:
             whole = appearance.over(self.appearance)
-            self._combined = known = (appearance, self.appearance, whole)
-        return known[2]
+            self._combined = combined = (appearance, self.appearance, whole)
+        return combined[2]
 
     def poses(self, state: State, appearance: Appearance | None = None) -> Poses:
         """Return the poses to render, level on a gimbal; `appearance` positions distractors."""
-        props = self.task.places(state)
-        if self.distractors:
-            shown = None if appearance is None else appearance.distractors
-            hidden = torch.tensor([0.0, 0.0, -HIDDEN_DEPTH]).expand(len(props), self.distractors, 3)
-            places = hidden if shown is None else shown.expand(len(props)).places
-            props = torch.cat([props, places.to(props)], 1)
-        attitude = state.body.attitude
-        if self.dynamics.mount == "gimbal":
-            attitude = twist_about_z(attitude)
-        return Poses(state.body.position, attitude, props)
+        return poses_of(self.task, self.dynamics, state, self.distractors, appearance)
 
     def prepare(self, view: View | None = None) -> None:
         """Prepare the renderer for a view before the first image."""

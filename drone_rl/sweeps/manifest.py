@@ -10,7 +10,6 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from drone_rl.config.configuration import check_same_config
-from drone_rl.config.training import TrainSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import (
     last_of,
@@ -21,10 +20,19 @@ from drone_rl.utils.files import (
 from drone_rl.utils.limits import SWEEP_BYTES
 from drone_rl.utils.overrides import COMMAND, MOST_OVERRIDES, check_harmless
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.schema import Maybe, Plain, Record, Several, Text, Whole, as_mapping, shown
-from drone_rl.utils.settings import current_names
+from drone_rl.utils.schema import (
+    Maybe,
+    OneOf,
+    Plain,
+    Record,
+    Several,
+    Text,
+    Whole,
+    as_mapping,
+    shown,
+)
 
-FORMAT = "drone_rl sweep"
+FORMAT = "drone_rl sweep, version 2"
 MAY_CHANGE = ("resume", "logger", "paths", "trainer.checkpoint_interval_s", "renderer")
 """Settings that may differ when a sweep is resumed."""
 _LEVELS = 100
@@ -44,7 +52,7 @@ _RUN = Record(
 )
 _SWEEP = Record(
     {
-        "format": Text(),
+        "format": OneOf((FORMAT,)),
         "command": COMMAND,
         "settings": Plain(),
         "runs": Several(_RUN, 0, 10_000),
@@ -80,9 +88,9 @@ class Run:
     def arguments(self) -> list[str]:
         """Return the arguments of `drone-rl` that begin or resume this run."""
         folder = quoted(str(self.folder))
-        own = ["hydra.mode=RUN", f"hydra.run.dir={folder}"]
+        single = ["hydra.mode=RUN", f"hydra.run.dir={folder}"]
         resume = [f"resume={folder}"] if self.checkpoint.is_file() else []
-        return ["train", *self.overrides, *own, *resume]
+        return ["train", *self.overrides, *single, *resume]
 
     def repeat_command(self) -> str:
         """Return the shell command that repeats this training run."""
@@ -129,8 +137,13 @@ class Sweep:
             {"number": r.number, "overrides": list(r.overrides), "folder": self.name_of(r)}
             for r in self.runs
         ]
-        own = {"format": FORMAT, "command": self.command, "settings": self.settings, "runs": runs}
-        content = {**own, **provenance()}
+        content = {
+            "format": FORMAT,
+            "command": self.command,
+            "settings": self.settings,
+            "runs": runs,
+            **provenance(),
+        }
         write_atomically(self.folder / "sweep.json", json.dumps(content, indent=2))
 
 
@@ -157,15 +170,12 @@ def read_sweep(folder: Path) -> Sweep:
             )
             for run in content["runs"]
         ]
-        if len({run.number for run in runs}) < len(runs):
-            raise InputError("two runs have the same number")
-        check_folders(runs)
-        given = as_mapping(content["settings"], "settings")
-        settings = current_names(TrainSettings, given)
+        settings = dict(as_mapping(content["settings"], "settings"))
         return Sweep(folder, content["command"], settings, runs)
     except InputError as error:
         raise InputError(
-            f"{path} is damaged ({error}); move the folder away and sweep again"
+            f"{path} is damaged, or of an older version of drone_rl ({error}); move the folder "
+            "away and sweep again"
         ) from None
 
 
@@ -215,14 +225,14 @@ def open_sweep(
         sweep = Sweep(folder, shlex.join(command), dict(settings), list(runs))
     else:
         sweep = read_sweep(folder)
-        known = {run.number: run.overrides for run in sweep.runs}
-        if any(known.get(run.number, run.overrides) != run.overrides for run in runs):
+        begun = {run.number: run.overrides for run in sweep.runs}
+        if any(begun.get(run.number, run.overrides) != run.overrides for run in runs):
             raise InputError(
                 f"hydra.sweep.dir={folder} holds another sweep, begun by: {sweep.command}; "
                 "choose another folder, or give that command to resume it"
             )
         check_same_config(sweep.settings, json.loads(json.dumps(settings)), MAY_CHANGE)
-        sweep.runs += [run for run in runs if run.number not in known]
+        sweep.runs += [run for run in runs if run.number not in begun]
         check_folders(sweep.runs)
     sweep.save()
     return sweep

@@ -20,7 +20,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import make_folder, remove_leftovers, write_atomically
 from drone_rl.utils.progress import Progress as Report
 from drone_rl.utils.progress import as_progress, note_shown
-from drone_rl.utils.readers import NAMES_OF_0_1, read_table
+from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import Instance, Several, shown
 
 
@@ -151,10 +151,9 @@ class CsvCallback(Callback):
             return
         rows = [*read_table(self.path)] if self.path.stat().st_size else []
         whole = [r for r in rows[1:] if len(r) == len(rows[0])]  # the last may be cut short
-        header = [[NAMES_OF_0_1.get(name, name) for name in row] for row in rows[:1]]
         kept = [r for r in whole if self._update_of(r) <= training.progress.updates]
         text = io.StringIO(newline="")
-        csv.writer(text).writerows(header + kept if kept else [])  # `on_update` writes the header
+        csv.writer(text).writerows(rows[:1] + kept if kept else [])  # `on_update` writes the header
         write_atomically(self.path, text.getvalue())
 
     def _update_of(self, row: Sequence[str]) -> int:

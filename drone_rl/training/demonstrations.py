@@ -44,7 +44,7 @@ from drone_rl.utils.files import (
     refuse_links,
     write_atomically,
 )
-from drone_rl.utils.limits import ARRAYS_BYTES, Allowance
+from drone_rl.utils.limits import ARRAYS_BYTES
 from drone_rl.utils.schema import Instance, Plain, Record, Text, Whole, as_mapping, shown
 
 FORMAT = "drone_rl demonstration"
@@ -211,17 +211,13 @@ class Demonstration:
         return file.getvalue()
 
 
-def read_demonstration(path: Path, allowance: Allowance | None = None) -> Demonstration:
+def read_demonstration(path: Path) -> Demonstration:
     """Read a file strictly.
-
-    Args:
-        path: The file.
-        allowance: Bytes that its arrays may take, shared with those of other files.
 
     Raises:
         InputError: It is damaged, too large, or no demonstration of this version.
     """
-    arrays = read_arrays(path, allowance=allowance or Allowance(ARRAYS_BYTES))
+    arrays = read_arrays(path)
     try:
         if arrays.keys() != {*_ARRAYS, "about"}:
             raise InputError(f"it does not hold exactly about, {', '.join(_ARRAYS)}")
@@ -254,8 +250,7 @@ def read_demonstrations(
         conditions: Those of the training that learns from them, if they must be the same.
 
     Raises:
-        InputError: There are none, one is unusable or was recorded under other conditions, or all
-            together are too large.
+        InputError: There are none, or one is unusable or was recorded under other conditions.
     """
     folder = as_path(folder, "folder")
     try:
@@ -271,9 +266,9 @@ def read_demonstrations(
             f"demonstrations={folder} holds {len(paths)} files *.npz; give a folder with 1 to "
             f"{MOST_DEMONSTRATIONS} recorded flights"
         )
-    allowance, found = Allowance(ARRAYS_BYTES), []
+    found = []
     for path in paths:
-        demonstration = read_demonstration(path, allowance)
+        demonstration = read_demonstration(path)
         if conditions is not None:
             demonstration.conditions.check_same(conditions, str(path))
         found.append(demonstration)

@@ -22,9 +22,6 @@ from drone_rl.training.restore import check_fits, check_optimizer
 from drone_rl.utils.errors import InputError
 
 ADVANTAGE, TARGET, ENTROPY = "advantage", "value_target", "entropy"
-_OPTIMIZER = "optimiser"
-"""Key of the optimizer's state in checkpoints; the spelling is part of the file format."""
-
 
 _MODES = threading.Lock()
 """TorchRL's loss modules set modes of the whole process, and restore them afterwards."""
@@ -104,21 +101,21 @@ class GradientLearner:
         """Return the weights and the states of optimizer and scheduler."""
         return {
             "policy": self.network.state_dict(),
-            _OPTIMIZER: self.optimizer.state_dict(),
+            "optimizer": self.optimizer.state_dict(),
             "scheduler": None if self.scheduler is None else self.scheduler.state_dict(),
         }
 
     def check_state(self, state: Mapping[str, Any]) -> None:
         """See `Learner.check_state`."""
         for key, value in self.state_dict().items():
-            if key != _OPTIMIZER:
+            if key != "optimizer":
                 check_fits(state[key], value, key)
-        check_optimizer(state[_OPTIMIZER], self.optimizer)
+        check_optimizer(state["optimizer"], self.optimizer)
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Resume from a state."""
         self.network.load_state_dict(state["policy"])
-        self.optimizer.load_state_dict(state[_OPTIMIZER])
+        self.optimizer.load_state_dict(state["optimizer"])
         if self.scheduler is not None:
             self.scheduler.load_state_dict(state["scheduler"])
 

@@ -44,7 +44,7 @@ from drone_rl.utils.files import (
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import Real, shown
-from drone_rl.utils.settings import current_names, kinds_of
+from drone_rl.utils.settings import kinds_of
 
 _log = logging.getLogger(__name__)
 MAY_CHANGE = (
@@ -318,8 +318,7 @@ def reraise_signal(training: Training, function: str = "train") -> Training:
 
 def _own(config: Mapping[str, Any]) -> dict[str, Any]:
     """Return the training settings of a checkpoint."""
-    given = current_names(TrainSettings, config)
-    return {k: v for k, v in given.items() if k in kinds_of(TrainSettings)}
+    return {k: v for k, v in config.items() if k in kinds_of(TrainSettings)}
 
 
 def settings_for(

@@ -85,11 +85,11 @@ def read_shifts(
         task = as_task(described.task)
         numbers["terms"] = task.vocabulary.as_dict()  # the file's own could say anything
         shape = (described.camera.height, described.camera.width, 3)
-        shown = {name: _read_strip(pictures.get(name), shape, name) for name in numbers["axes"]}
+        images = {name: _read_strip(pictures.get(name), shape, name) for name in numbers["axes"]}
     except InputError as error:
         raise InputError(f"shifts {path} can't be used: {error}") from None
     when = datetime.datetime.fromtimestamp(path.stat().st_mtime).strftime("%Y-%m-%d %H:%M")
-    return SavedShifts(path, {**numbers, "file": {"path": str(path), "dated": when}}, shown)
+    return SavedShifts(path, {**numbers, "file": {"path": str(path), "dated": when}}, images)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -104,7 +104,7 @@ class _Each:
         """See `drone_rl.utils.schema.Kind`."""
         given = as_mapping(value, where)
         if self.names is None:
-            Plain(most=1000).read(given, where)
+            Plain().read(given, where)
         else:
             for key in given:
                 OneOf(self.names).read(key, f"a name in {where}")
@@ -115,7 +115,7 @@ _ANY = Real(-1e12, 1e12)
 _COUNT, _PART = Whole(0, 10**9), Real(0.0, 1.0)
 _BOUNDS = {"lower95": _PART, "upper95": _PART}
 _SHARE = Record({"share": Maybe(_PART), **_BOUNDS, "successes": _COUNT, "trials": _COUNT})
-_FREE = Plain(most=1000, deepest=3)
+_FREE = Plain()
 _SIGNED = Real(-1.0, 1.0)
 _MEAN = Record({"mean": Maybe(_PART), **_BOUNDS, "count": _COUNT})
 _FIGURES = {
@@ -178,8 +178,8 @@ _WHOLE = Record(
         "format": OneOf((FORMAT,)),
         "format_version": Whole(FORMAT_VERSION, FORMAT_VERSION),
         "policy": Text(),
-        "network": Record({"weights": Text(64), "description": Plain(most=1000)}),
-        "settings": Plain(most=1000),
+        "network": Record({"weights": Text(64), "description": Plain()}),
+        "settings": Plain(),
         "seed": Whole(0),
         "seed_is_fixed": Flag(),
         "terms": Plain(),
@@ -199,13 +199,13 @@ def _refuse_another(
 ) -> None:
     """Refuse figures of another network, camera or task, or with unknown settings."""
     stated = numbers["network"]["weights"]
-    if stated != (own := fingerprint(weights)):
+    if stated != (actual := fingerprint(weights)):
         raise InputError(
-            f"it is for a network with hash {stated[:12]}..., but the policy's has {own[:12]}..."
+            f"it is for a network with hash {stated[:12]}..., but the policy's has {actual[:12]}..."
         )
-    of, mine = parse(numbers["network"]["description"]).as_dict(), described.as_dict()
+    of, description = parse(numbers["network"]["description"]).as_dict(), described.as_dict()
     for part in ("task", *_PARTS):
-        if of.get(part) != mine.get(part):
+        if of.get(part) != description.get(part):
             raise InputError(f"it is of another {part} than the policy's")
     stated = ShiftSettings.read(numbers["settings"], "settings")
     if stated.seed is None or stated.seed != numbers.get("seed", stated.seed):

@@ -14,23 +14,13 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.limits import (
-    FOLDER_ENTRIES,
-    JSON_VALUES,
-    SMALL_JSON_BYTES,
-    check_depth,
-    check_json_size,
-)
+from drone_rl.utils.limits import SMALL_JSON_BYTES
 from drone_rl.utils.schema import shown
 
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP)
 """Errors of file systems without locks."""
 _PROCESS = re.compile(r"[1-9][0-9]{0,6}")
 """Process id at the end of a temporary file's name."""
-_FORMER_SUFFIX = re.compile(r"[a-z0-9_]{8}")
-"""Random end of such a name in versions until 0.1."""
-_LONGEST_NUMBER = 40
-"""Digits of an integer in a JSON file; seeds of 128 bits have up to 39."""
 
 
 def as_path(value: str | Path, where: str) -> Path:
@@ -107,8 +97,8 @@ def newest(paths: Iterable[Path]) -> Path | None:
 
 def trained_policies(outputs: str | Path) -> list[Path]:
     """Return last.pt of every training under a folder of outputs, the newest first."""
-    found = as_path(outputs, "outputs").glob("train/**/checkpoints/last.pt")
-    return sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
+    checkpoints = as_path(outputs, "outputs").glob("train/**/checkpoints/last.pt")
+    return sorted(checkpoints, key=lambda path: path.stat().st_mtime, reverse=True)
 
 
 def read_json(path: Path, most: int = SMALL_JSON_BYTES) -> Any:
@@ -116,41 +106,21 @@ def read_json(path: Path, most: int = SMALL_JSON_BYTES) -> Any:
     return parse_json(read_bytes(path, most), str(path))
 
 
-def parse_json(
-    content: bytes | str, where: str, *, allow_nan: bool = False, most_values: int = JSON_VALUES
-) -> Any:
-    """Return plain data from JSON with unique names, finite numbers and bounded integers.
+def parse_json(content: bytes | str, where: str, *, allow_nan: bool = False) -> Any:
+    """Return plain data from JSON, whose numbers are finite by default.
 
-    `where` is its name for messages, `most_values` the largest number of values.
+    `where` is its name for messages.
 
     Raises:
         InputError: It is no such JSON.
     """
-    check_json_size(content, where, most_values)
+    number = float if allow_nan else _finite
     try:
-        text = content if isinstance(content, str) else content.decode()
-        value = json.loads(text, object_pairs_hook=_once, **_NUMBERS[allow_nan])
+        return json.loads(content, parse_float=number, parse_constant=number)
     except (ValueError, RecursionError) as error:
-        reasons = {RecursionError: "nested too deeply", UnicodeDecodeError: "no utf-8 text"}
-        reason = reasons.get(type(error), str(error)[:200])
         raise InputError(
-            f"{where} is damaged or no plain JSON ({reason}); give another file"
+            f"{where} is damaged or no plain JSON ({str(error)[:200]}); give another file"
         ) from None
-    check_depth(value, where)
-    return value
-
-
-def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    mapping = dict(pairs)
-    if len(mapping) < len(pairs):
-        raise ValueError("a name occurs twice")
-    return mapping
-
-
-def _whole(digits: str) -> int:
-    if len(digits) > _LONGEST_NUMBER:
-        raise ValueError("a number is too long")
-    return int(digits)
 
 
 def _finite(digits: str) -> float:
@@ -160,38 +130,23 @@ def _finite(digits: str) -> float:
     return value
 
 
-_NUMBERS: dict[bool, dict[str, Any]] = {
-    False: {"parse_int": _whole, "parse_float": _finite, "parse_constant": _finite},
-    True: {"parse_int": _whole, "parse_float": float, "parse_constant": float},
-}
-"""Parsers of numbers, by whether NaN and infinity are accepted."""
-
-
 def refuse_links(folder: Path, depth: int = 3) -> None:
     """Check that a folder has no links, so that reading and writing below it stays in it.
 
     `depth` levels of folders are searched.
 
     Raises:
-        InputError: It contains a link or a device, or too many files.
+        InputError: It contains a link or a device.
     """
-    for number, entry in enumerate(_entries(folder, depth), start=1):
-        if number > FOLDER_ENTRIES:
-            raise InputError(
-                f"{folder} has more than {FOLDER_ENTRIES} files and folders; give a smaller folder"
-            )
-        if not (entry.is_file(follow_symlinks=False) or entry.is_dir(follow_symlinks=False)):
+    for entry in os.scandir(folder):
+        is_folder = entry.is_dir(follow_symlinks=False)
+        if not is_folder and not entry.is_file(follow_symlinks=False):
             raise InputError(
                 f"{entry.path} is a link or a device; give a folder of regular files, or replace "
                 "the link by what it points to"
             )
-
-
-def _entries(folder: Path | str, depth: int) -> Iterator[os.DirEntry[str]]:
-    for entry in os.scandir(folder):
-        yield entry
-        if depth > 1 and entry.is_dir(follow_symlinks=False):
-            yield from _entries(entry.path, depth - 1)
+        if is_folder and depth > 1:
+            refuse_links(Path(entry.path), depth - 1)
 
 
 def to_file_name(name: str) -> str:
@@ -240,8 +195,7 @@ def remove_leftovers(folder: Path, *names: str) -> None:
     for name in names:
         for path in folder.glob(f".{name}.*"):
             suffix = path.name.removeprefix(f".{name}.")
-            is_ours = _PROCESS.fullmatch(suffix) and not _is_alive(int(suffix))
-            if (is_ours or _FORMER_SUFFIX.fullmatch(suffix)) and path.is_file():
+            if _PROCESS.fullmatch(suffix) and not _is_alive(int(suffix)) and path.is_file():
                 with contextlib.suppress(OSError):
                     path.unlink()
 

@@ -113,9 +113,9 @@ def episode_means(values: NDArray, episode: NDArray) -> NDArray:
 
     Shapes: (T,), and the episode of each frame, (T,), to (E,), one for each episode with values.
     """
-    known = np.isfinite(values)
-    _, number = np.unique(episode[known], return_inverse=True)
-    totals = np.bincount(number, weights=values[known].astype(np.float64))
+    has_value = np.isfinite(values)
+    _, number = np.unique(episode[has_value], return_inverse=True)
+    totals = np.bincount(number, weights=values[has_value].astype(np.float64))
     return totals / np.bincount(number)
 
 

@@ -12,7 +12,6 @@ from typing import Any
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.readers import read_yaml
 from drone_rl.utils.schema import Kind, Several, Text, shown
-from drone_rl.utils.settings import FORMER_CHOICES, FORMER_NAMES
 
 _OF_ONE_FOLDER = re.compile(r"\+{0,2}(resume|trial|demonstrations|paths(\.\w+)?)")
 """Overrides that do not affect how a run continues: its folder (it may have been moved), its sweep,
@@ -25,7 +24,7 @@ _HARMLESS = re.compile(rf"(\+{{0,2}}{_NAME}([./@]{_NAME})*=.*|~{_NAME}([./@]{_NA
 _SCALAR = r"[\w.+-]*"
 _VALUE = rf"({_SCALAR}|\[({_SCALAR}(, ?{_SCALAR})*)?\])"
 _SECTIONS = (
-    "task|appearance|dynamics|actions|camera|trainer|network|policy|returns|objective|optimizer|"
+    "task|appearance|dynamics|actions|camera|trainer|network|returns|objective|optimizer|"
     "scheduler|transforms|provable|cloning"
 )
 _TAKEN_OVER = (
@@ -61,20 +60,8 @@ COMMAND: Kind = _Command()
 """Kind (see `schema`) of a training command."""
 
 
-_FORMER = re.compile(rf"^(\+{{0,2}}|~)({'|'.join(map(re.escape, FORMER_NAMES))})(?=[.=@]|$)")
-
-
-def with_current_name(override: str) -> str:
-    """Return an override with the current names of its setting and choices."""
-    override = _FORMER.sub(lambda found: found[1] + FORMER_NAMES[found[2]], override)
-    for choice, current in FORMER_CHOICES.items():
-        group, _, former = choice.partition("=")
-        override = re.sub(rf"^(\+{{0,2}}{group}=.*?)\b{former}\b", rf"\1{current}", override)
-    return override
-
-
 def check_harmless(override: str, where: str) -> str:
-    """Return an override under its current name if it is safe to copy into a shell.
+    """Return an override if it is safe to copy into a shell.
 
     Raises:
         InputError: It refers to code, a Hydra setting or the value of another setting.
@@ -85,7 +72,7 @@ def check_harmless(override: str, where: str) -> str:
         raise InputError(
             f"{where} sets {shown(text)}, which is not a plain setting; remove it from the file"
         )
-    return with_current_name(text)
+    return text
 
 
 def read_overrides(folder: Path) -> list[str]:
@@ -93,8 +80,8 @@ def read_overrides(folder: Path) -> list[str]:
     path = folder / ".hydra" / "overrides.yaml"
     if not path.exists():
         return []
-    found = read_yaml(path)
-    texts = Several(Text(_LONGEST), 0, MOST_OVERRIDES).read(found, str(path))
+    content = read_yaml(path)
+    texts = Several(Text(_LONGEST), 0, MOST_OVERRIDES).read(content, str(path))
     return [check_harmless(text, str(path)) for text in texts]
 
 
@@ -105,13 +92,16 @@ def taken_over(folder: Path, typed: Collection[str]) -> list[str]:
         InputError: An override may not be taken from a file.
     """
     keys = {_key(override) for override in typed}
-    found = [o for o in read_overrides(folder) if _key(o) not in keys and not _is_of_one_folder(o)]
-    for override in must_be_typed(found):
+    recorded = [
+        o for o in read_overrides(folder) if _key(o) not in keys and not _is_of_one_folder(o)
+    ]
+    for override in must_be_typed(recorded):
         raise InputError(
             f"{folder}/.hydra/overrides.yaml sets {shown(override)}, which can't be read from a "
-            "file for safety; if you trust it, repeat it on the command line"
+            "file for safety; if you trust it, repeat it on the command line; start a run of an "
+            "older version of drone_rl again"
         )
-    return found
+    return recorded
 
 
 def must_be_typed(overrides: Iterable[str]) -> list[str]:

@@ -32,8 +32,8 @@ def line_of(error: BaseException) -> str:
     if isinstance(error, SyntaxError) and error.filename:
         return f"line {error.lineno} of {error.filename}"
     frames = traceback.extract_tb(error.__traceback__)
-    own = (f for f in reversed(frames) if not f.filename.startswith(("<frozen", *_OTHERS)))
-    return next((f"line {frame.lineno} of {frame.filename}" for frame in own), "")
+    of_user = (f for f in reversed(frames) if not f.filename.startswith(("<frozen", *_OTHERS)))
+    return next((f"line {frame.lineno} of {frame.filename}" for frame in of_user), "")
 
 
 def failure(what: str, error: BaseException, place: str = "") -> str:

@@ -9,17 +9,13 @@ import math
 import numbers
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 from drone_rl.utils.errors import InputError, did_you_mean
 
 LONGEST_TEXT = 4000
 """Characters of one text in a file."""
-MOST_VALUES = 20_000
-"""Values of a part of a file without a schema."""
-DEEPEST = 12
-"""Levels of such a part."""
 _MOST_BITS = 10_000
 """Of a whole number in a message."""
 
@@ -43,7 +39,6 @@ class Whole:
 
     def read(self, value: Any, where: str) -> int:
         """See `Kind`."""
-        _refuse_text(value, where, self.words)
         if not _is_number(value, numbers.Integral):
             raise InputError(f"{where}={shown(value)} is not a whole number; give {self.words}")
         if not self.low <= value <= self.high:
@@ -73,7 +68,6 @@ class Real:
 
     def read(self, value: Any, where: str) -> float:
         """See `Kind`."""
-        _refuse_text(value, where, self.words)
         value = _unboxed(value)
         if not _is_number(value, numbers.Real) or not self._holds(value):
             raise InputError(f"{where}={shown(value)} is out of range; give {self.words}")
@@ -137,24 +131,13 @@ class Instance:
 
     def read(self, value: Any, where: str) -> Any:
         """See `Kind`; a class with `from_name` accepts names."""
-        if value == "???":  # OmegaConf's mark of a setting that was removed
-            raise InputError(f"{where} is missing; give {where}=NAME")
         if isinstance(value, str) and hasattr(self.of, "from_name"):
             return self.of.from_name(value, where)
         if not isinstance(value, self.of):
-            example = _example_of(self.of)
-            remedy = f"{example.__module__}.{example.__name__}(...)"
-            remedy = f"a {self.of.__name__}" if self.of.__module__ == "builtins" else remedy
-            remedy += " or a registered name" if hasattr(self.of, "from_name") else ""
-            raise InputError(f"{where}={shown(value)} is no {self.of.__name__}; give {remedy}")
+            name = self.of.__name__
+            remedy = " or a registered name" if hasattr(self.of, "from_name") else ""
+            raise InputError(f"{where}={shown(value)} is no {name}; give one{remedy}")
         return value
-
-
-def _example_of(cls: type) -> type:
-    """Return the first class that is derived from one whose choices have names, else the class."""
-    while hasattr(cls, "from_name") and (derived := cls.__subclasses__()):
-        cls = derived[0]
-    return cls
 
 
 @dataclasses.dataclass(frozen=True)
@@ -202,14 +185,7 @@ class Maybe:
 
     def read(self, value: Any, where: str) -> Any:
         """See `Kind`."""
-        try:
-            return None if value is None else self.kind.read(value, where)
-        except InputError:
-            if isinstance(value, str) and value.lower() == "none":
-                raise InputError(
-                    f"{where}={value} is a text; write null (None in Python)"
-                ) from None
-            raise
+        return None if value is None else self.kind.read(value, where)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -247,7 +223,6 @@ class Span:
     def read(self, value: Any, where: str) -> Any:
         """See `Kind`."""
         if not self._is_range(value):
-            self._refuse_mixture(value, where)
             return self.kind.read(value, where)
         low, high = (self.kind.read(item, f"{where}[{i}]") for i, item in enumerate(value))
         pairs = zip(low, high, strict=True) if isinstance(low, tuple) else [(low, high)]
@@ -257,13 +232,6 @@ class Span:
                     f"{where} goes from {least:g} to {most:g}, which is less; give the lower first"
                 )
         return low, high
-
-    def _refuse_mixture(self, value: Any, where: str) -> None:
-        """Raise an `InputError` for a list of which an item is a list."""
-        inside = value if isinstance(value, list | tuple) else ()
-        if isinstance(self.kind, Several) and any(isinstance(i, list | tuple) for i in inside):
-            remedy = "give numbers, or the range of all as [[LOW,...],[HIGH,...]]"
-            raise InputError(f"{where} has ranges of single values; {remedy}")
 
     def _is_range(self, value: Any) -> bool:
         if not isinstance(value, list | tuple) or len(value) != 2:
@@ -323,25 +291,15 @@ class Record:
 
 @dataclasses.dataclass(frozen=True)
 class Plain:
-    """Any plain data of limited size: texts, numbers, true, false, none, lists, mappings."""
-
-    most: int = MOST_VALUES
-    deepest: int = DEEPEST
+    """Any plain data: texts, finite numbers, true, false, none, lists, mappings."""
 
     def read(self, value: Any, where: str) -> Any:
         """See `Kind`."""
-        seen, level = 0, [value]
-        for _ in range(self.deepest + 1):
-            below: list[Any] = []
-            for item in level:
-                seen += len(item) if isinstance(item, Mapping | list | tuple) else 0
-                if seen > self.most:
-                    raise InputError(f"{where} holds more than {self.most} values")
-                below.extend(_inside(item, where))
-            if not below:
-                return value
-            level = below
-        raise InputError(f"{where} is nested more than {self.deepest} times")
+        try:
+            _check_plain(value, where)
+        except RecursionError:
+            raise InputError(f"{where} is nested too deeply") from None
+        return value
 
 
 def as_mapping(value: Any, where: str) -> Mapping[str, Any]:
@@ -375,24 +333,17 @@ def _is_number(value: Any, kind: type) -> bool:
     return isinstance(value, kind) and not isinstance(value, bool)
 
 
-def _refuse_text(value: Any, where: str, words: str) -> None:
-    """Raise an `InputError` for a text where a number belongs."""
-    if isinstance(value, str):
-        raise InputError(f"{where}={shown(value)} is a text; give {words}")
-
-
-def _inside(item: Any, where: str) -> Sequence[Any]:
-    """The values of a list or mapping; a single value is checked and contains nothing."""
-    if isinstance(item, Mapping):
-        for key in as_mapping(item, where):
+def _check_plain(value: Any, where: str) -> None:
+    if isinstance(value, Mapping):
+        for key, item in as_mapping(value, where).items():
             Text().read(key, f"a name in {where}")
-        return list(item.values())
-    if isinstance(item, list | tuple):
-        return item
-    if isinstance(item, str):
-        Text().read(item, f"a text in {where}")
-    elif isinstance(item, float) and not math.isfinite(item):
-        raise InputError(f"{where} holds {item}; every number must be finite")
-    elif item is not None and not isinstance(item, bool | int | float):
-        raise InputError(f"{where} holds a value of type {type(item).__name__}; give plain data")
-    return ()
+            _check_plain(item, where)
+    elif isinstance(value, list | tuple):
+        for item in value:
+            _check_plain(item, where)
+    elif isinstance(value, str):
+        Text().read(value, f"a text in {where}")
+    elif isinstance(value, float) and not math.isfinite(value):
+        raise InputError(f"{where} holds {value}; every number must be finite")
+    elif value is not None and not isinstance(value, bool | int | float):
+        raise InputError(f"{where} holds a value of type {type(value).__name__}; give plain data")

@@ -132,8 +132,8 @@ def side_stream(random_state: np.random.RandomState, *key: int) -> np.random.Gen
 
     It depends on the state and the key only, so it is the same after a restart from a saved state.
     """
-    own = get_state(random_state)
-    child = np.random.SeedSequence([own["state"], own["inc"]], spawn_key=key)
+    state = get_state(random_state)
+    child = np.random.SeedSequence([state["state"], state["inc"]], spawn_key=key)
     return np.random.Generator(np.random.PCG64(child))
 
 

@@ -7,7 +7,6 @@ import contextlib
 import dataclasses
 import functools
 import math
-import operator
 import re
 import types
 import typing
@@ -19,34 +18,11 @@ from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.schema import Flag, Instance, Kind, Maybe, Real, Record, Text, as_mapping
 
 S = TypeVar("S", bound="Settings")
-FORMER_NAMES = {"optimiser": "optimizer", "trainer.minibatch_frames": "trainer.chunk_frames"}
-"""Former names of settings, the newest last. Command lines, arguments and files may have them."""
-FORMER_CHOICES = {
-    "collector=threads": "episodes",
-    "scheduler=none": "constant",
-    "returns=standardised": "standardized",
-    "returns=batch_normalised": "batch_normalized",
-    "appearance=randomised": "randomized",
-}
-"""Former names of choices, accepted in the same places."""
-_FORMER_FIELDS = {k.rpartition(".")[2]: v.rpartition(".")[2] for k, v in FORMER_NAMES.items()}
-
-
-class _Frozen:
-    """Values that can't be assigned or deleted."""
-
-    def __setattr__(self, name: str, value: object) -> None:
-        raise dataclasses.FrozenInstanceError(
-            f"{name} can't be assigned; make new ones, as in settings.replace({name}={value!r})"
-        )
-
-    def __delattr__(self, name: str) -> None:
-        raise dataclasses.FrozenInstanceError(f"cannot delete field {name!r}")
 
 
 @typing.dataclass_transform(kw_only_default=True, frozen_default=True)
 @dataclasses.dataclass(frozen=True)
-class Settings(_Frozen):
+class Settings:
     """Values that are checked before anything is built; each subclass is a frozen dataclass.
 
     A field is annotated with its type and its kind, as in `Annotated[int, Whole(1, 100)]`; for
@@ -58,21 +34,11 @@ class Settings(_Frozen):
     """
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
-        """Make the subclass a frozen dataclass with keyword arguments.
-
-        A subclass may repeat `@dataclasses.dataclass(frozen=True)`: the fields are restored as they
-        were written, and the methods that the decorator refuses to replace are removed.
-        """
+        """Make the subclass a frozen dataclass with keyword arguments."""
         super().__init_subclass__(**kwargs)
-        fields = {name: f for name, f in vars(cls).items() if isinstance(f, dataclasses.Field)}
         dataclasses.dataclass(frozen=True, kw_only=True)(cls)
-        for name, field in fields.items():
-            setattr(cls, name, field)
         _refuse_unknown_names(cls)
         _refuse_untyped(cls)
-        if not cls.__dataclass_fields__.keys().isdisjoint(_FORMER_FIELDS.values()):
-            _accept_former_names(cls)
-        del cls.__setattr__, cls.__delattr__
 
     def __post_init__(self) -> None:
         """Check every value by its kind."""
@@ -85,7 +51,6 @@ class Settings(_Frozen):
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with other values; raise an `InputError` for unknown or invalid ones."""
-        changes = current_names(type(self), changes)
         check_names(type(self), changes)
         return dataclasses.replace(self, **changes)
 
@@ -141,12 +106,15 @@ def check_names(
 
     `synonyms` are the settings that other projects' names mean, dotted as on the command line.
     """
-    known = kinds_of(cls)
+    kinds = kinds_of(cls)
     for name in given:
-        if name not in known:
-            names = [*known, *others]
-            ours = [name, *(other.rpartition(".")[2] for other in synonyms.get(name.lower(), ()))]
-            hints = (_inside(cls, our) or did_you_mean(our, names) for our in ours)
+        if name not in kinds:
+            names = [*kinds, *others]
+            meanings = [
+                name,
+                *(other.rpartition(".")[2] for other in synonyms.get(name.lower(), ())),
+            ]
+            hints = (_inside(cls, our) or did_you_mean(our, names) for our in meanings)
             meant = next(filter(None, hints), "")
             raise InputError(f"{prefix}{name} is unknown; valid names: {', '.join(names)}{meant}")
 
@@ -158,26 +126,6 @@ def _inside(cls: type[Settings], name: str) -> str:
             of = type(field.default)
             return f"; did you mean {field.name}={of.__module__}.{of.__name__}({name}=...)?"
     return ""
-
-
-def current_names(cls: type[Settings], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values of settings under the current names, see `FORMER_NAMES`, at all levels."""
-    types, found = types_of(cls), {}
-    for given_name, value in given.items():
-        current = _FORMER_FIELDS.get(given_name, "")
-        name = current if current in types and given_name not in types else given_name
-        found[name] = _current_value(name, types.get(name), value)
-    return found
-
-
-def _current_value(name: str, hint: Any, value: Any) -> Any:
-    if isinstance(value, str):
-        return FORMER_CHOICES.get(f"{name}={value}", value)
-    if not isinstance(value, Mapping) or not isinstance(hint, type):
-        return value
-    if "_target_" in value:
-        value = {**value, "_target_": _current_value(name, str, value["_target_"])}
-    return current_names(hint, value) if issubclass(hint, Settings) else value
 
 
 def _refuse_untyped(cls: type[Settings]) -> None:
@@ -208,20 +156,6 @@ def _refuse_unknown_names(cls: type[Settings]) -> None:
             raise
 
     setattr(cls, "__init__", checked)  # noqa: B010
-
-
-def _accept_former_names(cls: type[Settings]) -> None:
-    """Let the constructor and the attributes of a class have former names, too."""
-    construct = cls.__init__
-
-    @functools.wraps(construct)
-    def accepting(self: Settings, **given: Any) -> None:
-        construct(self, **current_names(type(self), given))
-
-    setattr(cls, "__init__", accepting)  # noqa: B010
-    for former, current in _FORMER_FIELDS.items():
-        if current in cls.__dataclass_fields__:
-            setattr(cls, former, property(operator.attrgetter(current)))
 
 
 @contextlib.contextmanager

@@ -137,16 +137,9 @@ def is_fixed(evidence: Evidence) -> bool:
     return bool(evidence.get("seed_is_fixed", True))
 
 
-def seed_of(evidence: Evidence) -> int | None:
-    """Return the seed, which older results have in their settings; None if it is not recorded."""
-    settings = evidence.get("settings")
-    older = settings.get("seed") if isinstance(settings, Mapping) else None
-    return evidence.get("seed", older)
-
-
 def seed_line(evidence: Evidence, what: str = "environments") -> str:
     """Return the seed of a result and its origin; `what` is sampled from its streams."""
-    seed, kind = seed_of(evidence), "fixed" if is_fixed(evidence) else "fresh"
+    seed, kind = evidence.get("seed"), "fixed" if is_fixed(evidence) else "fresh"
     return f"{what}: seed {'not recorded' if seed is None else seed} ({kind})"
 
 
@@ -154,7 +147,7 @@ def fixed_seed(name: str, what: str = "environments") -> Sentence:
     """Return the warning about a seed that was known before; `what` is sampled from its streams."""
 
     def text(evidence: Evidence) -> str:
-        seed = seed_of(evidence)
+        seed = evidence.get("seed")
         known = f"Fixed {what}" if seed is None else f"Fixed seed {seed}"
         return f"{known}: a policy could have been fitted to these {what}."
 

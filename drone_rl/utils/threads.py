@@ -38,8 +38,8 @@ def torch_threads(count: int) -> Iterator[None]:
 
 def pool_like_caller(size: int) -> ThreadPoolExecutor:
     """Return threads, each with as many threads of PyTorch as the calling thread has."""
-    own = torch.get_num_threads()
-    return ThreadPoolExecutor(size, initializer=set_torch_threads, initargs=(own,))
+    num_threads = torch.get_num_threads()
+    return ThreadPoolExecutor(size, initializer=set_torch_threads, initargs=(num_threads,))
 
 
 @contextlib.contextmanager

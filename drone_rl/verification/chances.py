@@ -40,7 +40,7 @@ _BOUNDS = {
     "mean_least": "on average at least",
     "mean_most": "on average at most",
 }
-MAX_NODES = 2**20  # lattice nodes of placements that are explored together; bounds memory
+NODES_AT_A_TIME = 2**20  # lattice nodes of placements that are explored together; bounds memory
 
 
 @dataclasses.dataclass(frozen=True)
@@ -201,7 +201,7 @@ def chances(
         else _given(task_settings, cubes)
     )
     bounded = _bounded(policy, placed, settings, progress) if settings.within else ()
-    at_a_time = max(1, MAX_NODES // math.prod(shape_of(task_settings)))
+    at_a_time = max(1, NODES_AT_A_TIME // math.prod(shape_of(task_settings)))
     with closing(policy.make_env(1, device=settings.device, renderer=settings.renderer)) as env:
         evaluator, outcomes = NodeEvaluator(env, policy.make_network(settings.device)), []
         for part in placed.split(at_a_time):

@@ -12,7 +12,7 @@ from benchmarks.simulated_policies import (
     judge_samples,
     policies,
 )
-from drone_rl.trust.rule import Kind, Rule
+from drone_rl.trust.rule import Rule, VerdictKind
 
 
 def sampled(policy, episodes, draws):
@@ -49,15 +49,15 @@ def test_quantities_of_an_episode_that_flying_straight_solves():
     assert observed["above forward"] == pytest.approx(0.0)
     assert observed["unsolved by forward"] == pytest.approx(-0.1)
     assert observed["unsolved by random"] == pytest.approx(0.9)
-    assert policy.kind is Kind.TRIVIAL
+    assert policy.kind is VerdictKind.TRIVIAL
 
 
 def test_policies_are_at_every_threshold_and_on_both_sides_of_it():
     kinds = {name: policy.kind for name, policy in policies().items()}
     for name in {name.rsplit(" ", 1)[0] for name in kinds}:
         assert len({kinds[f"{name} {shift}"] for shift in ("-0.03", "+0.03")}) == 2, name
-    assert set(kinds.values()) >= {*Kind} - {Kind.ONE_SIDED_LEFT}
-    assert kinds["all or nothing, success +0.00"] is Kind.NONE  # exactly 0.9 is not more
+    assert set(kinds.values()) >= {*VerdictKind} - {VerdictKind.ONE_SIDED_LEFT}
+    assert kinds["all or nothing, success +0.00"] is VerdictKind.NONE  # exactly 0.9 is not more
     for policy in policies().values():
         assert policy.shares.sum() == pytest.approx(1.0)
         assert policy.shares.min() >= 0.0
@@ -65,10 +65,10 @@ def test_policies_are_at_every_threshold_and_on_both_sides_of_it():
 
 def test_policies_far_from_thresholds_are_judged_correctly():
     perfect = _mixture(1.0, (L, A, R), (1, 1, 1), (1, 1, 1))
-    assert sampled(perfect, 100, 1) == [Kind.GOOD]
+    assert sampled(perfect, 100, 1) == [VerdictKind.GOOD]
     assert sampled(perfect, 5, 1) == [None]
     one_sided = _mixture(0.99, (L, R), (0, 1), (0, 0))
-    assert sampled(one_sided, 400, 20) == [Kind.ONE_SIDED_RIGHT] * 20
+    assert sampled(one_sided, 400, 20) == [VerdictKind.ONE_SIDED_RIGHT] * 20
 
 
 def test_intervals_that_are_too_narrow_are_detected(monkeypatch):
@@ -81,9 +81,9 @@ def test_intervals_that_are_too_narrow_are_detected(monkeypatch):
         return found._replace(lower=middle - 0.001, upper=middle + 0.001)
 
     policy = policies()["all or nothing, success +0.00"]
-    assert sampled(policy, 400, 100).count(Kind.GOOD) == 0
+    assert sampled(policy, 400, 100).count(VerdictKind.GOOD) == 0
     monkeypatch.setattr(simulated_policies, "estimate", narrow)
-    assert sampled(policy, 400, 100).count(Kind.GOOD) > 20
+    assert sampled(policy, 400, 100).count(VerdictKind.GOOD) > 20
     monkeypatch.setattr(simulated_policies, "EPISODES", (400,))
     monkeypatch.setattr(simulated_policies, "policies", lambda: {"on the edge": policy})
     assert simulated_policies.bench_false_certain(quick=True)["false_certain_rate"] > 0.2

@@ -3,7 +3,9 @@ import math
 import pytest
 
 from drone_rl.config import CameraSettings
+from drone_rl.config.camera import RENDERERS, RendererName
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.settings import Settings
 
 
 def test_vertical_fov_of_square_pixels():
@@ -21,3 +23,13 @@ def test_vertical_fov_of_square_pixels():
 def test_bad_camera_is_refused(change):
     with pytest.raises(InputError, match="out of range"):
         CameraSettings(**change)
+
+
+class Some(Settings):
+    renderer: RendererName = "raytrace"
+
+
+def test_a_setting_chooses_one_by_name():
+    assert [Some(renderer=name).renderer for name in RENDERERS] == ["raytrace", "mujoco_warp"]
+    with pytest.raises(InputError, match="renderer"):
+        Some(renderer="opengl")

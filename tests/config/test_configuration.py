@@ -1,5 +1,3 @@
-"""Settings become plain data and come back; what can't is named by its place."""
-
 import subprocess
 import sys
 
@@ -11,18 +9,20 @@ from drone_rl.config.configuration import (
     Changes,
     as_changes,
     as_config,
+    check_same_config,
     from_arguments,
     from_config,
+    locate,
     variant_of,
 )
-from drone_rl.config.learning import Adam, Optimizer
-from drone_rl.config.networks import Mlp
+from drone_rl.config.learning import Adam, Optimizer, Returns
+from drone_rl.config.networks import Lstm, Mlp, Network, OriginalCnn, SmallCnn
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.config.transforms import Crop, Gray
 from drone_rl.utils.errors import InputError
 
 
-def test_a_training_comes_back_as_it_was():
+def test_settings_round_trip():
     told = TrainSettings(
         task=TaskSettings(num_cubes=2),
         transforms=(Gray(), Crop(top=1, bottom=9), Crop(top=0, bottom=4)),
@@ -41,26 +41,19 @@ def test_a_training_comes_back_as_it_was():
     ("config", "message"),
     [
         ({"task": {"num_cubes": 0}}, "task.num_cubes=0 is out of range"),
-        ({"task": {"num_cubs": 1}}, "num_cubs is unknown"),
         ({"task": {"vertical_bound": 3.0}}, "task.altitude=2.5 lets the drone fly into"),
         ({"trainer": 3}, "trainer=3 must be a mapping"),
-        ({"unheard": 3}, "unheard is unknown"),
-        (
-            {"optimizer": {"lr": 1.0}},
-            "optimizer._target_ must be a .* name, got None",
-        ),
         ({"optimizer": {"_target_": Adam.target, "lr": 0}}, "optimizer.lr=0 is out of range"),
         ({"transforms": {"a": {"_target_": Crop.target, "top": -1}}}, r"transforms\.a\.top=-1"),
-        ({"collector": {"_target_": "their.Own", "num_envs": 0}}, "collector.num_envs=0"),
         ([], "settings="),
     ],
 )
-def test_mistakes_are_named_by_their_place(config, message):
+def test_errors_begin_with_the_place(config, message):
     with pytest.raises(InputError, match=f"{message}"):
         from_config(TrainSettings, config)
 
 
-def test_what_only_the_user_knows_is_kept_and_checked_where_it_is_known():
+def test_classes_of_other_packages():
     sgd = {"_target_": "mine.Optimizer", "momentum": 0.9}
     found = variant_of(Optimizer, sgd, "optimizer")
     assert not found.is_known
@@ -80,7 +73,7 @@ def test_settings_import_nothing_heavy():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_the_other_renderer_draws_the_minimal_look_alone():
+def test_mujoco_warp_renders_only_the_minimal_appearance():
     look = AppearanceSettings(fog_visibility=50.0)
     with pytest.raises(InputError, match=r"^renderer=mujoco_warp supports only appearance=minimal"):
         TrainSettings(renderer="mujoco_warp", appearance=look)
@@ -90,17 +83,12 @@ def test_the_other_renderer_draws_the_minimal_look_alone():
     assert from_config(TrainSettings, as_config(given)) == given
 
 
-def test_settings_that_may_be_none_are_made_of_mappings_too():
+def test_optional_settings():
     given = {"appearance": {"exposure": 2.0}}
     assert from_config(PlayCommand, given).appearance == AppearanceSettings(exposure=2.0)
     assert from_config(PlayCommand, {"appearance": None}).appearance is None
     with pytest.raises(InputError, match=r"^appearance\.exposure=0 is out of range"):
         from_config(PlayCommand, {"appearance": {"exposure": 0}})
-
-
-def test_an_appearance_without_room_is_refused_with_the_training():
-    with pytest.raises(InputError, match="puts the camera into the ground"):
-        TrainSettings(appearance=AppearanceSettings(camera_offset=(0.0, 0.0, -3.0)))
 
 
 def test_changes_of_settings_have_names():
@@ -121,10 +109,6 @@ def judged(policy, settings=None, *, task=None, appearance=None, **changes):
     """A function with settings, its further arguments, and changes."""
 
 
-def evaluated(policy, settings=None, **changes):
-    """A function of a policy without further arguments."""
-
-
 def test_settings_of_a_function_and_its_changes_to_them():
     assert from_arguments(Adam, None, {}, judged) == Adam()
     assert from_arguments(Adam, Adam(lr=0.5), {}, judged) == Adam(lr=0.5)
@@ -137,21 +121,62 @@ def test_settings_of_a_function_and_its_changes_to_them():
 @pytest.mark.parametrize(
     ("function", "change", "message"),
     [
-        (
-            judged,
-            {"apperance": 1},
-            r"^apperance is unknown; valid names: lr, task, .* mean appearance\?",
-        ),
-        (
-            judged,
-            {"num_cubes": 2},
-            r"^num_cubes is a setting of task; give task=\{'num_cubes': 2\}$",
-        ),
-        (evaluated, {"num_cubes": 2}, r"give load_policy\(\.\.\.\)\.in_task\(num_cubes=2\)$"),
-        (evaluated, {"mass": 2.0}, r"give load_policy\(\.\.\.\)\.in_dynamics\(mass=2\.0\)$"),
-        (judged, {"lrr": 2.0}, "lrr is unknown; .*did you mean lr"),
+        (judged, {"apperance": 1}, "apperance is unknown"),
+        (judged, {"num_cubes": 2}, "num_cubes is a setting of task"),
     ],
 )
-def test_changes_that_are_no_settings(function, change, message):
+def test_unknown_changes_are_refused(function, change, message):
     with pytest.raises(InputError, match=message):
         from_arguments(Adam, None, change, function)
+
+
+def test_changes_of_a_task():
+    kind = Changes(TaskSettings)
+    assert kind.read({"num_cubes": 5, "spacing": None}, "task") == {"num_cubes": 5}
+    with pytest.raises(InputError, match=r"^task\.num_cubes=0"):
+        kind.read({"num_cubes": 0}, "task")
+    with pytest.raises(InputError, match=r"^task\.num_cubs is unknown"):
+        kind.read({"num_cubs": 1}, "task")
+
+
+def test_check_same_config():
+    saved = {"seed": 0, "optimizer": {"lr": 0.1}, "trainer": {"total_frames": 10}}
+    check_same_config(saved, {**saved, "trainer": {"total_frames": 99}}, ["trainer.total_frames"])
+    with pytest.raises(InputError, match=r"optimizer.lr=0.2: .* optimizer.lr=0.1"):
+        check_same_config(saved, {**saved, "optimizer": {"lr": 0.2}}, ["trainer.total_frames"])
+    with pytest.raises(InputError, match="extra=1"):
+        check_same_config(saved, {**saved, "extra": 1}, [])
+
+
+def test_the_variants_of_a_part():
+    ours = {variant for variant in Network.variants() if variant.__module__.startswith("drone_rl.")}
+    assert ours == {SmallCnn, OriginalCnn, Lstm, Mlp}  # Other tests may have added their own.
+    assert "_Discounted" not in {variant.__name__ for variant in Returns.variants()}
+    ours = [v for v in Returns.variants() if v.__module__.startswith("drone_rl.")]
+    assert len(ours) == 9
+    assert SmallCnn().name == "small_cnn"
+
+
+def test_locate():
+    with pytest.raises(InputError, match=r"_target_=no\.such can't be imported"):
+        locate("no.such")
+    with pytest.raises(InputError, match="can't be imported"):
+        locate("os.no_such")
+    with pytest.raises(InputError, match="can't be imported"):
+        locate("")
+    assert locate("os.path").__name__ == "posixpath"
+
+
+def test_an_unknown_name_without_a_module_is_refused():
+    with pytest.raises(InputError, match=r"^network\._target_='resnet' is not registered"):
+        variant_of(Network, {"_target_": "resnet"}, "network")
+
+
+def test_a_registered_part_keeps_its_factory_with_values_of_the_users_own():
+    import drone_rl.policies.networks  # noqa: F401 (connects the settings with their factories)
+
+    part = variant_of(Network, {"_target_": "mlp", "hidden": [4], "more": 1}, "network")
+    assert part.values() == {"hidden": [4], "more": 1}
+    assert type(part).factory is Mlp.factory is not None
+    other = variant_of(Network, {"_target_": "os.path.join", "more": 1}, "network")
+    assert type(other).factory is None

@@ -1,11 +1,8 @@
-"""A drone is data, of which some can't be."""
-
 import dataclasses
-import math
 
 import pytest
 
-from drone_rl.config import COMPUTER_VISION, DynamicsSettings
+from drone_rl.config import COMPUTER_VISION, ActionSettings, DynamicsSettings
 from drone_rl.utils.errors import InputError
 
 FLIGHT = DynamicsSettings(mode="simple_flight")
@@ -15,18 +12,13 @@ FLIGHT = DynamicsSettings(mode="simple_flight")
     ("changes", "message"),
     [
         ({"mass": 0.0}, r"mass=0\.0 is out of range"),
-        ({"mass": -1.0}, r"mass=-1\.0 is out of range"),
-        (
-            {"mass": 2.0},
-            r"rotor_thrust=4\.17945 is too small to control the drone: four rotors give 16\.72 N, "
-            r"needed are 1\.1 times its weight, 21\.58 N; give at least 5\.4$",
-        ),
+        ({"mass": 2.0}, r"rotor_thrust=4\.17945 is too small .* 16\.72 N, .* 21\.58 N"),
         ({"inertia": (1.0, 1.0, 2.1)}, r"inertia=\[1\.0, 1\.0, 2\.1\] is that of no body"),
         ({"wind": (float("nan"), 0.0, 0.0)}, r"wind\[0\]=nan"),
         ({"mode": "hardware"}, "mode='hardware' is unknown; give computer_vision, simple_flight"),
     ],
 )
-def test_what_can_not_fly_is_named(changes, message):
+def test_impossible_drones_are_refused(changes, message):
     with pytest.raises(InputError, match=f"^{message}"):
         dataclasses.replace(FLIGHT, **changes)
 
@@ -59,7 +51,7 @@ def test_figures_of_the_generic_drone_by_hand():
         ({"gusts": 1.5}, r"dynamics\.gusts=1\.5 moves nothing in computer-vision mode; give "),
     ],
 )
-def test_air_moves_nothing_in_computer_vision_mode(air, message):
+def test_wind_in_computer_vision_mode_is_refused(air, message):
     dataclasses.replace(FLIGHT, **air).check_air()
     COMPUTER_VISION.check_air()
     with pytest.raises(InputError, match=f"^{message}"):
@@ -70,33 +62,22 @@ def test_air_moves_nothing_in_computer_vision_mode(air, message):
     ("change", "message"),
     [
         ({"camera_mount": "wing"}, "camera_mount="),
-        ({"mass": math.nan}, "mass=nan"),
         ({"inertia": (1.0, 1.0)}, "inertia"),
-        ({"inertia": (-0.01, 0.01, 0.01)}, "inertia"),
         ({"wind": (0.0, 0.0, 51.0)}, "wind"),
         ({"gusts": -1.0}, "gusts=-1.0"),
-        ({"gust_length": 0.0}, "gust_length=0.0"),
         ({"tick": 0.0}, "tick=0.0"),
-        ({"control_ticks": 0}, "control_ticks=0"),
         ({"restitution": 1.1}, "restitution=1.1"),
-        ({"angle_limit": 1.6}, "angle_limit=1.6"),
         ({"rate_gain": (1.0, -1.0, 1.0)}, "rate_gain"),
-        ({"rotor_time_constant": -0.1}, "rotor_time_constant=-0.1"),
     ],
 )
-def test_what_no_drone_has_is_named(change, message):
+def test_values_out_of_bounds(change, message):
     with pytest.raises(InputError, match=message):
         dataclasses.replace(FLIGHT, **change)
 
 
-def test_the_thrust_that_is_asked_for_is_enough():
-    needed = 1.1 * 2.0 * 9.81 / 4
-    dataclasses.replace(FLIGHT, mass=2.0, rotor_thrust=needed * 1.001)
-    with pytest.raises(InputError, match="too small to control"):
-        dataclasses.replace(FLIGHT, mass=2.0, rotor_thrust=needed * 0.999)
-
-
-def test_a_flat_plate_is_a_body():
-    """Its moment about the normal is the sum of the other two."""
-    plate = dataclasses.replace(FLIGHT, inertia=(0.1, 0.2, 0.3))
-    assert plate.inertia == (0.1, 0.2, 0.3)
+@pytest.mark.parametrize(
+    "wrong", [{"kind": "thrust"}, {"move_speed": 0.0}, {"yaw_rate": -1.0}, {"forward_speed": 51.0}]
+)
+def test_actions_out_of_bounds(wrong):
+    with pytest.raises(InputError, match=f"^{min(wrong)}="):
+        ActionSettings(**wrong)

@@ -8,7 +8,6 @@ from drone_rl.config.learning import (
     Episodes,
     Gae,
     LeaveOneOut,
-    Objective,
     Ppo,
     Ray,
     Reinforce,
@@ -19,18 +18,13 @@ from drone_rl.utils.errors import InputError
 
 
 @pytest.mark.parametrize("objective", [A2c(), Ppo()])
-def test_a_new_objective_brings_what_it_needs(objective):
+def test_a_new_objective_changes_returns_and_collector(objective):
     told = TrainSettings().replace(objective=objective, seed=3)
     assert (told.returns, told.collector) == (Gae(), Rollouts())
     assert (told.objective, told.seed) == (objective, 3)
 
 
-def test_a_new_objective_may_be_given_by_name():
-    told = TrainSettings().replace(objective="ppo", returns="gae")
-    assert told == TrainSettings().replace(objective=Ppo())
-
-
-def test_what_is_given_stays():
+def test_given_settings_are_kept():
     told = TrainSettings().replace(objective=Ppo(), collector=Rollouts(num_envs=5))
     assert told.collector.num_envs == 5
     again = told.replace(returns=Gae(gamma=0.5)).replace(objective=A2c())
@@ -38,7 +32,7 @@ def test_what_is_given_stays():
 
 
 @pytest.mark.parametrize("collector", [Episodes(), Ray()])
-def test_batches_without_next_observations_are_no_good_to_a_critic(collector):
+def test_critics_need_rollouts(collector):
     message = f"^objective=ppo requires collector=rollouts, got collector={collector.name}$"
     with pytest.raises(InputError, match=message):
         TrainSettings().replace(objective=Ppo(), collector=collector)
@@ -56,15 +50,10 @@ def test_returns_and_critics_belong_together():
         TrainSettings().replace(objective=Ppo()).replace(objective=Reinforce())
 
 
-def test_parts_of_the_users_own_are_not_judged():
+def test_combinations_with_other_packages_are_accepted():
     config = as_config(TrainSettings().replace(objective=Ppo()))
     config["collector"] = {"_target_": "mine.Collector", "num_envs": 3}
     assert from_config(TrainSettings, config).collector.target == "mine.Collector"
-
-
-def test_what_a_file_says_is_what_was_said():
-    told = TrainSettings().replace(objective=Ppo(epochs=7, shares_trunk=False))
-    assert from_config(TrainSettings, as_config(told)) == told
 
 
 def test_the_loss_gets_its_own_settings():
@@ -87,18 +76,10 @@ def test_a_setting_of_torchrls_loss_that_is_not_ours_is_passed_on():
     ("value", "message"),
     [
         ({"num_steps": 1}, "num_steps=1 is out of range; give a whole number from 2 to 4096"),
-        ({"epochs": 0}, "epochs=0 is out of range; give a whole number of 1 or more"),
         ({"minibatch_size": 0}, "minibatch_size=0 is out of range"),
-        ({"clip_epsilon": 0.0}, "clip_epsilon=0.0 is out of range; give a number above 0 up to 1"),
         ({"critic_coeff": 0.0}, "critic_coeff=0.0 is out of range; give a number above 0"),
-        ({"entropy_coeff": -1.0}, "entropy_coeff=-1.0 is out of range"),
-        ({"shares_trunk": 1}, "shares_trunk=1 is neither true nor false"),
     ],
 )
 def test_values_out_of_bounds(value, message):
     with pytest.raises(InputError, match=message):
         Ppo(**value)
-
-
-def test_the_variants_of_an_objective():
-    assert set(Objective.variants()) == {Reinforce, A2c, Ppo}

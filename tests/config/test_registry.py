@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from drone_rl.config.configuration import as_config, from_config
-from drone_rl.config.learning import Collector, LeaveOneOut, Objective, Returns
+from drone_rl.config.learning import Collector, Objective, Returns
 from drone_rl.config.networks import Network, SmallCnn
 from drone_rl.config.registry import (
     modules_of,
@@ -18,11 +18,10 @@ from drone_rl.config.registry import (
     register_transform,
 )
 from drone_rl.config.training import TrainSettings
-from drone_rl.config.transforms import Frame, Transform
+from drone_rl.config.transforms import Frame
 from drone_rl.envs.transforms import PixelTransform
-from drone_rl.objectives import LeaveOneOut as LeaveOneOutEstimator
 from drone_rl.objectives import ReturnEstimator
-from drone_rl.policies import MLP, SmallCNN
+from drone_rl.policies import MLP
 from drone_rl.policies.zoo import describe, parse
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Whole
@@ -91,14 +90,6 @@ def test_a_transform_is_selected_by_its_key_and_measured_by_a_call(registered):
     )
     assert [step.name for step in training.transforms] == ["gray", "mirror", "standardize"]
     assert describe(training).input == Frame((1, 25, 32), True)
-
-
-def test_a_transform_may_state_its_output(registered):
-    def output(frame, settings):
-        return Frame((*frame.shape[:-1], 7), True)
-
-    registered(register_transform("mirror", output=output)(Mirror))
-    assert Transform.from_name("mirror", "x").output(Frame((1, 2, 3))) == Frame((1, 2, 7), True)
 
 
 def test_a_return_estimator(registered):
@@ -232,12 +223,6 @@ def test_parameters_without_a_default_or_of_another_type_are_refused():
             register_network("odd")(factory)
     with pytest.raises(InputError, match="width is of type"):
         register_network("odd")(another)
-
-
-def test_defaults_of_classes_are_those_of_their_settings():
-    assert SmallCNN((1, 25, 64), 3).layers.fc1.out_features == SmallCnn().hidden[0]
-    made = LeaveOneOutEstimator()
-    assert (made.gamma, made.scale) == (LeaveOneOut().gamma, LeaveOneOut().scale)
 
 
 @pytest.mark.parametrize("name", ["values", "make", "name", "target"])

@@ -28,17 +28,8 @@ RGB, GRAY = Frame((25, 64, 3)), Frame((1, 25, 64), True)
         ("shift", {"down": 1, "across": 2}, GRAY, GRAY),
     ],
 )
-def test_what_becomes_of_a_picture(name, values, picture, after):
+def test_output_shapes(name, values, picture, after):
     assert Transform.named(name, "x")(**values).output(picture) == after
-
-
-_OF_FLOATS = ["blur", "noise", "dead_rows", "frozen_frames", "late_frames", "shift"]
-
-
-@pytest.mark.parametrize("name", _OF_FLOATS)
-def test_what_goes_wrong_in_a_camera_goes_wrong_with_floats(name):
-    with pytest.raises(InputError, match=f"{name} needs floats; put gray before it"):
-        Transform.named(name, "x")().output(RGB)
 
 
 def test_faults_are_those_by_chance_or_with_memory():

@@ -2,6 +2,7 @@
 
 import ast
 import re
+import tomllib
 
 import pytest
 
@@ -9,9 +10,8 @@ import drone_rl
 from tests.docs.commands import check_command, check_commands
 from tests.docs.conftest import ROOT
 from tools.docs.blocks import COMMAND, PYTHON, find_pages, read_blocks
-from tools.docs.rules import ALL, Rules, read_rules, rules_for
+from tools.docs.rules import ALL, FILE, read_rules
 
-RULES = read_rules()
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 LANGUAGE = r"^```{}\n(.*?)^```$"
 
@@ -31,16 +31,21 @@ def test_commands_are_known(page):
 
 @pytest.mark.parametrize("page", find_pages())
 def test_every_block_is_run_or_listed_with_a_reason(page):
-    found, rules = read_blocks(page), rules_for(page, RULES)
-    assert all(rules.not_run.values())
-    for block in found:
+    blocks, rules = read_blocks(page), read_rules(page)
+    for block in blocks:
         is_run = block.kind in (COMMAND, PYTHON) or block.title
         assert is_run or rules.why_not_run(block), f"{page}:{block.line}"
-    assert RULES.get(page, Rules()).find_unused(found) == []
 
 
-def test_rules_are_those_of_pages():
-    assert {*RULES} <= {ALL, *find_pages()}
+def test_every_rule_applies_to_a_block():
+    for page, section in tomllib.loads(FILE.read_text()).items():
+        codes = [
+            b.code for name in (find_pages() if page == ALL else [page]) for b in read_blocks(name)
+        ]
+        for key in (*section.get("not_run", ()), *section.get("smaller", ())):
+            assert any(code.startswith(key) for code in codes), (page, key)
+        for key in section.get("replace", ()):
+            assert any(key in code for code in codes), (page, key)
 
 
 def test_a_command_that_is_unknown_is_found():

@@ -1,6 +1,6 @@
 """The Python of every page runs block by block, with smaller sizes.
 
-`drone-rl bench docs` runs pages and commands with their own sizes and compares the outputs.
+`python -m tools.docs` runs pages and commands with their own sizes and compares the outputs.
 """
 
 import gc
@@ -23,9 +23,8 @@ from tests.docs.commands import check_commands
 from tools.docs import session
 from tools.docs.blocks import PYTHON, find_pages, read_blocks
 from tools.docs.outputs import find_different_words
-from tools.docs.rules import read_rules, rules_for
+from tools.docs.rules import read_rules
 
-RULES = read_rules()
 PAGES = [page for page in find_pages() if any(b.kind == PYTHON for b in read_blocks(page))]
 SHORT = (
     "trainer=drone_rl.TrainerSettings(total_frames=1500, checkpoint_interval_s=0.0), "
@@ -152,7 +151,7 @@ def shrink(page, code):
 def test_it_runs(page, workplace):
     if page.endswith("sb3.md"):
         pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
-    names, rules = {"__name__": "__main__"}, rules_for(page, RULES)
+    names, rules = {"__name__": "__main__"}, read_rules(page)
     for block in read_blocks(page):
         if block.title:
             (workplace / block.title).parent.mkdir(parents=True, exist_ok=True)

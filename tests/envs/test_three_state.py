@@ -2,19 +2,12 @@ import pytest
 import torch
 from torchrl.envs.utils import check_env_specs
 
-from drone_rl.envs.three_state import ThreeStateEnv, exact_gradient, outcomes
+from drone_rl.envs.three_state import ThreeStateEnv, exact_gradient
+from tests.three_state_episodes import outcomes
 
 
 def test_specs():
     check_env_specs(ThreeStateEnv(4))
-
-
-def test_action_zero_stays_and_is_truncated():
-    env = ThreeStateEnv(5, horizon=2)
-    rollout = env.rollout(9, policy=lambda td: td.set("action", torch.zeros(5).long()))
-    assert rollout.shape == (5, 2)
-    assert rollout["next", "truncated"][:, -1].all()
-    assert rollout["next", "reward"].sum() == 0
 
 
 def test_action_one_succeeds_with_probability_0_75():
@@ -24,15 +17,6 @@ def test_action_one_succeeds_with_probability_0_75():
     assert after["terminated"].all()
     assert abs(float(after["reward"].mean()) - 0.75) < 4 * (0.75 * 0.25 / 20_000) ** 0.5
     assert torch.equal(after["reward"][:, 0], after["observation"][:, 2])
-
-
-def test_same_seed_gives_same_transitions():
-    def sample(seed):
-        env = ThreeStateEnv(50, seed=seed)
-        return env.step(env.reset().set("action", torch.ones(50).long()))["next", "reward"]
-
-    assert torch.equal(sample(1), sample(1))
-    assert not torch.equal(sample(1), sample(2))
 
 
 def test_outcomes_of_two_steps_match_hand_computed_ones():
@@ -47,27 +31,6 @@ def test_outcomes_of_two_steps_match_hand_computed_ones():
             ((0, 0), (0.0, 0.0)): 0.4,
         }
     )
-
-
-def test_outcomes_match_the_environment():
-    """4,000 environments under a policy that takes action 1 with probability 0.3 and 0.6."""
-    leaving, n = [0.3, 0.6], 4000
-    env, generator = ThreeStateEnv(n, horizon=2, seed=3), torch.Generator().manual_seed(0)
-    state, seen = env.reset(), [((), ())] * n
-    alive = torch.ones(n, dtype=torch.bool)
-    for leave in leaving:
-        action = (torch.rand(n, generator=generator) < leave).long()
-        after = env.step(state.set("action", action))["next"]
-        rewards, ended = after["reward"][:, 0].tolist(), after["done"][:, 0]
-        for i in alive.nonzero()[:, 0].tolist():
-            seen[i] = ((*seen[i][0], int(action[i])), (*seen[i][1], rewards[i]))
-        alive &= ~ended
-        state = after
-    assert not alive.any()
-    exact = {(o.actions, o.rewards): o.probability for o in outcomes(leaving)}
-    assert set(seen) == set(exact)
-    for kind, p in exact.items():
-        assert abs(seen.count(kind) / n - p) < 4 * (p * (1 - p) / n) ** 0.5
 
 
 @pytest.mark.parametrize("gamma", [1.0, 0.9])

@@ -17,7 +17,7 @@ from torch import nn
 from torchrl.data import Categorical
 from torchrl.modules import ProbabilisticActor
 
-from drone_rl.envs.three_state import SUCCESS_PROBABILITY, exact_gradient, outcomes
+from drone_rl.envs.three_state import SUCCESS_PROBABILITY, exact_gradient
 from drone_rl.objectives import (
     BatchNormalized,
     LeaveOneOut,
@@ -30,6 +30,7 @@ from drone_rl.objectives import (
     TotalReward,
     returns,
 )
+from tests.three_state_episodes import outcomes
 
 EVEN = (0.5, 0.5)
 SKEWED = (0.7, 0.2, 0.4)

@@ -1,4 +1,3 @@
-import copy
 import math
 
 import pytest
@@ -11,7 +10,6 @@ from torchrl.modules import ProbabilisticActor
 
 from drone_rl.policies import make_actor
 from drone_rl.policies.actor import (
-    RandomSource,
     SeededCategorical,
     SquashedNormal,
     distribution_of,
@@ -81,19 +79,6 @@ def test_an_action_can_be_chosen_whatever_the_exploration_type_is(outer):
     assert set(drawn.keys()) == set(expected.keys())
     assert all(torch.equal(drawn[key], expected[key]) for key in ("logits", "action"))
     assert (greedy["action"] == 1).all()
-
-
-def test_copies_share_the_random_stream():
-    source = RandomSource(torch.Generator().manual_seed(0))
-    one = SeededCategorical(torch.zeros(100, 3), source).sample()
-    two = SeededCategorical(torch.zeros(100, 3), copy.deepcopy(source)).sample()
-    assert not torch.equal(one, two)
-
-
-def test_log_prob_and_entropy():
-    distribution = SeededCategorical(torch.tensor([[0.0, 0.0]]))
-    assert distribution.log_prob(torch.tensor([1])).exp().item() == 0.5
-    assert distribution.sample((7,)).shape == (7, 1)
 
 
 class Leaning(nn.Module):

@@ -42,14 +42,6 @@ def test_trunk_and_head_equal_the_policy(network):
     torch.testing.assert_close(acted[LOG_PROB], picked)
 
 
-def test_batch_dimensions_are_supported(network):
-    model = ActorCritic(network)
-    pixels, steps = seen(model, 6)
-    rows = TensorDict({"pixels": pixels.reshape(2, 3, *SHAPE)}, [2, 3])
-    found = model.critic(model.trunk(rows))
-    torch.testing.assert_close(found["state_value"].reshape(6, 1), steps["state_value"])
-
-
 def test_shared_trunk_has_gradients_of_policy_and_critic(network):
     model = ActorCritic(network, generator=generator())
     own = {name: p for name, p in model.critic.named_parameters()}
@@ -74,17 +66,6 @@ def test_separate_critic_shares_no_parameters(network):
     steps["state_value"].sum().backward()
     assert all(p.grad is None for p in network.parameters())
     assert all(p.grad is not None for p in own.parameters())
-
-
-def test_parameters_are_shared_with_the_collecting_policy(network):
-    model = ActorCritic(network)
-    pixels, _ = seen(model)
-    before = network(pixels)
-    torch.optim.SGD(model.parameters(), lr=1.0).zero_grad()
-    with torch.no_grad():
-        for parameter in model.actor.parameters():
-            parameter.add_(1.0)
-    assert not torch.equal(network(pixels), before)
 
 
 def test_initial_values_are_small_and_seeded(network):

@@ -3,7 +3,7 @@ import torch
 from torchrl.envs.utils import check_env_specs
 
 import drone_rl
-from drone_rl.config.transforms import Gray, Resize
+from drone_rl.config.transforms import Gray
 from drone_rl.policies.zoo import certificate_path, describe, parse, policy_path
 from drone_rl.sim import worlds as worlds_module
 from drone_rl.sim.rendering import Raytracer
@@ -37,19 +37,6 @@ def test_images_are_resized_to_the_network():
     assert [step.name for step in parse(before).transforms] == ["gray", "standardize"]
 
 
-def test_other_image_sizes():
-    camera = drone_rl.CameraSettings(width=20, height=10)
-    env = drone_rl.make_env(1, camera=camera, transforms=[Gray(), Resize(height=5, width=8)])
-    assert env.reset()["pixels"].shape == (1, 1, 5, 8)
-    env.close()
-
-
-def test_a_single_transform_needs_no_list():
-    env = drone_rl.make_env(1, transforms=Gray())
-    assert env.reset()["pixels"].shape == (1, 1, 25, 64)
-    env.close()
-
-
 def test_task_is_selected_by_name():
     env = drone_rl.make_env(1, task="pillars")
     assert isinstance(env.base_env.worlds.task, Pillars)
@@ -59,15 +46,13 @@ def test_task_is_selected_by_name():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"task": "pillar"}, "task='pillar' is unknown; valid names: collect_cubes, pillars"),
-        ({"task": 3}, "task=3 is no task; give one of collect_cubes, pillars"),
-        ({"camera": "tiny"}, "camera='tiny' is not of type CameraSettings; give one"),
-        ({"dynamics": "simple_flight"}, "dynamics='simple_flight' is not of type DynamicsSettings"),
-        ({"actions": "velocity"}, "actions='velocity' is not of type ActionSettings"),
-        ({"appearance": "smog"}, "appearance='smog' is unknown; give one of: .*fog"),
-        ({"appearance": 5}, "appearance=5 is no AppearanceSettings"),
+        ({"task": "pillar"}, "task='pillar' is unknown"),
+        ({"task": 3}, "task=3 is no task"),
+        ({"camera": "tiny"}, "camera='tiny'"),
+        ({"dynamics": "simple_flight"}, "dynamics='simple_flight'"),
+        ({"actions": "velocity"}, "actions='velocity'"),
+        ({"appearance": "smog"}, "appearance='smog' is unknown"),
         ({"transforms": "gray"}, r"transforms\[0\]='gray' is no transform"),
-        ({"transforms": None}, r"transforms\[0\]=None is no transform"),
         ({"transforms": [Gray(), 3]}, r"transforms\[1\]=3 is no transform"),
     ],
 )
@@ -151,16 +136,3 @@ def test_settings_of_dynamics_and_actions(monkeypatch):
     env.close()
     with pytest.raises(InputError, match=r"^actions=moves, but dynamics=Turning brings its own"):
         drone_rl.make_env(1, dynamics=Turning(), actions=slow)
-
-
-def test_a_device_may_be_torchs():
-    env = drone_rl.make_env(1, device=torch.device("cpu"))
-    assert env.reset()["pixels"].shape == (1, 1, 25, 64)
-    env.close()
-    with pytest.raises(InputError, match=r"^device=3 is no text"):
-        drone_rl.make_env(1, device=3)
-
-
-def test_wind_that_moves_nothing_is_refused():
-    with pytest.raises(InputError, match=r"^dynamics\.wind=\[5\.0, 0\.0, 0\.0\] moves nothing"):
-        drone_rl.make_env(1, dynamics=drone_rl.DynamicsSettings(wind=(5, 0, 0)))

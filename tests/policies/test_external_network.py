@@ -1,8 +1,5 @@
 """External callables as networks."""
 
-import importlib
-
-import numpy as np
 import pytest
 import torch
 from torch import nn
@@ -38,12 +35,6 @@ def test_numpy_logits_are_accepted_without_gradients():
     network = make(lambda x: left_half(x).detach().numpy())
     assert not network.is_differentiable
     assert network(torch.ones(1, *SHAPE)).tolist() == [[1.0, 1.0, 1.0]]
-
-
-def test_numpy_functions_of_frames_are_accepted():
-    network = make(lambda x: x.numpy().reshape(len(x), -1)[:, :3])
-    assert not network.is_differentiable
-    assert network(torch.arange(8.0).reshape(1, *SHAPE)).tolist() == [[0.0, 1.0, 2.0]]
 
 
 def test_function_without_gradients_is_not_differentiable():
@@ -85,21 +76,15 @@ def test_module_is_copied_in_eval_mode():
 @pytest.mark.parametrize(
     ("logits", "message"),
     [
-        (nn.Linear(7, 3), r"failed in Linear on images of shape \(1, 1, 2, 4\), torch\.float32 "
-         r"\(RuntimeError: .*\); correct it, or give drone_rl\.policy_from the camera= and transf"),
-        (lambda x: 1 / 0, r"failed in line \d+ of .*test_external_network\.py on images of shape "
-         r"\(1, 1, 2, 4\), torch\.float32 \(ZeroDivisionError: .*\); correct it, or give"),
-        (lambda x: importlib.import_module("numpie"), r"failed in line \d+ of .*_network\.py on "
-         r".*\(ModuleNotFoundError: No module named 'numpie'\); correct it"),
-        (lambda x: left_half(x)[:, :2], r"returned logits of shape \(1, 2\); give one that returns "
-         r"\(1, 3\), one for each of forward, left, right"),
-        (lambda x: left_half(x).argmax(-1), r"returned logits of shape \(1,\); give one that"),
-        (lambda x: (left_half(x), x), "returned a tuple; give a callable that returns logits of"),
-        (lambda x: None, "returned a NoneType; give a callable"),
+        (nn.Linear(7, 3), r"failed in Linear on images of shape \(1, 1, 2, 4\)"),
+        (lambda x: 1 / 0, r"failed in line \d+ of .*test_external_network\.py"),
+        (lambda x: left_half(x)[:, :2], r"returned a Tensor of shape \(1, 2\)"),
+        (lambda x: left_half(x).argmax(-1), r"returned a Tensor of shape \(1,\)"),
+        (lambda x: (left_half(x), x), "returned a tuple"),
         (lambda x: left_half(x) / 0 * 0, "returned logits that are not finite"),
         (lambda x: torch.rand(len(x), 3), "returned different logits for one image"),
     ],
-)  # fmt: skip
+)
 def test_invalid_logits_raise(logits, message):
     with pytest.raises(InputError, match=f"^the network {message}") as caught:
         make(logits)
@@ -117,27 +102,11 @@ def test_a_later_failure_raises():
         network(torch.ones(2, *SHAPE))
 
 
-def test_byte_images_of_another_size_raise():
-    with pytest.raises(InputError, match=r"on images of shape \(1, 2, 4, 3\)"):
-        make(lambda x: x.reshape(len(x), 5), (3, 2, 4), takes_bytes=True)
-
-
-def test_later_non_finite_logits_raise():
-    network = make(lambda x: left_half(x).log())
-    with pytest.raises(InputError, match="not finite"):
-        network(torch.zeros(1, *SHAPE))
-
-
 def test_uncopyable_module_raises():
     module = nn.Flatten()
     module.held = torch.ones(1, requires_grad=True) * 2  # not a leaf, and torch copies only leaves
     with pytest.raises(InputError, match=r"^the network Flatten can't be copied .* function that"):
         make(module)
-
-
-def test_numpy_float64_is_converted():
-    network = make(lambda x: np.asarray(left_half(x).detach(), np.float64))
-    assert network(torch.ones(2, *SHAPE)).dtype == torch.float32
 
 
 def test_the_type_of_parameters_is_named():
@@ -146,9 +115,3 @@ def test_the_type_of_parameters_is_named():
         make(network)
     with pytest.raises(InputError, match=r"give drone_rl\.policy_from the camera= and transforms="):
         make(nn.Sequential(nn.Flatten(), nn.Linear(9, 3)))
-
-
-def test_the_type_of_the_images_it_was_given_is_named():
-    network = nn.Sequential(nn.Flatten(), nn.Linear(24, 3))
-    with pytest.raises(InputError, match=r"of shape \(1, 2, 4, 3\), torch\.uint8"):
-        make(network, (3, 2, 4), takes_bytes=True)

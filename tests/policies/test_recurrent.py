@@ -11,7 +11,6 @@ import drone_rl
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.config.commands import HeldOutSettings
-from drone_rl.config.learning import Ppo, Rollouts
 from drone_rl.config.networks import Lstm
 from drone_rl.config.training import TrainSettings
 from drone_rl.objectives import LeaveOneOut, ReinforceLoss
@@ -22,7 +21,6 @@ from drone_rl.policies.recurrent import CELL, HIDDEN, Memory
 from drone_rl.policies.zoo import describe
 from drone_rl.training.learners import ReinforceLearner, episode_chunks
 from drone_rl.trust.export import export
-from drone_rl.trust.video import view
 from drone_rl.utils.errors import InputError
 
 TASK = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=9, front_margin=3.0)
@@ -76,15 +74,6 @@ def test_state_by_hand():
         torch.testing.assert_close(memory.hidden, torch.full((2, 1, 1), math.tanh(cell) / 2))
         expected = network.logits.weight[:, 0] * math.tanh(cell) / 2 + network.logits.bias
         torch.testing.assert_close(logits, expected.expand(2, 3).detach())
-
-
-def test_initial_weights_follow_from_the_generator():
-    one, same, other = make_network(), make_network(), make_network(1)
-    assert all(torch.equal(a, b) for a, b in zip(one.parameters(), same.parameters(), strict=True))
-    assert not torch.equal(one.lstm.lstm.weight_hh_l0, other.lstm.lstm.weight_hh_l0)
-    assert one.lstm.lstm.bias_ih_l0.tolist() == [0.0] * 6 + [1.0] * 6 + [0.0] * 12
-    assert one.lstm.lstm.bias_hh_l0.tolist() == [0.0] * 24
-    assert float(one.logits.weight.detach().norm()) < 0.05
 
 
 @torch.no_grad()
@@ -247,12 +236,6 @@ def test_file_holds_the_policy(trained, tmp_path):
         torch.testing.assert_close(first.step(frame, memory)[0], second.step(frame, memory)[0])
 
 
-def test_verdict_says_that_rounding_was_not_checked(trained):
-    verdict = drone_rl.judge(trained.policy, episodes=20, seed=0).verdict
-    assert verdict.evidence["rounding"] is None
-    assert "Whether rounding could change actions was not checked." in verdict.sentence
-
-
 def test_onnx_model_agrees_at_every_step(trained, tmp_path):
     pytest.importorskip("onnxruntime")
     found = drone_rl.export_onnx(trained.folder, tmp_path / "mine.onnx", seed=0)
@@ -272,27 +255,6 @@ REFUSED = {
 def test_analyses_of_single_frames_are_refused(what, trained, tmp_path):
     with pytest.raises(InputError, match=rf"{what}.*; give (another policy|domain=false)"):
         REFUSED[what](trained.policy, tmp_path)
-
-
-def test_the_viewer_refuses_it(trained):
-    with pytest.raises(InputError, match=r"the viewer needs .*; leave viewer=false to film it"):
-        view(trained.policy)
-
-
-def test_success_under_perturbations_is_measured(trained):
-    found = drone_rl.shifts(trained.policy, axes=["light"], episodes=20, domain=False, seed=0)
-    assert "brightness" in str(found)
-
-
-def test_a_critic_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"RecurrentNetwork is not; give objective=reinforce"):
-        drone_rl.train(
-            SETTINGS,
-            folder=tmp_path,
-            objective=Ppo(num_steps=8),
-            collector=Rollouts(num_envs=4, num_threads=1),
-            progress=lambda *_: None,
-        )
 
 
 def test_actor_needs_the_state():

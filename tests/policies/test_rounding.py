@@ -1,5 +1,3 @@
-"""Rounding bounds hold for random summation orders in float32."""
-
 import numpy as np
 import pytest
 import torch
@@ -7,9 +5,10 @@ from torch import nn
 
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN
 from drone_rl.policies.external_network import ExternalNetwork
-from drone_rl.policies.rounding import TOLERANCE, RoundingBound, arithmetic_on, decider
+from drone_rl.policies.rounded_layers import layer_of
+from drone_rl.policies.rounding import TOLERANCE, Regrouped, RoundingBound, arithmetic_on, decider
 from drone_rl.sim.actions import MOVES
-from tests.own_networks import Mirrored
+from tests.own_networks import Doubled, Mirrored
 
 BIG = 2.0**24
 
@@ -140,15 +139,6 @@ def test_unknown_module_is_compared_with_float64():
         assert found.is_fragile.tolist() == [is_fragile] * 2
 
 
-def test_float32_only_module_uses_a_tolerance():
-    class Strict(nn.Linear):
-        def forward(self, pixels):
-            return nn.functional.linear(pixels.flatten(1).float(), self.weight, self.bias)
-
-    network = ExternalNetwork(Strict(1, 3), (1, 1, 1), MOVES)
-    assert decider(network)[0](torch.ones(1, 1, 1, 1)).outputs.shape == (1, 3)
-
-
 def test_tf32_convolutions_are_reported(monkeypatch):
     for allowed in (True, False):
         monkeypatch.setattr(torch.backends.cudnn, "allow_tf32", allowed)
@@ -159,3 +149,72 @@ def test_tf32_convolutions_are_reported(monkeypatch):
 
 def test_a_forward_pass_of_its_own_has_no_known_bound():
     assert RoundingBound.find(Mirrored((1, 25, 64), 3)) is None
+
+
+def test_bound_covers_inputs_of_other_evaluations():
+    """The input is 0 in one evaluation, up to 1 exactly, and up to 2 in another evaluation."""
+    layer = nn.Linear(1, 1)
+    with torch.no_grad():
+        layer.weight.fill_(1.5e38)
+        layer.bias.zero_()
+    none, one = torch.zeros(1, 1).double(), torch.ones(1, 1).double()
+    assert layer_of(layer).bound(none, one).isfinite().all()  # 2 * 1.5e38 does not overflow
+    assert layer_of(layer).bound(none, 1.2 * one).isinf().all()  # 2.4 * 1.5e38 does
+
+
+def test_bound_of_a_sum_of_four_ones_by_hand():
+    """Five terms with the bias: 5 roundings of partial sums up to 4, and 2 of each of 4 terms."""
+    layer = nn.Linear(4, 1)
+    with torch.no_grad():
+        layer.weight.fill_(1.0)
+        layer.bias.zero_()
+    ones = torch.ones(1, 4).double()
+    bound = layer_of(layer).bound(ones, torch.zeros_like(ones))
+    assert bound.item() == pytest.approx((5 * 4 + 2 * 4) * 2.0**-24, rel=0.01)
+
+
+def test_partial_sums_are_at_most_the_positive_terms():
+    """Terms 1, -1, 1, -1 add up to 0 and no partial sum exceeds 2: 5 roundings of 2, 2 of 4."""
+    layer = nn.Linear(4, 1)
+    with torch.no_grad():
+        layer.weight.copy_(torch.tensor([[1.0, -1.0, 1.0, -1.0]]))
+        layer.bias.zero_()
+    ones = torch.ones(1, 4).double()
+    made, error, _ = layer_of(layer).run(ones, torch.zeros_like(ones))
+    assert made.item() == 0.0
+    assert error.item() == pytest.approx((5 * 2 + 2 * 4) * 2.0**-24, rel=0.01)
+
+
+def test_convolutions_with_padding_are_not_supported():
+    assert layer_of(nn.Conv2d(1, 1, 2)) is not None
+    for padding in (1, "valid"):
+        assert layer_of(nn.Conv2d(1, 1, 2, padding=padding)) is None
+
+
+@pytest.mark.parametrize(
+    "layer", [Doubled(1, 2, 3), nn.utils.parametrizations.spectral_norm(nn.Conv2d(1, 2, 3))]
+)
+def test_layers_that_compute_something_else_are_not_supported(layer):
+    assert layer_of(layer) is None
+
+
+@pytest.mark.parametrize("groups", ["single", "mixed"])
+def test_grouping_does_not_change_a_function_of_the_frame(groups):
+    sizes = []
+
+    def logits(pixels):
+        sizes.append(len(pixels))
+        return pixels.flatten(1) * torch.tensor([1.0, 2.0, 3.0])
+
+    network = ExternalNetwork(logits, (1, 1, 3), MOVES)
+    pixels = torch.rand(20, 1, 1, 3)
+    sizes.clear()
+    assert torch.equal(Regrouped(network, groups)(pixels), pixels.flatten(1) * torch.arange(1, 4))
+    assert set(sizes) == {1} if groups == "single" else len(set(sizes)) > 1
+
+
+def test_dependence_on_the_batch_is_detected():
+    network = ExternalNetwork(lambda x: torch.full((len(x), 3), float(len(x))), (1, 1, 3), MOVES)
+    pixels = torch.rand(20, 1, 1, 3)
+    assert not torch.equal(Regrouped(network, "mixed")(pixels), network(pixels))
+    assert not torch.equal(Regrouped(network, "single")(pixels), network(pixels))

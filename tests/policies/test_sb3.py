@@ -1,5 +1,3 @@
-"""Models of Stable-Baselines3 are copied, and refused where a single image does not decide."""
-
 import copy
 
 import numpy as np
@@ -7,7 +5,8 @@ import pytest
 import torch
 
 import drone_rl
-from drone_rl.config.transforms import Gray
+from drone_rl.config.networks import Mlp, SmallCnn
+from drone_rl.config.transforms import Gray, Rgb, Standardize
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.utils.errors import InputError
 from tests.policies.sb3_models import (
@@ -19,6 +18,7 @@ from tests.policies.sb3_models import (
     make_model,
     of_floats,
     sb3,
+    single,
 )
 
 policies = pytest.importorskip("stable_baselines3.common.policies")
@@ -92,3 +92,70 @@ def test_other_values_are_no_models_and_no_environments():
         drone_rl.policy_from(make_model("bytes, CNN"), env="venv")
     with pytest.raises(InputError, match=r"^env= is of models of Stable-Baselines3"):
         drone_rl.policy_from(lambda images: images[:, :3], env="venv")
+
+
+spaces = gymnasium.spaces
+
+IMAGES = spaces.Box(-np.inf, np.inf, (1, 25, 64), np.float32)
+
+
+def test_trunk_has_the_layers_before_the_logits():
+    trunk, network = drone_rl.Sb3Trunk(IMAGES), SmallCnn().make((1, 25, 64), 3)
+    names = [name for name, _ in trunk.layers.named_children()]
+    assert [*names, "logits"] == [name for name, _ in network.layers.named_children()]
+    trunk.layers.load_state_dict(network.layers[:-1].state_dict())
+    x = torch.randn(5, 1, 25, 64)
+    assert trunk(x).shape == (5, 128) == (5, trunk.features_dim)
+    torch.testing.assert_close(network.layers[-1](trunk(x)), network(x))
+
+
+def test_other_networks_are_supported():
+    assert drone_rl.Sb3Trunk(IMAGES, Mlp(hidden=(7, 5))).features_dim == 5
+    assert drone_rl.Sb3Trunk(IMAGES, SmallCnn(channels=(4,), hidden=())).features_dim == 4 * 6 * 16
+
+
+def test_vector_observations_raise():
+    with pytest.raises(InputError, match=r"^Sb3Trunk got observations of shape \(28,\); give ima"):
+        drone_rl.Sb3Trunk(spaces.Box(0, 1, (28,)))
+
+
+def test_batches_of_several_frames_are_tried():
+    with pytest.raises(InputError, match=r"on images of shape \(2, 1, 25, 64\)"):
+        drone_rl.policy_from(lambda images: images.reshape(1, 1, 25, 64)[:, 0, 10, :3])
+
+    def mean_of_batch(images):
+        return images[:, 0, 10, :3] + 10 * images.mean()
+
+    with pytest.raises(InputError, match=r"^policy=mean_of_batch gives other logits .* a batch of"):
+        drone_rl.policy_from(mean_of_batch)
+
+
+class Late(gymnasium.ObservationWrapper):
+    """The observation of the step before."""
+
+    def __init__(self, env):
+        super().__init__(env)
+        self.before = None
+
+    def observation(self, observation):
+        seen, self.before = self.before, observation
+        return observation if seen is None else seen
+
+
+def test_wrappers_with_memory_are_refused():
+    env = single(Late)(gymnasium.make(NAME, camera=CAMERA))
+    model = sb3.PPO("CnnPolicy", env, seed=0, n_steps=4, batch_size=4)
+    with torch.no_grad():
+        model.policy.action_net.weight.mul_(1000)
+    with pytest.raises(InputError, match=r"acts otherwise than by its library.*: Late, VecTransp"):
+        as_policy(model)
+
+
+def test_transforms_that_are_not_those_of_the_environment_are_refused():
+    model = make_model("floats, channels first")
+    right, wrong = (Gray(), Standardize()), (Gray(), Standardize(mean=0.2))
+    assert drone_rl.policy_from(model, transforms=right).transforms == right
+    with pytest.raises(InputError, match="acts otherwise than by its library's predict"):
+        drone_rl.policy_from(model, transforms=wrong)
+    with pytest.raises(InputError, match=r"observes \(1, 40, 48\), .* return images of \(3, 40, 4"):
+        drone_rl.policy_from(model, transforms=[Rgb()])

@@ -1,18 +1,11 @@
+"""Sets of actions: mirror images, opposites, distances, probabilities."""
+
 import numpy as np
 import pytest
 import torch
 
-from drone_rl.sim.actions import MOVES, DiscreteActions, Move
+from drone_rl.sim.actions import MOVES, DiscreteActions
 from tests.five_actions import FIVE
-
-
-def test_move_numbers_are_those_of_files():
-    assert [(move.name, move.value) for move in Move] == [("FORWARD", 0), ("LEFT", 1), ("RIGHT", 2)]
-    assert MOVES.names == ("forward", "left", "right")
-    assert (MOVES.left, MOVES.right, MOVES.order) == (1, 2, (1, 0, 2))
-    assert (len(MOVES), len(FIVE), FIVE.right) == (3, 5, 3)
-    assert MOVES.entry == ((), torch.int64, 0, 2)
-    assert MOVES.output_names == MOVES.names and (MOVES.num_outputs, FIVE.num_outputs) == (3, 5)
 
 
 def test_constant_and_random_actions():
@@ -26,13 +19,6 @@ def test_greedy_action_has_the_greatest_output():
     outputs = torch.tensor([[0.0, 3.0, 1.0], [2.0, 0.0, 1.0]])
     assert MOVES.greedy(outputs).tolist() == [1, 0]
     assert torch.equal(MOVES.scores(outputs), outputs)
-
-
-def test_recorded_actions_are_indices():
-    action = torch.tensor([0, 4, 2])
-    assert FIVE.part(action) is action and FIVE.kept(action) == {"actions": action}
-    assert FIVE.fields() == {"actions": "action taken: 0 up, 1 down, 2 left, 3 right, 4 stay"}
-    assert FIVE.is_reversible(FIVE.kept(action)).tolist() == [True, False, True]
 
 
 def test_probabilities_are_the_softmax_of_outputs():
@@ -96,27 +82,53 @@ def test_as_dict_returns_plain_values():
     }
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"mirrored": (1, 2, 0)}, "mirrored"),
-        ({"mirrored": (0, 0, 0)}, "mirrored"),
-        ({"mirrored": (0, 1, 3)}, "mirrored"),
-        ({"opposite": (1, 2, 0)}, "opposite"),
-        ({"order": (0, 1, 1)}, "order"),
-        ({"colors": ((0, 0, 0),)}, "color"),
-        ({"left": 0}, "left"),
-    ],
-)
-def test_inconsistent_sets_raise(change, message):
-    given = {name: getattr(MOVES, name) for name in MOVES.__dataclass_fields__}
-    with pytest.raises(ValueError, match=message):
-        DiscreteActions(**{**given, **change})
-
-
 def test_moves_in_three_dimensions_extend_the_chapters():
     from drone_rl.sim.actions import DIRECTIONS_3D, MOVES, MOVES_3D
 
     assert MOVES_3D.names == (*MOVES.names, "up", "down")
     assert [MOVES_3D.names[i] for i in MOVES_3D.opposite[3:]] == ["down", "up"]
     assert [sum(d) for d in DIRECTIONS_3D] == [1, 1, -1, 1, -1]
+
+
+FOUR = DiscreteActions(
+    names=("left", "right", "far left", "far right"),
+    mirrored=(1, 0, 3, 2),
+    opposite=(1, 0, 3, 2),
+    left=0,
+    order=(2, 0, 1, 3),
+    arrows=((-1, 0), (1, 0), (-1, 0), (1, 0)),
+    colors=((0, 0, 0),) * 4,
+)
+
+
+class Both(DiscreteActions):
+    lefts = (0, 2)
+
+
+def test_opposition_sums_all_parts_that_lead_left():
+    both = Both(**vars(FOUR))
+    for kind in (torch.tensor, np.array):
+        probs = kind([[0.5, 0.0, 0.25, 0.25]])
+        assert (FOUR.prob_left(probs).tolist(), both.prob_left(probs).tolist()) == (
+            [0.5],
+            [0.75],
+        )
+    one, other = np.array([0.5, 0.0, 0.25, 0.25]), np.array([0.0, 0.25, 0.25, 0.5])
+    assert FOUR.opposition(one, other) == 0.25  # 0.5 and 0.25
+    assert both.opposition(one, other) == 0.5  # 0.5 and 0.5
+
+
+def test_agrees_is_true_for_equal_parts_or_sides():
+    both, every = Both(**vars(FOUR)), torch.arange(4)
+    assert FOUR.agrees(every, torch.tensor(0)).tolist() == [True, False, False, False]
+    assert both.agrees(every, torch.tensor(0)).tolist() == [True, False, True, False]
+    assert FOUR.agrees(every, every).all()
+
+
+def test_undoing_and_turning_parts():
+    every = torch.arange(4)
+    assert FOUR.undoes(every, torch.tensor([1, 1, 3, 2])).tolist() == [True, False, True, True]
+    assert FOUR.can_be_undone(every).all() and FOUR.turns(every).all()
+    still = DiscreteActions(**{**vars(FOUR), "opposite": (0, 1, 2, 3), "mirrored": (1, 0, 2, 3)})
+    assert not still.can_be_undone(every).any() and not still.undoes(every, every).any()
+    assert still.turns(every).tolist() == [True, True, False, False]

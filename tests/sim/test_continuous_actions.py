@@ -1,3 +1,5 @@
+"""Continuous actions: rates, parts and their probabilities."""
+
 import math
 
 import numpy as np
@@ -5,14 +7,20 @@ import pytest
 import torch
 
 from drone_rl.config import ActionSettings
-from drone_rl.sim.actions import MOVES
 from drone_rl.sim.continuous_actions import ContinuousActions, normal_of
-from drone_rl.utils.errors import InputError
 
 SETTINGS = ActionSettings(kind="velocity", forward_speed=4, sideways_speed=3, yaw_rate=45)
+
+
 ALL = ContinuousActions.of(SETTINGS)
+
+
 STRAIGHT = ContinuousActions.of(SETTINGS.replace(yaw_rate=0.0))
+
+
 EDGE = math.atanh(1 / 3)
+
+
 DEVIATION = math.exp(-0.5)
 
 
@@ -24,20 +32,6 @@ def outputs(forward=0.0, left=0.0, yaw=0.0):
 
 def phi(x):
     return 0.5 * math.erfc(-x / math.sqrt(2))
-
-
-def test_discrete_actions_are_refused():
-    with pytest.raises(InputError, match="actions=moves are discrete; give settings with kind=vel"):
-        ContinuousActions.of(ActionSettings())
-
-
-def test_part_names_are_moves_and_turns():
-    assert STRAIGHT.names == MOVES.names and STRAIGHT.order == MOVES.order
-    assert ALL.names == ("forward", "left", "right", "turn left", "turn right")
-    assert ALL.names[ALL.order[0]] == "turn left"
-    assert ALL.entry == ((3,), torch.float32, -1.0, 1.0)
-    assert ALL.num_outputs == len(ALL.output_names) == 6 and (len(ALL), len(STRAIGHT)) == (5, 3)
-    assert ContinuousActions.of(SETTINGS) == ALL != STRAIGHT
 
 
 def test_to_rates_converts_to_units():
@@ -95,13 +89,6 @@ def test_part_probabilities_match_sampled_actions():
     ).abs().max() < 0.007  # 4 standard errors of 0.5 / 316
 
 
-def test_uniform_actions_have_equal_parts():
-    drawn = ALL.sample((30_000,), torch.Generator().manual_seed(0))
-    assert drawn.shape == (30_000, 3) and drawn.abs().max() <= 1
-    still = torch.stack([drawn[:, 0], drawn[:, 1], torch.zeros(30_000)], -1)
-    assert (ALL.part(still).bincount() / 30_000 - 1 / 3).abs().max() < 0.012
-
-
 def test_part_of_an_action():
     action = torch.tensor(
         [[1, 0, 0], [1, 0.5, 0], [-1, -0.5, 0], [1, 0.5, -0.6], [0, 0.2, 0.9], [1, 0.3, -0.3]]
@@ -146,32 +133,6 @@ def test_greedy_action_is_the_mean():
     torch.testing.assert_close(ALL.greedy(outputs(1.0, -0.5, 0.25)), expected)
 
 
-def test_recorded_actions_have_rates_and_parts():
-    kept = ALL.kept(torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]))
-    assert set(kept) == set(ALL.fields())
-    assert kept["actions"].tolist() == [0, 1]
-    assert kept["rates"].tolist() == [[4, 0, 0], [2, 3, 0]]
-    assert "3 turn left" in ALL.fields()["actions"]
-
-
 def test_lateral_motion_without_progress_is_swaying():
     action = torch.tensor([[-1.0, 0.5, 0], [-0.3, 0.5, 0], [-0.4, 0, -0.5], [-1, 0.2, 0.2]])
     assert ALL.is_reversible(ALL.kept(action)).tolist() == [True, False, True, False]
-
-
-def test_as_dict_has_names_arrows_and_colors():
-    description = ALL.as_dict()
-    assert description["names"] == list(ALL.names) and description["left"] == 1
-    assert all(math.hypot(*arrow) == pytest.approx(1) for arrow in description["arrows"])
-    for (across, up), other in zip(description["arrows"], description["mirrored"], strict=True):
-        assert description["arrows"][other] == [-across, up]
-    assert (
-        description["colors"][:3] == MOVES.as_dict()["colors"]
-        and len(set(map(tuple, description["colors"]))) == 5
-    )
-
-
-def test_rates_of_an_array_are_those_of_a_tensor():
-    actions, action = ContinuousActions.of(SETTINGS), [1.0, 0.0, -1.0]
-    found = actions.to_rates(np.array(action))
-    assert torch.equal(found, actions.to_rates(torch.tensor(action)))

@@ -1,4 +1,4 @@
-"""Fixed appearances, and appearances sampled at every reset."""
+"""Fixed appearances, appearances sampled at every reset, and distractors."""
 
 import math
 
@@ -7,9 +7,15 @@ import pytest
 import torch
 from PIL import Image
 
-from drone_rl.config import MINIMAL, AppearanceSettings, PillarsSettings, TaskSettings
+from drone_rl.config import AppearanceSettings, PillarsSettings, TaskSettings
 from drone_rl.sim.rendering.scene import SemanticClass
-from drone_rl.sim.visual_randomization import AppearanceSampler
+from drone_rl.sim.visual_randomization import (
+    HIDDEN_DEPTH,
+    WIDTH,
+    AppearanceSampler,
+    draw_distractors,
+    stand,
+)
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state
@@ -35,11 +41,6 @@ def reset(settings, count):
     return looks
 
 
-def test_minimal_appearance_is_none():
-    looks = reset(MINIMAL, 3)
-    assert looks.current() is None and looks.middle is None and not looks.varies
-
-
 def test_fixed_appearance_is_shared_by_all_environments():
     looks = reset(AppearanceSettings(sun_elevation=30.0, sun_azimuth=90.0, sun_strength=0.5), 3)
     look = looks.middle
@@ -61,14 +62,6 @@ def test_samples_fill_their_ranges():
     ground = look.textures[SemanticClass.GROUND]
     assert ground.images == ("grid", "bricks") and 2 <= ground.size.min() <= ground.size.max() <= 4
     assert all(100 < (ground.choice == which).sum() < 170 for which in (-1, 0, 1))
-
-
-@pytest.mark.parametrize(
-    "settings", [{"ground_texture": ("grid", "bricks")}, {"shadows": 0.6}, {"exposure": (1, 2)}]
-)
-def test_every_random_value_is_sampled(settings):
-    looks = reset(AppearanceSettings(**settings), 20)
-    assert looks.varies and len(looks.values.unique(dim=0)) > 1
 
 
 def test_middle_appearance_is_the_center_of_ranges():
@@ -125,17 +118,6 @@ def test_camera_and_distractors_of_each_environment():
     assert looks.middle.distractors.expand(2).sizes.shape == (2, 3)
 
 
-def test_wider_field_of_view_decreases_zoom():
-    look = reset(AppearanceSettings(camera_widening=(15.0, 15.0)), 2).middle
-    wanted = math.tan(math.radians(67.5)) / math.tan(math.radians(75.0))
-    assert float(look.camera.zoom) == pytest.approx(wanted)
-
-
-def test_impossible_settings_raise_at_construction():
-    with pytest.raises(InputError, match="puts the camera into the ground"):
-        AppearanceSampler(AppearanceSettings(camera_offset=(0, 0, -5)), 1)
-
-
 @pytest.mark.parametrize("size", [None, (4097, 2)])
 def test_textures_are_read_at_construction(tmp_path, size):
     path = tmp_path / "ground.png"
@@ -155,3 +137,61 @@ def test_defaults_equal_the_appearance_of_the_tasks(task):
     clear = worlds.render(worlds.state)
     assert (plain.int() - clear.int()).abs().max() <= 2 and not torch.equal(plain, clear)
     worlds.close()
+
+
+CUBES = TaskSettings()
+
+
+SOME = AppearanceSettings(
+    distractors=(2, 5),
+    distractor_size=(1.0, 2.0),
+    distractor_distance=(3.0, 6.0),
+    distractor_color=((0.0, 0.5, 0.0), (0.4, 0.5, 1.0)),
+)
+
+
+def drawn(settings, seed):
+    source = None if seed is None else np.random.RandomState(seed)
+    return torch.tensor(draw_distractors(settings, CUBES.object_region, source)).reshape(-1, WIDTH)
+
+
+def test_positions_are_beside_the_path():
+    ahead, aside = torch.tensor([1.0, 2.0]), torch.tensor([3.0, 4.0])
+    places = stand(CUBES.object_region, ahead, aside, torch.tensor([True, False]), 2.5)
+    assert places.tolist() == [[1.0, 9.0, 2.5], [2.0, -10.0, 2.5]]  # cubes are within 6 m
+
+
+def test_distractors_fill_their_ranges():
+    rows = torch.stack([drawn(SOME, seed) for seed in range(200)])
+    assert rows.shape == (200, 5, WIDTH)
+    stands = rows[..., 2] > 0
+    assert {*stands.sum(1).tolist()} == {2, 3, 4, 5} and stands[:, :2].all()
+    x, y, z, size = rows[..., :4].unbind(-1)
+    assert x.min() >= 0 and 33 < x.max() <= 48  # the last cube is at 33 m, the first at 15 m
+    beside = y.abs() - 6.0 - size / 2
+    assert 3 <= beside.min() < 3.1 and 5.9 < beside.max() <= 6
+    assert (z == size / 2)[stands].all() and torch.allclose(
+        z[~stands], (size / 2 - HIDDEN_DEPTH)[~stands]
+    )
+    assert 1 <= size.min() < 1.05 and 1.95 < size.max() <= 2
+    assert (rows[..., 5] == 0.5).all() and 0.3 < rows[..., 4].max() <= 0.4
+    assert (y[:, 0] > 0).all() and (y[:, 1] < 0).all()  # alternating sides
+
+
+def test_middle_positions_follow_the_golden_section():
+    """Positions start at half of 48 m, alternate sides, and advance by 0.618 per pair."""
+    turn = 0.6180339887498949
+    shares = [(0.5 + pair * turn + side * 0.5) % 1.0 for pair in range(3) for side in (0, 1)][:5]
+    rows = drawn(SOME, None)
+    assert rows[:, 0].tolist() == pytest.approx([48 * share for share in shares], rel=1e-6)
+    assert rows[:, 1].tolist() == [sign * (6 + 4.5 + 0.75) for sign in (1, -1, 1, -1, 1)]
+
+
+def test_fixed_settings_draw_no_random_numbers():
+    fixed = AppearanceSettings(distractors=3, distractor_size=2.0, distractor_distance=4.0)
+    source, other = np.random.RandomState(0), np.random.RandomState(0)
+    begin, shift = other.uniform(0.0, 1.0), other.uniform(-0.5, 0.5, 3)
+    rows = torch.tensor(draw_distractors(fixed, CUBES.object_region, source)).reshape(-1, WIDTH)
+    assert source.uniform() == other.uniform()
+    shares = (begin + np.array([0.0, 0.5, 0.6180339887498949]) + shift / 3) % 1.0
+    assert rows[:, 0].tolist() == pytest.approx((48 * shares).tolist(), rel=1e-6)

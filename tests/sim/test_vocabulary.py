@@ -1,8 +1,11 @@
+"""Terms of reports and displays of actions, as files hold them."""
+
 import dataclasses
 
 import pytest
 
-from drone_rl.sim.vocabulary import CUBES, MOST, some_cubes, terms_of
+from drone_rl.sim import actions
+from drone_rl.sim.vocabulary import CUBES, MOST, SHOWN_MOVES, shown_actions, terms_of
 from drone_rl.utils.errors import InputError
 
 
@@ -10,30 +13,6 @@ def test_vocabulary_round_trip_and_default():
     assert terms_of({}) == CUBES
     other = dataclasses.replace(CUBES, goal="post", sides={"near": "close by"})
     assert terms_of({"terms": other.as_dict()}) == other
-
-
-@pytest.mark.parametrize(
-    ("count", "words"), [(1, "one cube"), (2, "two cubes"), (4, "four cubes"), (5, "five cubes"),
-    (6, "6 cubes")],
-)  # fmt: skip
-def test_cubes_are_counted_in_words(count, words):
-    task = {"num_cubes": count, "cube_size": 2.5, "lateral_bound": 6.0, "vertical_bound": 0.0}
-    assert some_cubes(task) == f"{words} of 2.5 m, up to 6 m to either side and 0 m up or down"
-
-
-def test_phrases():
-    assert (CUBES.goals, CUBES.targets, CUBES.reaches, CUBES.handles) == (
-        "cubes", "cubes", "collects", "collects the cube",
-    )  # fmt: skip
-    assert dataclasses.replace(CUBES, reach="reach").reaches == "reaches"
-    assert dataclasses.replace(CUBES, reach="fly", handle="dodge").reaches == "flies"
-    assert dataclasses.replace(CUBES, reach="play", handle="dodge").reaches == "plays"
-    assert dataclasses.replace(CUBES, reach="fly through").reaches == "flies through"
-    assert dataclasses.replace(CUBES, handle="dodge").handles == "dodges"
-    assert CUBES.side("left") == "on its left" and CUBES.side("above") == "above"
-    assert CUBES.place("right") == "on its right" and CUBES.label("row") == "row"
-    assert CUBES.ending("step_limit") == "at the step limit"
-    assert CUBES.ending("wall_touched") == "by wall touched"
 
 
 @pytest.mark.parametrize(
@@ -60,3 +39,26 @@ def test_descriptions_of_failures(by, value, said):
 def test_invalid_vocabulary_raises(change):
     with pytest.raises(InputError, match="terms"):
         terms_of({"terms": {**CUBES.as_dict(), **change}})
+
+
+def test_moves_are_the_default_display():
+    display = shown_actions({"actions": actions.MOVES.as_dict()})
+    assert display == SHOWN_MOVES == shown_actions({"name": "an older one"})
+    assert [SHOWN_MOVES.css(i) for i in range(3)] == ["#cc79a7", "#e69f00", "#0072b2"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"names": ["a", "a", "b"]}, "give 3 different names, and the index of each once"),
+        ({"order": [0, 1, 1]}, "order=.*0, 1, 1.* or a name is invalid"),
+        ({"arrows": [[0, 1]]}, "an arrow and a color"),
+        ({"colors": [[0, 0, 256]] * 3}, "out of range"),
+        ({"colors": "red"}, "does not fit"),
+        ({"speeds": [4, 3]}, "does not fit"),
+        ({"more": 1}, "unknown"),
+    ],
+)
+def test_invalid_displays_raise(change, message):
+    with pytest.raises(InputError, match=message):
+        shown_actions({"actions": {**actions.MOVES.as_dict(), **change}})

@@ -8,7 +8,7 @@ from drone_rl.training.callbacks import OngoingTraining, Progress
 from drone_rl.trust.export import export_policy
 from tests.policies.zoo.test_files import CHECKPOINT
 from tests.training_loop import run
-from tests.trust.test_export_card_text import VERDICT
+from tests.trust.cards import VERDICT
 
 
 def test_progress_starts_at_zero():

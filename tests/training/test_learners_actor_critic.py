@@ -276,7 +276,7 @@ def test_state_dict_restores_the_learner(make_learner, batch):
             {"module.weight": torch.zeros(1, 3), "module.bias": torch.zeros(1)},
             r"critic\.module",
         ),
-        ("optimiser", {}, "optimizer has other names"),
+        ("optimizer", {}, "optimizer has other names"),
         ("scheduler", None, "scheduler has other names"),
         ("minibatches", torch.zeros(3), "minibatches is not of shape"),
     ],

@@ -110,7 +110,7 @@ def test_nan_changes_nothing(make_trainer):
     ("part", "value", "message"),
     [
         ("policy", {"weight": torch.zeros(2, 4)}, "policy has other names"),
-        ("optimiser", {}, "optimizer has other names"),
+        ("optimizer", {}, "optimizer has other names"),
         ("scheduler", None, "scheduler has other names"),
     ],
 )

@@ -260,17 +260,6 @@ def contents(folder):
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def test_a_checkpoint_from_before_the_optimizer_was_renamed_is_resumed(trained, tmp_path):
-    folder = shutil.copytree(trained[0].folder, tmp_path / "run")
-    last = folder / "checkpoints" / "last.pt"
-    state = torch.load(last, weights_only=False)
-    state["config"]["optimiser"] = state["config"].pop("optimizer")
-    torch.save(state, last)
-    longer = TINY.trainer.replace(total_frames=900)
-    done = drone_rl.train(folder=folder, resume=True, trainer=longer, progress=silent)
-    assert done.result["frames"] >= 900
-
-
 def test_rejected_resume_changes_no_file(trained, tmp_path):
     folder = shutil.copytree(trained[0].folder, tmp_path / "run")
     before = contents(folder)
@@ -278,7 +267,7 @@ def test_rejected_resume_changes_no_file(trained, tmp_path):
         drone_rl.train(folder=folder, resume=True, seed=9)
     assert contents(folder) == before
     state = torch.load(folder / "checkpoints" / "last.pt", weights_only=False)
-    torch.save({**state, "optimiser": {}}, folder / "checkpoints" / "last.pt")
+    torch.save({**state, "optimizer": {}}, folder / "checkpoints" / "last.pt")
     before = contents(folder)
     longer = TINY.trainer.replace(total_frames=900)
     with pytest.raises(InputError):

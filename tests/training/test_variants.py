@@ -169,7 +169,7 @@ def test_resuming_within_episodes_equals_an_uninterrupted_run(settings, tmp_path
     assert torch.cat(counts).count_nonzero() > 0  # episodes are running
     again = drone_rl.train(folder=half.folder, resume=True, trainer=longer, progress=silent)
     one, two = checkpoint(whole), checkpoint(again)
-    for key in ("policy", "critic", "optimiser", "minibatches", "generators", "collector"):
+    for key in ("policy", "critic", "optimizer", "minibatches", "generators", "collector"):
         assert_same(one[key], two[key])
     progress = [
         {k: v for k, v in state["progress"].items() if k != "seconds"} for state in (one, two)

@@ -1,15 +1,27 @@
-from drone_rl.utils.errors import InputError, did_you_mean
+import json
+import sys
+
+import pytest
+
+from drone_rl.utils.errors import InputError, did_you_mean, extra
 
 
-def test_a_users_mistake_is_a_value_error_with_its_message():
-    error = InputError("seed=-1 is out of range; give 0 or more")
-    assert isinstance(error, ValueError)
-    assert str(error) == "seed=-1 is out of range; give 0 or more"
+@pytest.mark.parametrize(
+    ("name", "names", "meant"),
+    [
+        ("GOOD", ["good", "proved"], "good"),
+        ("grid_snaped", ["rgb", "Grid_Snapped"], "Grid_Snapped"),
+        ("fov", ["width", "horizontal_fov"], "horizontal_fov"),
+        ("x", ["good", "proved"], None),
+        ("fov", ["vertical_fov", "horizontal_fov"], None),
+    ],
+)
+def test_similar_names(name, names, meant):
+    assert did_you_mean(name, names) == (f"; did you mean {meant}?" if meant else "")
 
 
-def test_the_known_name_that_is_most_like_an_unknown_one():
-    assert did_you_mean("GOOD", ["good", "proved"]) == "; did you mean good?"
-    assert did_you_mean("grid_snaped", ["rgb", "Grid_Snapped"]) == "; did you mean Grid_Snapped?"
-    assert did_you_mean("x", ["good", "proved"]) == ""
-    assert did_you_mean("fov", ["width", "horizontal_fov"]) == "; did you mean horizontal_fov?"
-    assert did_you_mean("fov", ["vertical_fov", "horizontal_fov"]) == ""
+def test_extras(monkeypatch):
+    assert extra("json", "x", "y") is json
+    monkeypatch.setitem(sys.modules, "submitit", None)
+    with pytest.raises(InputError, match=r"launcher=slurm.*pip install -e '.\[slurm\]'"):
+        extra("submitit", "slurm", "hydra/launcher=slurm")

@@ -1,5 +1,3 @@
-"""Whole files, locked folders, and files that nobody should trust."""
-
 import errno
 import math
 import multiprocessing
@@ -14,9 +12,7 @@ from drone_rl.utils.files import (
     as_path,
     folder_lock,
     is_locked,
-    last_of,
     make_folder,
-    new_run_folder,
     newest,
     parse_json,
     read_bytes,
@@ -31,7 +27,7 @@ from drone_rl.utils.files import (
 )
 
 
-def test_a_file_is_replaced_whole_and_nothing_is_left_beside_it(tmp_path):
+def test_a_file_is_replaced_and_no_other_is_left(tmp_path):
     path = tmp_path / "a.json"
     write_atomically(path, "old")
     write_atomically(path, "new")
@@ -48,12 +44,6 @@ def test_the_newest_is_the_one_that_was_changed_last(tmp_path):
     assert newest([]) is None
 
 
-def test_places_of_runs_and_their_checkpoints(tmp_path):
-    assert new_run_folder("train").parent == Path("outputs/train/runs")
-    assert new_run_folder("explain", tmp_path).parent == tmp_path / "explain" / "runs"
-    assert last_of(tmp_path) == tmp_path / "checkpoints" / "last.pt"
-
-
 def test_trained_policies_are_sorted_by_the_time_of_their_last_checkpoint(tmp_path):
     files = []
     for name, changed in (("runs/a", 20), ("multiruns/s/0", 30), ("runs/b", 10)):
@@ -66,7 +56,7 @@ def test_trained_policies_are_sorted_by_the_time_of_their_last_checkpoint(tmp_pa
     assert trained_policies(tmp_path / "empty") == []
 
 
-def test_a_folder_has_one_holder_at_a_time(tmp_path):
+def test_one_process_locks_a_folder(tmp_path):
     assert not is_locked(tmp_path)
     with folder_lock(tmp_path):
         assert is_locked(tmp_path)
@@ -83,7 +73,7 @@ def _hold_and_die(folder):
         os._exit(9)
 
 
-def test_a_dead_process_holds_nothing(tmp_path):
+def test_locks_end_with_their_process(tmp_path):
     process = multiprocessing.get_context("fork").Process(target=_hold_and_die, args=(tmp_path,))
     process.start()
     process.join()
@@ -91,7 +81,7 @@ def test_a_dead_process_holds_nothing(tmp_path):
     assert not is_locked(tmp_path)
 
 
-def test_a_link_that_waits_where_a_file_is_written_leads_nowhere(tmp_path):
+def test_links_are_replaced_not_followed(tmp_path):
     canary = tmp_path / "canary"
     canary.write_text("sings")
     (tmp_path / f".a.json.{os.getpid()}").symlink_to(canary)
@@ -123,7 +113,7 @@ def test_plain_files_of_bounded_size_are_read(tmp_path):
         (lambda path: None, "No such file"),
     ],
 )
-def test_what_is_no_plain_file_is_refused_at_once(tmp_path, make, message):
+def test_other_files_are_refused_without_waiting(tmp_path, make, message):
     make(tmp_path / "a")
     with pytest.raises(InputError, match=message):
         read_bytes(tmp_path / "a", 9)
@@ -133,23 +123,14 @@ def test_json_is_read(tmp_path):
     (tmp_path / "a").write_text('{"a": [1, 2.5, null, true, "ä"]}')
     assert read_json(tmp_path / "a") == {"a": [1, 2.5, None, True, "ä"]}
     assert math.isnan(parse_json("[NaN]", "x", allow_nan=True)[0])
+    assert parse_json(str(2**128 - 1), "x") == 2**128 - 1
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (b'{"a": 1, "a": 2}', "twice"),
-        (b"1" + b"0" * 400, "too long"),
-        (b"[" * 100_000, "too deeply"),
-        (b"NaN", "NaN is no number"),
-        (b"[-Infinity]", "no number"),
-        (b"\xff\xfe", "utf-8"),
-        (b"{", "damaged"),
-        (b"1 2", "damaged"),
-    ],
+    "text", [b"[" * 100_000, b"NaN", b"[-Infinity]", b"1e400", b"\xff\xfe", b"{", b"1 2"]
 )
-def test_json_that_would_surprise_is_refused(text, message):
-    with pytest.raises(InputError, match=message) as error:
+def test_other_json_is_refused_in_one_line(text):
+    with pytest.raises(InputError, match=r"^x is damaged") as error:
         parse_json(text, "x")
     assert "\n" not in str(error.value)
 
@@ -205,12 +186,11 @@ def test_leftovers_of_dead_processes_are_deleted_and_nothing_else(tmp_path):
     dead = subprocess.Popen(["true"])
     dead.wait()
     kept = {".last.pt.1", ".other.pt.99", ".last.pt.notes.txt", "last.pt", ".last.pt.0x"}
-    gone = {f".last.pt.{dead.pid}", f".last.pt.{os.getpid()}", ".best.pt.a1b2_c3d"}
+    gone = {f".last.pt.{dead.pid}", f".last.pt.{os.getpid()}"}
     for name in kept | gone:
         (tmp_path / name).touch()
-    (tmp_path / ".best.pt.zzzzzzzz").mkdir()
     remove_leftovers(tmp_path, "last.pt", "best.pt")
-    assert {path.name for path in tmp_path.iterdir()} == {*kept, ".best.pt.zzzzzzzz"}
+    assert {path.name for path in tmp_path.iterdir()} == kept
     remove_leftovers(tmp_path / "none", "last.pt")
 
 
@@ -224,29 +204,10 @@ def test_the_end_of_a_log(tmp_path):
         read_tail(tmp_path, 5)
 
 
-def test_json_is_bounded(tmp_path):
-    assert parse_json("[1, 2]", "x", most_values=3) == [1, 2]
-    with pytest.raises(InputError, match="more than 2 values"):
-        parse_json("[1, 2]", "x", most_values=2)
-    with pytest.raises(InputError, match="nested more than 64 times"):
-        parse_json("[" * 65 + "]" * 65, "x")
-    with pytest.raises(InputError, match="too large"):
-        parse_json("1e400", "x")
-    assert parse_json("1e400", "x", allow_nan=True) == math.inf
-
-
-def test_a_folder_of_too_many_files(tmp_path, monkeypatch):
-    for name in "abc":
-        (tmp_path / name).touch()
-    monkeypatch.setattr("drone_rl.utils.files.FOLDER_ENTRIES", 2)
-    with pytest.raises(InputError, match="more than 2 files and folders"):
-        refuse_links(tmp_path)
-
-
 def test_paths_are_text_or_paths():
     assert as_path("a/b", "folder") == as_path(Path("a/b"), "folder") == Path("a/b")
     for wrong in (5, None, ["a"], b"a", ""):
-        with pytest.raises(InputError, match=r"^folder=.* is no path; give the path of a"):
+        with pytest.raises(InputError, match=r"^folder="):
             as_path(wrong, "folder")  # pyright: ignore[reportArgumentType]
 
 
@@ -255,23 +216,5 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path):
     make_folder(tmp_path / "a" / "b")
     assert (tmp_path / "a" / "b").is_dir()
     (tmp_path / "file").touch()
-    with pytest.raises(InputError, match=r"^folder=.*b can't be made \(Not a directory\); give"):
+    with pytest.raises(InputError, match="Not a directory"):
         make_folder(tmp_path / "file" / "b")
-
-
-def test_seeds_of_128_bits_are_read():
-    assert parse_json(str(2**128 - 1), "x") == 2**128 - 1
-
-
-@pytest.mark.parametrize(
-    ("content", "reason"),
-    [
-        (b"\xe8\x00", "no utf-8 text"),
-        (b"{", "Expecting property name"),
-        (b"[" * 70_000 + b"]" * 70_000, "nested too deeply"),
-    ],
-)
-def test_a_file_of_another_kind_is_told_in_one_line(content, reason):
-    message = rf"^x is damaged or no plain JSON \({reason}.*\); give another file$"
-    with pytest.raises(InputError, match=message):
-        parse_json(content, "x")

@@ -4,7 +4,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom
 
-from drone_rl.utils.intervals import mean_bounds, median_bounds, proportion
+from drone_rl.utils.intervals import (
+    episode_means,
+    mean_bounds,
+    mean_interval,
+    median_bounds,
+    proportion,
+)
 
 QUICK = settings(max_examples=30, deadline=None)
 
@@ -20,20 +26,20 @@ def test_clopper_pearson_by_known_values():
     assert (none["lower95"], none["upper95"]) == pytest.approx((0.0, 0.3085), abs=1e-4)
 
 
-def test_little_confidence_by_hand():
+def test_low_confidence_by_hand():
     """The tail is 0.3 on either side."""
     assert proportion(1, 1, confidence=0.4)["lower95"] == pytest.approx(0.3)
     assert mean_bounds([1.0], confidence=0.4)["lower95"] == pytest.approx(1.5 / (2 / 0.3 - 0.5))
     assert median_bounds(range(10), confidence=0.4) == (3.0, 6.0)  # 176 of 1024 are outside
 
 
-def test_share_of_nothing_is_unknown():
+def test_proportion_without_trials():
     result = proportion(0, 0)
     assert result["share"] is None
     assert (result["lower95"], result["upper95"]) == (0.0, 1.0)
 
 
-def test_mean_bounds_of_nothing_and_of_sure_things():
+def test_mean_bounds_without_values_and_of_equal_values():
     assert mean_bounds([]) == {"mean": None, "lower95": 0.0, "upper95": 1.0, "count": 0}
     ones = mean_bounds(np.ones(400))
     assert ones["upper95"] == 1.0
@@ -50,9 +56,10 @@ def test_mean_bounds_contain_the_exact_interval_of_a_share():
     assert mean_bounds(values[::-1]) == bounds
 
 
-def test_mean_bounds_refuse_values_out_of_range():
+@pytest.mark.parametrize("wrong", [1.5, float("nan"), float("inf"), -1e-6, 1 + 1e-6])
+def test_mean_bounds_refuse_values_out_of_range(wrong):
     with pytest.raises(ValueError, match="from 0"):
-        mean_bounds([0.5, 1.5])
+        mean_bounds([0.5, wrong])
 
 
 def test_mean_bounds_cover_a_rare_disaster():
@@ -69,7 +76,7 @@ def test_median_bounds_are_order_statistics():
 
 
 @pytest.mark.parametrize("trials", [1, 6, 15, 40])
-def test_proportion_covers_by_adding_up_all_outcomes(trials):
+def test_coverage_of_proportion_summed_over_all_outcomes(trials):
     intervals = [proportion(k, trials) for k in range(trials + 1)]
     for p in np.linspace(0, 1, 101):
         held = [i["lower95"] <= p <= i["upper95"] for i in intervals]
@@ -78,7 +85,7 @@ def test_proportion_covers_by_adding_up_all_outcomes(trials):
 
 @given(st.integers(0, 60), st.integers(0, 60), st.floats(0.5, 0.999))
 @QUICK
-def test_proportion_is_monotone_and_its_own_mirror_image(successes, failures, confidence):
+def test_proportion_is_monotone_and_symmetric(successes, failures, confidence):
     trials = successes + failures
     here, mirrored = proportion(successes, trials), proportion(failures, trials)
     assert here["lower95"] == pytest.approx(1 - mirrored["upper95"])
@@ -94,7 +101,7 @@ def test_proportion_is_monotone_and_its_own_mirror_image(successes, failures, co
 
 
 @pytest.mark.parametrize("trials", [1, 4, 13])
-def test_mean_bounds_of_shares_cover_by_adding_up_all_outcomes(trials):
+def test_coverage_of_mean_bounds_summed_over_all_outcomes(trials):
     rows = [np.repeat([1.0, 0.0], [k, trials - k]) for k in range(trials + 1)]
     found = [mean_bounds(row) for row in rows]
     for p in np.linspace(0.01, 0.99, 99):
@@ -107,7 +114,7 @@ VALUES = st.lists(st.floats(0, 1), min_size=1, max_size=12)
 
 @given(VALUES, st.floats(-5, 5), st.floats(0.1, 10))
 @QUICK
-def test_mean_bounds_know_no_unit_and_no_side(values, low, width):
+def test_mean_bounds_are_invariant_to_scale_and_reflection(values, low, width):
     z = np.array(values)
     plain, moved = mean_bounds(z), mean_bounds(low + width * z, low, low + width)
     for key in ("mean", "lower95", "upper95"):
@@ -152,12 +159,6 @@ def test_mean_bounds_of_four_values_by_hand():
     assert sum((1 - s + s / lower) ** 17 for s in stakes) / 4 == pytest.approx(40)
 
 
-@pytest.mark.parametrize("wrong", [[float("nan")], [float("inf")], [-1e-6], [1 + 1e-6]])
-def test_mean_bounds_refuse_what_is_not_in_range(wrong):
-    with pytest.raises(ValueError, match="from 0"):
-        mean_bounds([0.5, *wrong])
-
-
 def test_rounding_errors_at_the_ends_are_in_range():
     assert mean_bounds([1 + 1e-12, -1e-12])["mean"] == pytest.approx(0.5)
 
@@ -171,3 +172,32 @@ def test_median_bounds_are_the_narrowest_that_cover(count, confidence):
         r for r in range(1, count // 2 + 1) if 2 * binom.cdf(r - 1, count, 0.5) <= 1 - confidence
     ]
     assert found == ((max(ranks) - 1, count - max(ranks)) if len(ranks) else None)
+
+
+def test_each_episode_counts_once():
+    # 0.5 of episode 0 and 1 of episode 1, however many frames each has; episode 2 says nothing
+    values = np.array([0.0, 1.0, 1.0, np.nan, 1.0, 1.0, np.nan])
+    episode = np.array([0, 0, 1, 1, 1, 1, 2])
+    assert episode_means(values, episode).tolist() == [0.5, 1.0]
+    found = mean_interval(values, episode)
+    expected = mean_bounds([0.5, 1.0])
+    assert found["mean"] == 0.75
+    assert (found["lower95"], found["upper95"]) == (expected["lower95"], expected["upper95"])
+    assert (found["frames"], found["episodes"]) == (5, 2)
+
+
+def test_more_frames_of_an_episode_do_not_narrow_the_interval():
+    few = mean_interval(np.ones(5), np.arange(5))
+    many = mean_interval(np.ones(500), np.arange(500) // 100)
+    assert few["lower95"] == many["lower95"] < 0.6
+
+
+def test_mean_intervals_have_the_range_of_the_values():
+    assert mean_interval(np.array([-0.5]), np.zeros(1), low=-1.0)["lower95"] < -0.5
+    with pytest.raises(ValueError, match="from 0"):
+        mean_interval(np.array([-0.5]), np.zeros(1))
+
+
+def test_mean_interval_without_frames():
+    found = mean_interval(np.array([np.nan]), np.zeros(1))
+    assert found == {"mean": None, "lower95": None, "upper95": None, "frames": 0, "episodes": 0}

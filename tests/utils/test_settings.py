@@ -6,13 +6,10 @@ from typing import Annotated, Any
 import pytest
 
 import drone_rl
-from drone_rl.config import TaskSettings
-from drone_rl.utils import settings as settings_module
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Real, Several, Text, Whole
+from drone_rl.utils.schema import Real, Several, Whole
 from drone_rl.utils.settings import (
     Settings,
-    conf_dir,
     kinds_of,
     plain,
     prefixed_errors,
@@ -38,39 +35,18 @@ class Outer(Settings):
             raise InputError("size=None needs a value; give one")
 
 
-class More(Outer):
-    extra: str = "z"
-
-
-@dataclasses.dataclass(frozen=True)
-class Decorated(Inner):
-    y: Annotated[int, Whole(0, 9)] = 2
-    names: Annotated[tuple[str, ...], Several(Text(), 0, 9)] = dataclasses.field(
-        default_factory=lambda: ("a",)
-    )
-
-
-class MoreDecorated(Decorated):
-    z: Annotated[int, Whole(0, 9)] = 3
-
-
-@pytest.mark.parametrize("cls", [Inner, Decorated, MoreDecorated])
-def test_settings_are_frozen(cls):
-    made: Any = cls(x=3)
-    words = "x can't be assigned" if cls is Inner else "assign to field 'x'"  # of the decorator
-    with pytest.raises(dataclasses.FrozenInstanceError, match=words):
+def test_settings_are_frozen():
+    made: Any = Inner(x=3)
+    with pytest.raises(dataclasses.FrozenInstanceError):
         made.x = 4
-    with pytest.raises(dataclasses.FrozenInstanceError, match="delete field 'x'"):
-        del made.x
-    assert made == cls(x=3) and hash(made) == hash(cls(x=3))
+    assert made == Inner(x=3) and hash(made) == hash(Inner(x=3))
 
 
-def test_a_class_may_repeat_the_decorator():
-    assert Decorated(x=3).values() == {"x": 3, "y": 2, "names": ["a"]}
-    assert Decorated(names=["b"]).replace(y=4).names == ("b",)
-    with pytest.raises(InputError, match="y=10"):
-        Decorated(y=10)
-    assert list(MoreDecorated().values()) == ["x", "y", "names", "z"]
+def test_as_base_leaves_out_further_fields():
+    class More(Outer):
+        extra: str = "z"
+
+    assert More(count=3, extra="y").as_base(Outer) == Outer(count=3)
 
 
 def test_values_take_their_types():
@@ -86,8 +62,7 @@ def test_values_take_their_types():
     ("change", "message"),
     [
         ({"count": 0}, "count=0 is out of range"),
-        ({"count": "2"}, "count='2' is a text"),
-        ({"size": "x"}, "size='x' is a text"),
+        ({"size": "x"}, "size='x'"),
         ({"widths": [1, 2, 3]}, r"widths=\[1,2,3\] does not fit"),
         ({"is_on": 1}, "is_on=1 is neither true nor false"),
         ({"name": 5}, "name=5 is no text"),
@@ -96,12 +71,12 @@ def test_values_take_their_types():
         ({"unheard": 1}, "unheard is unknown; valid names: count, size"),
     ],
 )
-def test_mistakes_begin_with_the_name(change, message):
+def test_errors_begin_with_the_name(change, message):
     with pytest.raises(InputError, match=f"^{message}"):
         Outer().replace(**change)
 
 
-def test_settings_read_from_a_file_are_complete():
+def test_files_must_have_every_field():
     whole = {"x": 3}
     assert Inner.read(whole, "inner") == Inner(x=3)
     for data in ({}, {"x": 3, "y": 1}, {"x": 10}, [1]):
@@ -109,12 +84,7 @@ def test_settings_read_from_a_file_are_complete():
             Inner.read(data, "inner")
 
 
-def test_what_was_added_is_left_out_where_it_is_not_known():
-    assert More(count=3, extra="y").as_base(Outer) == Outer(count=3)
-    assert type(More().as_base(Outer)) is Outer
-
-
-def test_the_place_is_put_before_the_name():
+def test_errors_have_a_prefix():
     failing = pytest.raises(InputError, match=r"^a\.b\.x=10 ")
     with failing, prefixed_errors("a"), prefixed_errors("b"):
         Inner(x=10)
@@ -128,7 +98,7 @@ def test_kinds_and_types_of_each_field():
     }
 
 
-def test_numbers_without_bounds_are_finite():
+def test_floats_are_finite():
     class Priced(Settings):
         cost: float = 0.5
 
@@ -146,13 +116,13 @@ def test_types_without_a_kind_are_refused(hint):
         odd()
 
 
-def test_names_of_files_and_plain_values():
+def test_snake_case_and_plain_values():
     assert [snake_case(c) for c in (Inner, Outer)] == ["inner", "outer"]
     assert snake_case(type("SmallCnn", (), {})) == "small_cnn"
     assert plain({"a": (1, (2,)), "b": Inner()}) == {"a": [1, [2]], "b": {"x": 1}}
 
 
-def test_unknown_names_of_a_class_are_refused_with_the_known_ones():
+def test_unknown_names_are_refused():
     with pytest.raises(InputError, match=r"^num_cube is unknown; .*; did you mean num_cubes\?$"):
         drone_rl.TaskSettings(num_cube=2)  # pyright: ignore[reportCallIssue]
     with pytest.raises(TypeError, match="positional"):
@@ -167,14 +137,7 @@ def test_a_task_may_be_given_by_its_name():
         drone_rl.TrainSettings(task="pillar")  # pyright: ignore[reportArgumentType]
 
 
-def test_the_configuration_of_the_checkout_or_of_the_installed_package(monkeypatch, tmp_path):
-    assert (conf_dir() / "train.yaml").is_file()
-    package = tmp_path / "drone_rl"
-    monkeypatch.setattr(settings_module, "__file__", str(package / "utils" / "settings.py"))
-    assert conf_dir() == package / "conf"
-
-
-def test_a_value_without_a_type_is_no_setting():
+def test_attributes_without_a_type_are_refused():
     with pytest.raises(InputError, match=r"Half\.cost has no type.*write cost: float = 0\.005"):
 
         class Half(Inner):
@@ -184,10 +147,3 @@ def test_a_value_without_a_type_is_no_setting():
 
         class Other(Inner):  # the base's default would stay
             x = 3
-
-
-def test_settings_say_how_to_change_them():
-    with pytest.raises(
-        AttributeError, match=r"num_cubes can't be .* settings\.replace\(num_cubes=2\)"
-    ):
-        TaskSettings().num_cubes = 2

@@ -1,59 +1,39 @@
+import pytest
+from drone_rl.evaluation.evaluate import EVALUATION
+
 from drone_rl.utils.text import (
-    all_cubes,
-    among,
-    bounds,
+    CHECK,
+    Sentence,
     exact,
     listed,
     ordinal,
     percent,
     plural,
     rate,
+    said,
+    say,
+    seed_line,
 )
 
 
-def test_numbers_as_people_write_them():
-    found = {"lower95": 0.1, "upper95": 0.256, "successes": 3, "trials": 30}
-    assert bounds(found) == "95%: 0.10 to 0.26"
-    assert bounds(found, percent) == "95%: 10.0% to 25.6%"
-    assert among(found) == "3 of 30"
-
-
-def test_lists():
-    assert listed([]) == ""
-    assert listed(["a"]) == "a"
-    assert listed(["a", "b"]) == "a and b"
-    assert listed(["a", "b", "c"], "or") == "a, b or c"
-
-
-def test_counts():
-    assert (plural(0, "pair"), plural(1, "pair"), plural(2, "pair")) == (
-        "0 pairs", "1 pair", "2 pairs",
-    )  # fmt: skip
-    assert (plural(1, "axis", "axes"), plural(2, "axis", "axes")) == ("1 axis", "2 axes")
-
-
-def test_ordinals_go_on_beyond_their_names():
+def test_lists_and_counts():
+    assert [listed(["a", "b", "c"][:n], "or") for n in range(4)] == ["", "a", "a or b", "a, b or c"]
+    assert [plural(n, "pair") for n in range(3)] == ["0 pairs", "1 pair", "2 pairs"]
+    assert plural(2, "axis", "axes") == "2 axes"
     assert [ordinal(i) for i in (0, 8, 9, 10)] == ["first", "ninth", "10th", "11th"]
-    assert [ordinal(i) for i in (20, 21, 22, 23)] == ["21st", "22nd", "23rd", "24th"]
-    assert [ordinal(i) for i in (110, 111, 112)] == ["111th", "112th", "113th"]
+    assert [ordinal(i) for i in (20, 21, 22, 110)] == ["21st", "22nd", "23rd", "111th"]
 
 
-def test_cubes():
-    assert (all_cubes(1), all_cubes(3)) == ("the cube", "all 3 cubes")
-
-
-def test_nearly_all_is_never_all():
-    assert [exact(share) for share in (0.0, 1e-12, 0.25, 1 / 3)] == [
-        "0%", "1e-10%", "25%", "33.3333333%",
-    ]  # fmt: skip
-    assert exact(1 - 1e-9) == "99.9999999%"
-    for share in (1 - 1e-10, 1 - 1e-16, 1.0, 1 + 1e-12):  # whose digits, or the sum's, are too few
+def test_exact_rates_are_never_rounded_to_all():
+    shares = (0.0, 1e-12, 0.25, 1 / 3, 1 - 1e-9)
+    texts = ["0%", "1e-10%", "25%", "33.3333333%", "99.9999999%"]
+    assert [exact(share) for share in shares] == texts
+    for share in (1 - 1e-10, 1 - 1e-16, 1.0):  # which too few digits, or a sum's errors, make 1
         assert exact(share) == "more than 99.9999999%"
     assert exact(1 - 1e-16, is_all=True) == "100%"
-    assert exact(0.5, is_all=True) == "50%"
 
 
-def test_percentages_with_one_decimal_are_never_rounded_to_nothing_or_all():
+def test_percentages_are_never_rounded_to_none_or_all():
     shares = (0, 0.0004, 0.0123, 0.9749, 0.9996, 1.0)
     assert [percent(share) for share in shares] == [
         "0%", "less than 0.1%", "1.2%", "97.5%", "more than 99.9%", "100%"
@@ -61,16 +41,35 @@ def test_percentages_with_one_decimal_are_never_rounded_to_nothing_or_all():
     assert [percent(share, 0) for share in shares] == [
         "0%", "less than 1%", "1%", "97%", "more than 99%", "100%"
     ]  # fmt: skip
-    figure = {"share": 0.975, "lower95": 0.9543, "upper95": 0.9881}
-    assert rate(figure) == "97.5% (95% CI 95.4 to 98.8)"
-    assert rate({**figure, "mean": 0.5}, label="") == "97.5% (95.4 to 98.8)"
-    assert rate({**figure, "share": None}) == "not offered"
-    assert rate({"mean": 0.5, "lower95": 0.0, "upper95": 1.0}) == "50.0% (95% CI 0.0 to 100.0)"
 
 
-def test_no_rounding_to_certainty():
-    all_of_many = {"share": 1.0, "lower95": 0.9996312, "upper95": 1.0}
-    assert rate(all_of_many, label="") == "100.0% (>99.9 to 100.0)"
-    nearly = {"share": 0.9999, "lower95": 0.99, "upper95": 1.0}
-    assert rate(nearly, label="") == ">99.9% (99.0 to 100.0)"
-    assert rate({"share": 0.0, "lower95": 0.0, "upper95": 0.0003689}) == "0.0% (95% CI 0.0 to <0.1)"
+@pytest.mark.parametrize(
+    ("share", "lower", "upper", "text"),
+    [
+        (0.975, 0.9543, 0.9881, "97.5% (95% CI 95.4 to 98.8)"),
+        (0.0, 0.0, 0.0003689, "0.0% (95% CI 0.0 to <0.1)"),
+        (1.0, 0.9996312, 1.0, "100.0% (95% CI >99.9 to 100.0)"),
+        (None, 0.0, 1.0, "not offered"),
+    ],
+)
+def test_rates_with_intervals(share, lower, upper, text):
+    assert rate({"share": share, "lower95": lower, "upper95": upper}) == text
+
+
+MANY = Sentence("loops.many", "a loop", lambda e: e["loops"] > 0, lambda e: f"{e['loops']} loops.")
+NONE = Sentence("loops.never", "none", lambda e: e["loops"] == 0, lambda e: "No loop.")
+
+
+def test_sentences_have_conditions():
+    assert say([MANY, NONE], {"loops": 3}) == "3 loops."
+    assert said([MANY, NONE], {"loops": 0}) == {"loops.never": "No loop."}
+    assert say(lambda e: {"loops.a": "A.", "loops.b": "B."}, {}) == "A. B."
+
+
+def test_fixed_seeds_are_reported():
+    fixed = said((*EVALUATION, *CHECK), {"seed": 5, "seed_is_fixed": True})
+    assert [*fixed] == ["evaluation.fixed_seed", "check.fixed_seed"]
+    assert all("Fixed seed 5" in text for text in fixed.values())
+    assert said((*EVALUATION, *CHECK), {"seed": 9, "seed_is_fixed": False}) == {}
+    assert seed_line({"seed": 9, "seed_is_fixed": False}) == "environments: seed 9 (fresh)"
+    assert seed_line({"seed": 0}, "placements") == "placements: seed 0 (fixed)"

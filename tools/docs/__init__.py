@@ -1,7 +1,7 @@
 """Run every command and code block of README.md and docs/, and compare the output that they show.
 
-`python -m tools.docs [--update] [PAGE ...]` runs pages, `drone-rl bench docs` runs all of them;
-`--time` times them as printed, see `timing.py`.
+`python -m tools.docs [--update | --time] [PAGE ...]` runs pages, by default all. `--update` writes
+the printed outputs into the pages; `--time` runs commands as printed, without smaller sizes.
 
 Each page runs in a copy of the checkout, from top to bottom:
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -69,35 +70,33 @@ def read_blocks(page: str, root: Path = ROOT) -> list[Block]:
     return blocks
 
 
-def _fences(page: str, lines: list[str]) -> list[tuple[int, str, str | None, list[str]]]:
-    """Return first line, language, title and content of each fenced block."""
-    found, begin = [], None
+def _fences(page: str, lines: list[str]) -> Iterator[tuple[int, str, str | None, list[str]]]:
+    """Yield first line, language, title and content of each fenced block."""
+    opening, start = None, 0
     for number, line in enumerate(lines, 1):
         if not line.lstrip().startswith("```"):
             continue
-        opening = _FENCE.match(line)
-        if opening is None:
-            raise ValueError(f"{page}:{number}: a fence that is not understood: {line}")
-        if begin is None:
-            begin = (number, opening[1], opening[2])
+        if opening is not None:
+            yield start, opening[1], opening[2], lines[start : number - 1]
+            opening = None
+        elif opening := _FENCE.match(line):
+            start = number
         else:
-            found.append((*begin, lines[begin[0] : number - 1]))
-            begin = None
-    if begin is not None:
-        raise ValueError(f"{page}:{begin[0]}: a fence that is not closed")
-    return found
+            raise ValueError(f"{page}:{number}: a fence that is not understood: {line}")
+    if opening is not None:
+        raise ValueError(f"{page}:{start}: a fence that is not closed")
 
 
 def _commands(page: str, start: int, lines: list[str], *, prompted: bool) -> list[Block]:
     """Return a block for each command; what follows a command with a prompt is its output."""
-    found: list[Block] = []
+    commands: list[Block] = []
     for number, line in enumerate(lines, start + 1):
         if prompted and not line.startswith(_PROMPT):
-            last = found[-1]
+            last = commands[-1]
             area = (last.shown_lines[0] or number, number + 1)
             shown = f"{last.shown}\n{line}".strip("\n")
-            found[-1] = dataclasses.replace(last, shown=shown, shown_lines=area)
+            commands[-1] = dataclasses.replace(last, shown=shown, shown_lines=area)
         elif line and not line.startswith("#"):
             code = line.removeprefix(_PROMPT)
-            found.append(Block(page=page, line=number, kind=COMMAND, code=code))
-    return found
+            commands.append(Block(page=page, line=number, kind=COMMAND, code=code))
+    return commands

@@ -1,23 +1,22 @@
-"""Run the blocks of one page in a folder: `python -m tools.docs.session PAGE RESULTS`."""
+"""Run the blocks of one page in the current folder: `python -m tools.docs.session PAGE [FLAGS]`."""
 
 import ast
 import contextlib
 import dataclasses
 import io
-import json
 import os
 import re
 import subprocess
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from tools.docs.blocks import COMMAND, PYTHON, Block, read_blocks
-from tools.docs.outputs import find_difference, find_different_words
-from tools.docs.rules import read_rules, rules_for
+from tools.docs.outputs import OMITTED, find_difference, find_different_words
+from tools.docs.rules import Rules, read_rules
 
 LIMIT = 900.0
 """Seconds after which a command is killed."""
@@ -32,9 +31,7 @@ _TRAINS = re.compile(r"drone-rl (train|demo)|Trainer\(|\btrain\(")
 class Outcome:
     """Result of a block."""
 
-    line: int
-    code: str
-    """First line of the block."""
+    block: Block
     status: str
     """One of `RAN`, `SMALLER`, `OTHER_NUMBERS`, `NOT_RUN` and `FAILED`."""
     why: str = ""
@@ -42,30 +39,39 @@ class Outcome:
     printed: str = ""
     seconds: float = 0.0
 
+    def __str__(self) -> str:
+        """Return seconds, place, first line, status and reason."""
+        place = f"{self.block.page}:{self.block.line}"
+        first = self.block.code.partition("\n")[0]
+        return f"{self.seconds:6.1f} s  {place}: {first}: {self.status}: {self.why}".rstrip(": ")
+
 
 class Session:
     """A page that is run from top to bottom in the current folder."""
 
-    def __init__(self, page: str) -> None:
+    def __init__(self, page: str, rules: Rules) -> None:
         self.blocks = read_blocks(page, Path())
-        self.rules = rules_for(page, read_rules())
+        self.rules = rules
         self.names: dict[str, Any] = {"__name__": "__main__"}
         """Names that the Python blocks of the page have defined."""
-        self.has_trained = any(_TRAINS.search(command) for command in self.rules.before)
+        self.has_trained = any(_TRAINS.search(command) for command in rules.before)
 
-    def run(self) -> Iterator[Outcome]:
-        """Run every block and yield its outcome."""
+    def run(self) -> list[Outcome]:
+        """Run every block and print its outcome."""
         for command in self.rules.before:
             printed, status = run_command(command)
             if status:
                 raise RuntimeError(f"{command}: exit status {status}\n{printed}")
-        yield from map(self.run_block, self.blocks)
+        outcomes = []
+        for block in self.blocks:
+            outcomes.append(self.run_block(block))
+            print(outcomes[-1], flush=True)
+        return outcomes
 
     def run_block(self, block: Block) -> Outcome:
         """Run a block and compare its output with the page."""
-        first = block.code.partition("\n")[0]
         if why := self.rules.why_not_run(block):
-            return Outcome(block.line, first, NOT_RUN, why)
+            return Outcome(block, NOT_RUN, why)
         begin = time.perf_counter()
         try:
             printed, why = self._execute(block)
@@ -78,8 +84,8 @@ class Session:
             status, missing = OTHER_NUMBERS, find_different_words(block.shown, printed)
         if missing is not None:
             why = f"the page shows, but the program did not print: {missing}"
-        seconds = round(time.perf_counter() - begin, 1)
-        return Outcome(block.line, first, FAILED if why else status, why, printed, seconds)
+        seconds = time.perf_counter() - begin
+        return Outcome(block, FAILED if why else status, why, printed, seconds)
 
     def _execute(self, block: Block) -> tuple[str, str]:
         """Run a block; return what it printed and why it failed, if it did."""
@@ -98,7 +104,7 @@ class Session:
 
 def run_command(command: str) -> tuple[str, int]:
     """Run a command in bash; return what it printed and its exit status."""
-    done = subprocess.run(
+    completed = subprocess.run(
         ["bash", "-c", command],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -106,7 +112,7 @@ def run_command(command: str) -> tuple[str, int]:
         check=False,
         timeout=LIMIT,
     )
-    return done.stdout, done.returncode
+    return completed.stdout, completed.returncode
 
 
 def show(value: Any) -> None:
@@ -138,15 +144,40 @@ def run_python(
     return printed.getvalue()
 
 
-def main() -> None:
-    """Run a page in the current folder and write the outcomes as JSON."""
-    page, results = sys.argv[1:]
+def update_page(page: Path, outcomes: Sequence[Outcome]) -> None:
+    """Replace shown outputs that were not printed; print those that omit text, to shorten by hand.
+
+    Args:
+        page: The page.
+        outcomes: Outcome of each block of the page.
+    """
+    lines = page.read_text().splitlines()
+    for outcome in reversed(outcomes):  # from the end, so that earlier lines keep their numbers
+        block, (first, end) = outcome.block, outcome.block.shown_lines
+        is_true = block.shown and find_difference(block.shown, outcome.printed) is None
+        if is_true or not (first and outcome.printed):
+            continue
+        if OMITTED in block.shown:
+            print(f"{page}:{block.line}: shorten by hand: {outcome.printed}")
+        else:
+            lines[first - 1 : end - 1] = outcome.printed.strip("\n").splitlines()
+    page.write_text("".join(f"{line}\n" for line in lines))
+
+
+def main(page: str, *flags: str) -> int:
+    """Run a page in the current folder and return the exit status."""
     sys.path.insert(0, os.getcwd())
-    outcomes = []
-    for outcome in Session(page).run():
-        outcomes.append(dataclasses.asdict(outcome))
-        Path(results).write_text(json.dumps(outcomes, indent=1))  # also of a page that is stopped
+    rules = read_rules(page)
+    if "--time" in flags:
+        rules = dataclasses.replace(rules, smaller={})
+    outcomes = Session(page, rules).run()
+    if "--update" in flags:
+        update_page(Path(page), outcomes)
+    failed = sum(outcome.status == FAILED for outcome in outcomes)
+    seconds = sum(outcome.seconds for outcome in outcomes)
+    print(f"{page}: {len(outcomes)} blocks, {failed} failed, {seconds:.0f} s", flush=True)
+    return int(failed > 0)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main(*sys.argv[1:]))

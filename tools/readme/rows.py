@@ -1,458 +1,535 @@
-"""Rows of the tables of figures for training, adversarial tests and verification."""
+"""Rows of the tables of figures in README.md and docs/results.md."""
 
 import statistics
-from collections.abc import Sequence
 
-from tools.readme.tables import Figures, Row, percent, seconds
-
-
-def _times(f: Figures) -> str:
-    times = f["time_to_solve_s"]
-    return f"{min(times):.0f} to {max(times):.0f}, median {statistics.median(times):.0f}"
+from tools.readme.tables import Figures, Row
 
 
-def _rates(f: Figures) -> str:
-    collected, rendered = f["collector_fps"], f["raw_render_beside_collector_fps"]
-    return f"{f['collector_over_raw']:.2f} ({collected:,.0f} over {rendered:,.0f})"
+def _peer_seconds(figures: Figures) -> str:
+    names = ("reinforce", "ppo", "sb3_ppo", "sb3_a2c", "torchrl")
+    means = [statistics.mean(figures["peers"][name]["seconds"]) for name in names]
+    return "; ".join(f"{seconds:.1f}" for seconds in means)
 
 
-def _rendering(f: Figures) -> str:
-    ratios = "; ".join(f"{ratio:.1f}" for ratio in f["render_over_warp"].values())
-    return f"{f['raw_render_fps']:,.0f}; {ratios} times"
+def _relative_time(figures: Figures) -> str:
+    """Format the ratio of training times, and both times."""
+    ratio = figures["solve_over_best_peer"]
+    ours = statistics.mean(figures["peers"]["reinforce"]["seconds"])
+    return f"{ratio:.2f} ({ours:.1f} s against {ours / ratio:.1f} s)"
 
 
-def _class_models(f: Figures) -> str:
-    return ", ".join(f"{p:.3f}" for p in f["class_model_probability"])
-
-
-def _verdicts(f: Figures) -> str:
-    right, certain, total = (f[f"verdicts_{name}"] for name in ("right", "certain", "total"))
-    return f"{right} of {certain} certain, {total} in total"
-
-
-def _known_maps(f: Figures) -> str:
-    rate, total = f["planted_maps_found"], f["planted_maps_total"]
-    return f"{rate * total:.0f} of {total}"
-
-
-def _imitated(f: Figures) -> str:
-    rates, frames = f["imitation_reinforce_success"], f["imitation_reinforce_frames"]
-    return f"{', '.join(map(percent, rates))}; {', '.join(f'{n:,}' for n in frames)} frames"
-
-
-def _seconds(values: Sequence[float]) -> str:
-    return ", ".join(f"{value:.0f}" for value in values)
-
-
-def _slower(f: Figures) -> str:
-    """Describe the machine relative to the one of the targets, by how the seconds were scaled."""
-    return f"on a machine {f['proof_two_s'] / f['proof_two_scaled_s']:.1f} times slower"
-
-
-TRUTH = (
+HEADLINES = (
     Row(
-        "coverage",
-        "smallest coverage of all displayed 95% intervals, by enumeration and simulation",
-        lambda f: percent(f["interval_coverage_min"]),
-        "94.5%",
+        "solve",
+        "Seconds to train the default task, start-up included, median of 5 seeds",
+        "{time_to_solve_s.median:.1f}",
     ),
     Row(
-        "coverage",
-        "rate of certain but wrong verdicts, greatest of the simulated policies near the "
-        "thresholds; number of these policies",
-        lambda f: f"{percent(f['false_certain_rate'])}; {len({r['policy'] for r in f['certain']})}",
-        "at most 5%",
+        "solve",
+        "Success rate in 1,000 held-out episodes, lower end of the 95% CI, worst of 5 seeds",
+        "{success_lower95.min:%}",
     ),
     Row(
-        "maps",
-        "saliency maps independent of the policy that are trusted",
-        lambda f: f"{f['placebo_maps_trusted']} of {f['placebo_maps_total']}",
-        "0",
-    ),
-    Row("maps", "networks with a known map whose true map is trusted", _known_maps, "90%"),
-    Row(
-        "sentences",
-        "injected changes of evidence that change or remove the sentence",
-        lambda f: f"{f['sentences_flipped']} of {f['sentences_total']}",
-        "all",
+        "peers",
+        "Time until solved, relative to the fastest other: Stable-Baselines3's PPO or A2C, or "
+        "TorchRL's Collector (means of 3 seeds)",
+        _relative_time,
     ),
     Row(
-        "verdicts",
-        "certain verdicts that agree with 5,000 other episodes",
-        _verdicts,
-        "all",
+        "render",
+        "Rendering speed at 25x64 pixels relative to MuJoCo Warp, same CPU",
+        lambda figures: f"{figures['render_over_warp']['25x64']:.1f} times",
     ),
     Row(
         "gamed",
-        "adversarial policies judged good and certain, or proved",
-        lambda f: f"{f['gamed_verdicts']} of {f['gamed_total']}",
-        "0",
+        "Policies built to deceive `verdict` that it called good or proved",
+        "{gamed_verdicts} of {gamed_total}",
     ),
     Row(
-        "fragile_honest",
-        'honest policies, bundled or trained by default, "not certain" because of rounding',
-        lambda f: f"{f['fragile_honest']} of {f['fragile_honest_total']}",
-        "0",
+        "maps",
+        "Heat maps that ignore the policy (such as noise) but pass the tests",
+        "{placebo_maps_trusted} of {placebo_maps_total}",
     ),
     Row(
-        "injections",
-        "injection payloads, one per page, that run in Chromium",
-        lambda f: f"{f['injections_run']} of {f['injections_total']:,}",
-        "0",
-    ),
-    Row(
-        "accessibility",
-        "serious or critical accessibility violations of the report and the site (axe-core)",
-        lambda f: f"{f['a11y_violations']} on {f['a11y_pages']} pages",
-        "0",
-    ),
-    Row(
-        "domain_axes",
-        "axes whose operating domain is enforced in the right direction, from file to verdict",
-        lambda f: f"{f['domain_axes_right']} of {f['domain_axes']}",
-        "all",
-    ),
-    Row(
-        "render_truth",
-        "images of random scenes compared with OpenGL: pixels off edges with another geom",
-        lambda f: f"{f['render_truth_inner_wrong']} in {f['render_truth_scenes']} scenes",
-        "0",
-    ),
-    Row(
-        "render_truth",
-        "the same: geoms of more than 30 pixels with IoU of at least 0.98; smallest IoU",
-        lambda f: (
-            f"{f['render_truth_overlapping']} of {f['render_truth_geoms']}; "
-            f"{f['render_truth_least_overlap']:.3f}"
-        ),
-        "all",
-    ),
-    Row(
-        "render_truth",
-        "the same: greatest difference of depth; of color, levels of 255",
-        lambda f: f"{f['render_truth_depth_mm']:.2f} mm; {f['render_truth_rgb']}",
-        "1 mm; 2",
-    ),
-    Row(
-        "shifts",
-        "seconds to evaluate a policy under ten groups of perturbations, five strengths each, 200 "
-        "episodes",
-        lambda f: f"{f['shift_suite_s']:.0f} with {f['shift_suite_axes']} axes",
-        "480",
-    ),
-    Row(
-        "shifts",
-        "mean area under the curve of success rate over strength, policy good",
-        lambda f: f"{f['shift_area']:.2f}",
-    ),
-    Row(
-        "robust",
-        "gain of `experiment=robust` over the default in success rate, percentage points, 3 seeds: "
-        "under groups of perturbations without randomization in training",
-        lambda f: f"{f['robust_gain_points']:+.1f} of at most {f['robust_room_points']:.1f}",
-        "+15",
-    ),
-    Row(
-        "robust",
-        "the same under all groups; loss under training conditions",
-        lambda f: (
-            f"{f['robust_gain_all_kinds_points']:+.1f}; "
-            f"{round(f['robust_cost_points'], 1) + 0.0:.1f}"
-        ),
-        "-; at most 1",
-    ),
-    Row(
-        "explain",
-        "time and memory of `drone-rl explain policy=good`, 600 frames, with the report",
-        lambda f: f"{f['explain_s']:.0f} s, {f['explain_peak_memory_mib'] / 1024:.1f} GiB",
-        "120 s, 2 GiB",
-    ),
-    Row(
-        "docs",
-        "commands and code blocks of all pages that run and print what the page shows; of these "
-        "with smaller sizes; with other numbers, as training rounds differently on this processor",
-        lambda f: (
-            f"{f['docs_blocks_run']} of {f['docs_blocks']}; {f['docs_blocks_smaller']}; "
-            f"{f['docs_blocks_other_numbers']}"
-        ),
-        "all that need no cluster, account or installation",
+        "prove",
+        "Simulated episodes that end differently than proved",
+        "{proof_contradicted} of {proof_flights:,}",
     ),
 )
-"""Adversarial tests."""
-PROOF = (
-    Row(
-        "prove",
-        "fraction of all placements from which the default policy fails, exact, 5 seeds",
-        lambda f: ", ".join(map(percent, f["proof_lost"])),
-        "",
-    ),
-    Row(
-        "prove",
-        "greatest undecided fraction of these proofs",
-        lambda f: percent(f["proof_undecided"]),
-        "0.0001%",
-    ),
-    Row(
-        "prove",
-        "seconds of these proofs",
-        lambda f: f"{_seconds(f['proof_three_s'])}, {_slower(f)}",
-        "240",
-    ),
-    Row(
-        "prove",
-        "seconds of a proof with two cubes, policy good",
-        lambda f: f"{f['proof_two_s']:.1f}, {_slower(f)}",
-        "4",
-    ),
-    Row(
-        "prove",
-        "simulated episodes that end differently than proved",
-        lambda f: f"{f['proof_contradicted']} of {f['proof_flights']:,}",
-        "0",
-    ),
-    Row(
-        "prove",
-        "certificates that the independent checker accepts",
-        lambda f: f"{f['proof_checked']} of {f['proof_checked_total']}",
-        "all",
-    ),
-    Row(
-        "tampering",
-        "tampered certificates that the checker rejects",
-        lambda f: f"{f['tampered_refused']} of {f['tampered_total']}",
-        "all",
-    ),
-    Row(
-        "places",
-        "random images that differ from the closed form",
-        lambda f: f"{f['places_wrong']} of {f['places_compared']:,}",
-        "0",
-    ),
-    Row(
-        "places",
-        "seconds to compute an exact response map",
-        lambda f: f"{f['places_s']:.1f}, {f['places_cells']:,} cells",
-        "15",
-    ),
-    Row(
-        "provable",
-        "minutes until `experiment=provable` is proved, 3 seeds",
-        lambda f: ", ".join(f"{seconds / 60:.1f}" for seconds in f["provable_s"]),
-        "30",
-    ),
-    Row(
-        "exact_coverage",
-        "fraction of verdict intervals that contain the exact success rate",
-        lambda f: percent(f["verdict_coverage_exact"]),
-        "94.5%",
-    ),
-    Row(
-        "many_cubes",
-        "fraction decided within an hour, policy good: four cubes; five cubes",
-        lambda f: f"{percent(f['proof_four'])}; {percent(f['proof_five'])}",
-        "",
-    ),
-)
-"""Verification."""
+"""The headline figures of README.md, most important first: at most eight that need no legend."""
 MAIN = (
     Row(
         "solve",
         "seconds from the start of `drone-rl train` to a running mean of 2.97 of 3 cubes, 5 seeds",
-        _times,
+        "{time_to_solve_s.min:.0f} to {time_to_solve_s.max:.0f}, median "
+        "{time_to_solve_s.median:.0f}",
         "60",
     ),
-    Row("solve", "seeds of 5 that reach this mean", lambda f: str(f["seeds_solved"]), "5"),
+    Row("solve", "seeds of 5 that reach this mean", "{seeds_solved}", "5"),
     Row(
         "solve",
         "success rate in 1,000 held-out episodes, lower end of the exact 95% CI, worst of 5 seeds",
-        lambda f: percent(min(f["success_lower95"])),
+        "{success_lower95.min:%}",
         "95%",
     ),
     Row(
         "seeds",
         "20 other seeds: number that reach this mean; worst lower end of the 95% CI",
-        lambda f: f"{f['seeds_solved_of_20']}; {percent(min(f['seeds_lower95']))}",
+        "{seeds_solved_of_20}; {seeds_lower95.min:%}",
         "20",
     ),
     Row(
         "imitation",
         "policies cloned from 30 flights of the oracle, success rate in 1,000 held-out episodes, "
         "3 seeds",
-        lambda f: ", ".join(map(percent, f["imitation_success"])),
+        "{imitation_success:%}",
         "80%",
     ),
     Row(
         "imitation",
         "the same after REINFORCE, and the frames that it collected",
-        _imitated,
+        "{imitation_reinforce_success:%}; {imitation_reinforce_frames:,} frames",
         "95%",
     ),
     Row(
         "solve",
         "training frames/s, collection and learning together",
-        lambda f: f"{f['learning_fps']:,.0f}",
+        "{learning_fps:,.0f}",
         "16,000",
     ),
     Row(
         "large",
         "the same with images of 100x256 (`experiment=large`)",
-        lambda f: f"{f['learning_fps_large']:,.0f}",
+        "{learning_fps_large:,.0f}",
         "2,440",
     ),
     Row(
         "render",
-        "rendering at 25x64, frames/s; ratio to MuJoCo Warp's renderer at 25x64; 64x64; 100x256",
-        _rendering,
+        "rendering at 25x64, frames/s; ratio to MuJoCo Warp's renderer at 25x64, 64x64, 100x256",
+        "{raw_render_fps:,.0f}; {render_over_warp:.1f} times",
         "-",
     ),
     Row(
         "render",
         "rendering at 64x64, frames/s",
-        lambda f: f"{f['raw_render_fps_64']:,.0f}",
+        "{raw_render_fps_64:,.0f}",
         "70,000",
     ),
     Row(
         "render",
         "the same with `appearance=blocks`: 30 geoms, textures, shadows, fog",
-        lambda f: f"{f['raw_render_blocks_fps_64']:,.0f}",
+        "{raw_render_blocks_fps_64:,.0f}",
         "25,000",
     ),
     Row(
         "render",
         "time of RGB, gray, depth, distance, segmentation and normals in one pass, relative to RGB",
-        lambda f: f"{f['render_all_over_rgb']:.2f}",
+        "{render_all_over_rgb:.2f}",
         "at most 1.6",
     ),
     Row(
         "collector",
         "frames/s of the collector with a policy, relative to rendering only by MuJoCo Warp, 25x64",
-        _rates,
+        "{collector_over_raw:.2f} ({collector_fps:,.0f} over "
+        "{raw_render_beside_collector_fps:,.0f})",
         "0.7",
     ),
     Row(
         "collector",
         "frames/s of the collector with a policy, best number of environments; 16 environments",
-        lambda f: (
-            f"{f['collector_fps']:,.0f} ({f['collector_worlds']} environments); "
-            f"{f['collector_fps_16']:,.0f}"
-        ),
+        "{collector_fps:,.0f} ({collector_worlds} environments); {collector_fps_16:,.0f}",
         "40,000; 15,000",
     ),
     Row(
         "dm_control",
         "frames/s of the batched environment relative to dm_control with EGL, default quality",
-        lambda f: f"{f['batched_over_dm_control']:.0f} times ({f['dm_control_fps']:.0f} frames/s)",
+        "{batched_over_dm_control:.0f} times ({dm_control_fps:.0f} frames/s)",
         "100 times",
     ),
     Row(
         "dm_control",
         "the same with dm_control's quality tuned manually",
-        lambda f: (
-            f"{f['batched_over_dm_control_tuned']:.1f} times "
-            f"({f['dm_control_tuned_fps']:.0f} frames/s)"
-        ),
+        "{batched_over_dm_control_tuned:.1f} times ({dm_control_tuned_fps:.0f} frames/s)",
         "1.5 times",
     ),
-    Row(
-        "memory",
-        "peak memory of the default training",
-        lambda f: f"{f['peak_memory_mib']:.0f} MiB",
-        "1,024 MiB",
-    ),
+    Row("memory", "peak memory of the default training", "{peak_memory_mib:.0f} MiB", "1,024 MiB"),
     Row(
         "memory",
         "memory growth over 1,000,000 frames after the first 100,000",
-        lambda f: f"{round(f['memory_growth_mib_per_million_frames'], 1) + 0.0:.1f} MiB",
+        "{memory_growth_mib_per_million_frames:z.1f} MiB",
         "5 MiB",
     ),
     Row(
         "startup",
         "time from the start of `drone-rl train` to its first update, kernels cached",
-        lambda f: (
-            f"{f['start_to_first_update_s']:.1f} s with {f['import_torch_s']:.1f} s for `import "
-            f"torch`; {f['start_to_first_update_scaled_s']:.1f} s scaled to 1 s for it"
-        ),
+        "{start_to_first_update_s:.1f} s with {import_torch_s:.1f} s for `import torch`; "
+        "{start_to_first_update_scaled_s:.1f} s scaled to 1 s for it",
         "4 s",
     ),
     Row(
         "startup",
         "time of `drone-rl verdict policy=good`, 400 episodes; scaled likewise",
-        lambda f: f"{f['verdict_s']:.1f} s; {f['verdict_scaled_s']:.1f} s",
+        "{verdict_s:.1f} s; {verdict_scaled_s:.1f} s",
         "6 s",
     ),
     Row(
         "startup",
         "additional time if kernels must be compiled; scaled likewise",
-        lambda f: f"{f['first_compile_s']:.0f} s; {f['first_compile_scaled_s']:.0f} s",
+        "{first_compile_s:.0f} s; {first_compile_scaled_s:.0f} s",
         "15 s",
     ),
-    Row("startup", "time of `import drone_rl`", lambda f: seconds(f["import_s"]), "0.3 s"),
+    Row("startup", "time of `import drone_rl`", "{import_s:two digits} s", "0.3 s"),
     Row(
         "explain",
         "time of t-SNE with 600 frames; 10,000 frames",
-        lambda f: f"{seconds(f['tsne_600_s'])}; {seconds(f['tsne_10000_s'])}",
+        "{tsne_600_s:two digits} s; {tsne_10000_s:two digits} s",
         "5 s; 60 s",
     ),
     Row(
         "explain",
         "time of a response map, 41 x 31 positions",
-        lambda f: seconds(f["response_map_s"]),
+        "{response_map_s:two digits} s",
         "3 s",
     ),
     Row(
         "explain",
         "action probability of class models, policy good (forward, left, right)",
-        _class_models,
+        "{class_model_probability:.3f}",
         "0.99",
     ),
     Row(
         "original",
         "`experiment=original`, best of six settings: seeds of 5 that reach 2.99 of 3",
-        lambda f: f"{f['original_solved']} ({f['original_best'].replace('_', ' ')})",
+        "{original_solved} ({original_best})",
         "4",
     ),
     Row(
         "chapter",
         "its time for 30,000 episodes, minutes; frames/s relative to stepping in Python",
-        lambda f: f"{f['original_minutes']:.1f}; {f['original_speedup']:.1f} times",
+        "{original_minutes:.1f}; {original_speedup:.1f} times",
         "15; 3 times",
     ),
     Row(
         "chapter",
         "elements of the chapter that a command or test shows; cases of signs and cameras",
-        lambda f: f"{f['chapter_shown']} of {f['chapter_elements']}; {f['convention_cases']}",
+        "{chapter_shown} of {chapter_elements}; {convention_cases}",
         "all; 30",
     ),
     Row(
         "chapter",
         "success rate on a task that needs memory (`examples/recall.py`), an LSTM; no memory",
-        lambda f: f"{100 * f['lstm_success']:.1f}%; {100 * f['memoryless_success']:.1f}%",
+        "{lstm_success:%}; {memoryless_success:%}",
         "90%; at most 60%",
     ),
-    Row("explain", "size of report.html", lambda f: f"{f['report_mib']:.1f} MiB", "10 MB"),
+    Row("explain", "size of report.html", "{report_mib:.1f} MiB", "10 MB"),
     Row(
         "sweeps",
         "training runs per hour in a sweep, two parallel runs relative to one",
-        lambda f: f"{f['sweep_speedup']:.2f} times",
+        "{sweep_speedup:.2f} times",
         "1.6 times",
     ),
     Row(
         "sweeps",
         "overhead of launcher and logging relative to training runs without them",
-        lambda f: f"{100 * f['launcher_overhead']:.1f}%",
+        "{launcher_overhead:.1%}",
         "10%",
     ),
     Row(
         "kills",
         "runs with bit-identical results in a sweep that was killed three times",
-        lambda f: f"{f['sweep_runs_same_after_kills']} of {f['sweep_runs']}",
+        "{sweep_runs_same_after_kills} of {sweep_runs}",
+        "all",
+    ),
+)
+"""Training, rendering and sweeps."""
+ADVERSARIAL = (
+    Row(
+        "coverage",
+        "smallest coverage of all displayed 95% intervals, by enumeration and simulation",
+        "{interval_coverage_min:%}",
+        "94.5%",
+    ),
+    Row(
+        "coverage",
+        "rate of certain but wrong verdicts, greatest of the simulated policies near the "
+        "thresholds",
+        "{false_certain_rate:%}",
+        "at most 5%",
+    ),
+    Row(
+        "maps",
+        "saliency maps independent of the policy that are trusted",
+        "{placebo_maps_trusted} of {placebo_maps_total}",
+        "0",
+    ),
+    Row(
+        "maps",
+        "networks with a known map: how many; fraction whose true map is trusted",
+        "{planted_maps_total}; {planted_maps_found:%}",
+        "90%",
+    ),
+    Row(
+        "verdicts",
+        "certain verdicts that agree with 5,000 other episodes",
+        "{verdicts_right} of {verdicts_certain} certain, {verdicts_total} in total",
         "all",
     ),
     Row(
-        "ray",
-        "frames/s with `collector=ray` relative to the default collector",
-        lambda f: f"{f['ray_over_plain']:.2f}",
-        "0.8",
+        "gamed",
+        "adversarial policies judged good and certain, or proved",
+        "{gamed_verdicts} of {gamed_total}",
+        "0",
+    ),
+    Row(
+        "fragile_honest",
+        'honest policies, bundled or trained by default, "not certain" because of rounding',
+        "{fragile_honest} of {fragile_honest_total}",
+        "0",
+    ),
+    Row(
+        "domain_axes",
+        "axes whose operating domain is enforced in the right direction, from file to verdict",
+        "{domain_axes_right} of {domain_axes}",
+        "all",
+    ),
+    Row(
+        "render_truth",
+        "images of random scenes compared with OpenGL: pixels off edges with another geom",
+        "{render_truth_inner_wrong} in {render_truth_scenes} scenes",
+        "0",
+    ),
+    Row(
+        "render_truth",
+        "the same: geoms of more than 30 pixels with IoU of at least 0.98; smallest IoU",
+        "{render_truth_overlapping} of {render_truth_geoms}; {render_truth_least_overlap:.3f}",
+        "all",
+    ),
+    Row(
+        "render_truth",
+        "the same: greatest difference of depth; of color, levels of 255",
+        "{render_truth_depth_mm:.2f} mm; {render_truth_rgb}",
+        "1 mm; 2",
+    ),
+    Row(
+        "shifts",
+        "seconds to evaluate a policy under ten groups of perturbations, five strengths each, 200 "
+        "episodes",
+        "{shift_suite_s:.0f} with {shift_suite_axes} axes",
+        "480",
+    ),
+    Row(
+        "shifts",
+        "mean area under the curve of success rate over strength, policy good",
+        "{shift_area:.2f}",
+    ),
+    Row(
+        "robust",
+        "gain of `experiment=robust` over the default in success rate, percentage points, 3 seeds: "
+        "under groups of perturbations without randomization in training",
+        "{robust_gain_points:+.1f} of at most {robust_room_points:.1f}",
+        "+15",
+    ),
+    Row(
+        "robust",
+        "the same under all groups; loss under training conditions",
+        "{robust_gain_all_kinds_points:+.1f}; {robust_cost_points:z.1f}",
+        "-; at most 1",
+    ),
+    Row(
+        "explain",
+        "time and memory of `drone-rl explain policy=good`, 600 frames, with the report",
+        "{explain_s:.0f} s, {explain_peak_memory_mib:,.0f} MiB",
+        "120 s, 2,048 MiB",
     ),
 )
-"""Training and sweeps."""
+"""Attempts to make the program claim something false."""
+VERIFICATION = (
+    Row(
+        "prove",
+        "fraction of all placements from which the default policy fails, exact, 5 seeds",
+        "{proof_lost:%}",
+    ),
+    Row(
+        "prove",
+        "greatest undecided fraction of these proofs",
+        "{proof_undecided:%}",
+        "0.0001%",
+    ),
+    Row(
+        "prove",
+        "seconds of these proofs; scaled to the speed of the machine of the target",
+        "{proof_three_s:.0f}; {proof_three_scaled_s:.0f}",
+        "240",
+    ),
+    Row(
+        "prove",
+        "seconds of a proof with two cubes, policy good; scaled likewise",
+        "{proof_two_s:.1f}; {proof_two_scaled_s:.1f}",
+        "4",
+    ),
+    Row(
+        "prove",
+        "simulated episodes that end differently than proved",
+        "{proof_contradicted} of {proof_flights:,}",
+        "0",
+    ),
+    Row(
+        "prove",
+        "certificates that the independent checker accepts",
+        "{proof_checked} of {proof_checked_total}",
+        "all",
+    ),
+    Row(
+        "provable",
+        "minutes until `experiment=provable` is proved, 3 seeds",
+        "{provable_s:minutes}",
+        "30",
+    ),
+    Row(
+        "exact_coverage",
+        "fraction of verdict intervals that contain the exact success rate",
+        "{verdict_coverage_exact:%}",
+        "94.5%",
+    ),
+)
+"""Verification."""
+FLIGHT = (
+    Row(
+        "fly_page",
+        "page to fly from: images of 256x144 displayed per second in Chromium, without a GPU",
+        "{fly_page_fps:.0f}",
+        "30",
+    ),
+    Row(
+        "airsim",
+        "server for AirSim's clients: round trips per second for an image of 144x256, for a pose; "
+        "simulated over real seconds in lockstep; seconds until it is ready",
+        "{airsim_images_per_s:,.0f}; {airsim_calls_per_s:,.0f}; {airsim_lockstep_factor:,.0f}; "
+        "{airsim_ready_s:.1f}",
+        "400; 4,000; 100; 5",
+    ),
+    Row(
+        "airsim",
+        "methods of the multirotor client 1.8.1 that work, wholly or partly, of those that need no "
+        "lidar, distance sensor, car or Unreal; crafted messages survived; "
+        "growth over an hour of simulated traffic, MiB; two runs in lockstep are the same",
+        "{airsim_methods_share:%}; {airsim_fuzz_survived:,}; {airsim_growth_mib:.1f}; "
+        "{airsim_lockstep_repeats}",
+        "95%; 100,000; 5; yes",
+    ),
+    Row(
+        "airsim",
+        "the chapter's program for AirSim 1.1: mean cubes of 3 over 20 resets, collected by an "
+        "oracle that sees images only, with the default clock, in lockstep, in computer-vision "
+        "mode; trained through the client: success rate, lower end of the 95% CI; minutes",
+        "{airsim_chapter_cubes:.2f}; {airsim_chapter_lower95:%}; {airsim_chapter_minutes:.0f}",
+        "2.9 each; 90%; 20",
+    ),
+    Row(
+        "airsim",
+        "kinds of AirSim programs whose numbers are right through every client that has their "
+        "calls (1.1.7, 1.2.8, 1.8.1, cosysairsim 3.5); simulated seconds after 200 continues of "
+        "0.01 s, and of 0.05 s",
+        "{airsim_scripts_right} of {airsim_scripts}; {airsim_continue_s:.2f}",
+        "all; 2.0, 10.0",
+    ),
+    Row(
+        "flight_speed",
+        "environment steps per second of 256 drones (33 physics steps with all controllers each); "
+        "ratio to MuJoCo Warp with the same body and no controller",
+        "{flight_moves_per_s:,.0f}; {flight_over_mujoco_warp:.0f}",
+        "300,000; 50",
+    ),
+    Row(
+        "flight_speed",
+        "real-time factor of one drone with an image of 144x256 per command",
+        "{flight_realtime_factor:.0f}",
+        "30",
+    ),
+    Row(
+        "flight_speed",
+        "frames/s of the collector with vehicle dynamics; ratio to computer-vision mode",
+        "{flight_collector_fps:,.0f}; {flight_over_cv:.2f}",
+        "0.8",
+    ),
+    Row(
+        "flight_parity",
+        "greatest difference to MuJoCo after 10 s of free flight, 100 random maneuvers: m; degrees",
+        "{flight_parity_m:.4f}; {flight_parity_deg:.4f}",
+        "0.01; 0.5",
+    ),
+    Row(
+        "flight_paths",
+        "mean distance, m, to a square path of 10 m at 2 m/s; to the hover position in wind of "
+        "5 m/s",
+        "{path_error_m:.2f}; {hover_error_m:.2f}",
+        "0.5; 0.3",
+    ),
+    Row(
+        "flight_moves",
+        "`experiment=flight`: seconds from the start of the command until solved, 5 seeds; success "
+        "rate in 1,000 episodes, lower end of the exact 95% CI",
+        "{flight_time_to_solve_s:.0f}; {flight_success_lower95:%}",
+        "median 60; 95%",
+    ),
+    Row(
+        "flight_velocity",
+        "the same for `experiment=flight_velocity`, 3 seeds",
+        "{flight_velocity_time_to_solve_s:.0f}; {flight_velocity_success_lower95:%}",
+        "300; 95%",
+    ),
+    Row(
+        "flight_pillars",
+        "the same for `experiment=flight_pillars`, 3 seeds",
+        "{flight_pillars_time_to_solve_s:.0f}; {flight_pillars_success_lower95:%}",
+        "90%",
+    ),
+)
+"""Vehicle dynamics."""
+LIBRARIES = (
+    Row(
+        "peers",
+        "seconds from process start until solved, mean of 3 seeds: our default; our PPO; "
+        "Stable-Baselines3's PPO; its A2C; TorchRL's collector",
+        _peer_seconds,
+        "ours lowest",
+    ),
+    Row(
+        "peers",
+        "ratio of our default's seconds to those of the fastest other library",
+        "{solve_over_best_peer:.2f}",
+        "0.6",
+    ),
+    Row(
+        "gymnasium",
+        "frames/s of the Gymnasium vector environment relative to the batched environment",
+        "{gym_over_batched:.2f} ({gym_fps:,.0f} frames/s)",
+        "0.8",
+    ),
+    Row(
+        "pillars",
+        "task pillars: success rate in 1,000 held-out episodes, lower end of the exact 95% CI, "
+        "3 seeds",
+        "{pillars_success_lower95:%}",
+        "95%",
+    ),
+    Row(
+        "pillars",
+        "minutes to train each seed, from the start of the command",
+        "{pillars_time_to_solve_s:minutes}",
+        "5",
+    ),
+    Row(
+        "onnx",
+        "greatest difference of a probability between the bundled policies and their ONNX models",
+        "{onnx_max_difference:.1e} on {onnx_frames:,} images",
+        "1e-05",
+    ),
+    Row(
+        "onnx",
+        "images with a different most probable action",
+        "{onnx_actions_differ} of {onnx_frames:,}",
+        "0",
+    ),
+)
+"""Other libraries."""

@@ -1,4 +1,4 @@
-"""Complete the command line of `drone-rl train`: former names, a sweep's folder, `resume=`."""
+"""Complete the command line of `drone-rl train`: a sweep's folder, `resume=`."""
 
 import re
 import shlex
@@ -14,37 +14,23 @@ import drone_rl
 from drone_rl.sweeps.manifest import is_sweep, quoted, sweep_name
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import last_of, refuse_links, trained_policies, write_atomically
-from drone_rl.utils.overrides import must_be_typed, taken_over, with_current_name
-from drone_rl.utils.settings import FORMER_CHOICES, FORMER_NAMES
+from drone_rl.utils.overrides import must_be_typed, taken_over
 
 _SHIPPED = Path(drone_rl.__file__).parent / "policies" / "zoo"
 """Folder of the shipped policies, whose package imports torch."""
 
 
-def translate_former(overrides: Sequence[str]) -> list[str]:
-    """Translate former names: `policy=mlp` to `network=mlp`, `FORMER_NAMES`, `FORMER_CHOICES`."""
-    named = [*map(with_current_name, overrides)]
+def refuse_policies(overrides: Sequence[str]) -> None:
+    """Raise an `InputError` for `policy=` with an existing policy, which other commands take."""
     shipped = {path.stem for path in _SHIPPED.glob("*.safetensors")}
-    for value in (o.removeprefix("policy=") for o in named if o.startswith("policy=")):
+    for value in (o.removeprefix("policy=") for o in overrides if o.startswith("policy=")):
         if value in ("latest", *shipped) or "/" in value:
             raise InputError(
                 f"policy={value}: drone-rl train makes a new policy; resume=RUN continues the run "
                 "of one, and network=NAME chooses its network"
             )
-    return [re.sub(r"^(\+{0,2}|~)policy(?=[.=])", r"\1network", o) for o in named]
 
 
-_RENAMED = [
-    *(
-        (rf"^({choice.partition('=')[0]}=.*?)\b{current}\b", rf"\1{choice.partition('=')[2]}")
-        for choice, current in FORMER_CHOICES.items()
-    ),
-    *(
-        (rf"^(\+{{0,2}}|~){re.escape(current)}(?=[.=@])", rf"\1{former}")
-        for former, current in reversed(FORMER_NAMES.items())
-    ),
-]
-"""Patterns of current names in overrides and the former names, the latest first."""
 _FOLDER = "hydra.sweep.dir=${paths.outputs}/${hydra.job.config_name}/multiruns/"
 _NO_EARLY_FILES = ("hydra.output_subdir=null", "++hydra.job_logging.handlers.file.delay=true")
 """Keep Hydra from writing settings before they are checked, and from opening a log."""
@@ -59,11 +45,16 @@ def complete(overrides: Sequence[str]) -> list[str]:
         InputError: There is no run to resume, `policy=` names a policy, or the run has a setting
             that may not come from a file.
     """
-    typed = translate_former(overrides)
+    typed = [*overrides]
+    refuse_policies(typed)
+    folders = [o.split("=", 1)[1] for o in typed if o.startswith("resume=")]
+    if is_sweep(typed) and folders:
+        raise InputError(
+            "resume= continues one run, not with -m; to continue a sweep, repeat its command"
+        )
     if is_sweep(typed):
         is_named = any(o.startswith("hydra.sweep.dir=") for o in typed)
-        return typed if is_named else [*typed, _FOLDER + _sweep_folder(typed)]
-    folders = [o.split("=", 1)[1] for o in typed if o.startswith("resume=")]
+        return typed if is_named else [*typed, _FOLDER + sweep_name(typed)]
     if not folders or folders[-1] in ("", "null"):
         return typed
     if any(o.startswith("hydra.run.dir=") for o in typed):
@@ -76,8 +67,7 @@ def complete(overrides: Sequence[str]) -> list[str]:
         remedy = "the folder of a run" if above is None else f"its folder, {_resume(above)}"
         raise InputError(f"resume={folder} has no checkpoints/last.pt; give {remedy}")
     refuse_links(folder)
-    former = [re.sub(r"^(\+{0,2}|~)network(?=[.=])", r"\1policy", o) for o in typed]
-    kept = translate_former(taken_over(folder, [*typed, *former]))
+    kept = taken_over(folder, typed)
     plain = [_resume(folder) if o.startswith("resume=") else o for o in typed]
     own = ["hydra.mode=RUN", f"hydra.run.dir={quoted(str(folder))}", *_NO_EARLY_FILES]
     return [*kept, *plain, *own]
@@ -96,16 +86,6 @@ def spare_run(overrides: Sequence[str]) -> list[str]:
 
 def _is_run(folder: Path) -> bool:
     return last_of(folder).is_file()
-
-
-def _sweep_folder(typed: Sequence[str]) -> str:
-    """Return the folder's name, or that of the same sweep begun under former names of settings."""
-    older, names = [*typed], [sweep_name(typed)]
-    for current, former in _RENAMED:
-        older = [re.sub(current, former, o) for o in older]
-        names.append(sweep_name(older))
-    sweeps = _outputs(typed) / "train" / "multiruns"
-    return next((name for name in reversed(names) if (sweeps / name).is_dir()), names[0])
 
 
 def _outputs(typed: Sequence[str]) -> Path:

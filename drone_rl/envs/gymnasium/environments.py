@@ -90,9 +90,9 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
             InputError: The number of seeds is wrong, or an option is unknown.
         """
         mask = self._read_mask(dict(options or {}))
-        for i, own in enumerate(self._read_seeds(seed)):
-            if mask[i] and own is not None:
-                self._generators[i], self._seeds[i] = seeding.np_random(own)
+        for i, one in enumerate(self._read_seeds(seed)):
+            if mask[i] and one is not None:
+                self._generators[i], self._seeds[i] = seeding.np_random(one)
         self._start(mask)
         self._ended = ~mask if self._ended is None else self._ended & ~mask
         return self.batch.observe(), _masked(self.batch.info(), mask)
@@ -105,13 +105,13 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         """
         if self._ended is None:
             raise InputError("step() needs a running episode; call reset() first")
-        given = read_action(actions, self.batch.worlds.dynamics.actions, (self.num_envs,))
+        actions = read_action(actions, self.batch.worlds.dynamics.actions, (self.num_envs,))
         if self.autoreset_mode is AutoresetMode.DISABLED and self._ended.any():
             raise InputError(
                 f"worlds {np.flatnonzero(self._ended).tolist()} have ended; reset them by "
                 "reset(options={'reset_mask': mask}), or choose another autoreset_mode"
             )
-        rewards = np.where(self._ended, 0.0, self.batch.step(given))
+        rewards = np.where(self._ended, 0.0, self.batch.step(actions))
         self._start(self._ended)
         flags = self.batch.flags()
         self._ended = flags[0] | flags[1]
@@ -146,11 +146,11 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         self.batch.reset(torch.from_numpy(worlds), [self._generator(i) for i in worlds.tolist()])
 
     def _generator(self, world: int) -> np.random.Generator:
-        found = self._generators[world]
-        if found is None:
-            found, self._seeds[world] = seeding.np_random()
-            self._generators[world] = found
-        return found
+        generator = self._generators[world]
+        if generator is None:
+            generator, self._seeds[world] = seeding.np_random()
+            self._generators[world] = generator
+        return generator
 
     def _read_seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
         if seed is None:
@@ -184,14 +184,12 @@ def _masked(info: Info, mask: Mask) -> Info:
     return masked
 
 
-def _mode(given: AutoresetMode | str) -> AutoresetMode:
-    if given in AutoresetMode.__members__:  # SAME_STEP, as in messages of other libraries
-        return AutoresetMode[str(given)]
+def _mode(name: AutoresetMode | str) -> AutoresetMode:
     try:
-        return AutoresetMode(given)
+        return AutoresetMode(name)
     except ValueError:
-        known = ", ".join(mode.value for mode in AutoresetMode)
-        raise InputError(f"autoreset_mode={given!r} is unknown; give one of: {known}") from None
+        names = ", ".join(mode.value for mode in AutoresetMode)
+        raise InputError(f"autoreset_mode={name!r} is unknown; give one of: {names}") from None
 
 
 _ONLY = torch.zeros(1, dtype=torch.int64)

@@ -24,7 +24,6 @@ from drone_rl.config.configuration import Changes
 from drone_rl.sim.actions import Actions, Entry
 from drone_rl.sim.composer_task import CONTROL_TIMESTEP_S
 from drone_rl.sim.entities import CHASE
-from drone_rl.sim.rendering import check_device
 from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError, did_you_mean
@@ -119,15 +118,14 @@ class WorldBatch:
         Raises:
             InputError: An option or setting is unknown or out of range.
         """
-        own = kinds_of(GymnasiumSettings)
-        options = {name: value for name, value in given.items() if name in own}
+        names = kinds_of(GymnasiumSettings)
+        options = {name: value for name, value in given.items() if name in names}
         for name, kind in _PARTS.items():
             if isinstance(options.get(name), Mapping):
                 options[name] = kind(**Changes(kind).read(options[name], name))
         options = GymnasiumSettings(**options)
         options.dynamics.check_air()
-        changes = {name: value for name, value in given.items() if name not in own}
-        check_device(options.device)
+        changes = {name: value for name, value in given.items() if name not in names}
         self.options = options
         self.task = _chosen_task(task, changes)
         """The task or its settings."""

@@ -7,7 +7,7 @@ to build a policy, and all that a file can request.
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Unpack
 
 import torch
 from torchrl.envs import InitTracker, TransformedEnv
@@ -31,13 +31,14 @@ from drone_rl.config.training import MOST_TRANSFORMS, TrainSettings
 from drone_rl.config.transforms import Fault, Frame, Stack, Transform
 from drone_rl.envs import DroneEnv, with_transforms
 from drone_rl.policies import ImageNetwork
+from drone_rl.policies.environment import EnvOptions
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import Dynamics, make_dynamics
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.plugins import described, errors_of
 from drone_rl.utils.schema import Several, as_mapping, shown
-from drone_rl.utils.seeding import as_global_stream, plain_generator
+from drone_rl.utils.seeding import Stream, as_global_stream, plain_generator
 from drone_rl.utils.settings import Settings
 
 FORMAT = "drone_rl policy"
@@ -145,31 +146,28 @@ class PolicyDescription:
         *,
         seed: int,
         device: str,
-        pixels: bool = True,
+        stream: Stream = Stream.WORLDS,
         task: Task[Any] | None = None,
-        **kwargs: Any,
+        **options: Unpack[EnvOptions],
     ) -> TransformedEnv:
         """Build environments with the described camera and transforms; see `DroneEnv`.
 
         `task` is the same task with other starts of episodes. Without `pixels`: no transforms.
         """
+        parts: Any = {"appearance": self.appearance, **options}
+        parts["dynamics"] = options.get("dynamics") or self.dynamics
+        if isinstance(parts["dynamics"], DynamicsSettings):  # others have actions of their own
+            parts.setdefault("actions", self.actions)
         env = DroneEnv(
             num_envs,
             task or self.task,
             self.camera,
             seed=seed,
+            stream=stream,
             device=device,
-            pixels=pixels,
-            **{"appearance": self.appearance, **self._moved(kwargs), **kwargs},
+            **parts,
         )
-        return with_transforms(env, self.make_transforms() if pixels else ())
-
-    def _moved(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        """Return dynamics and actions, unless given dynamics have actions of their own."""
-        dynamics = given.get("dynamics")
-        if dynamics is None or isinstance(dynamics, DynamicsSettings):
-            return {"dynamics": self.dynamics, "actions": self.actions}
-        return {}
+        return with_transforms(env, self.make_transforms() if options.get("pixels", True) else ())
 
     def make_dynamics(self) -> Dynamics:
         """Return the vehicle dynamics."""
@@ -194,8 +192,8 @@ class PolicyDescription:
             network = self._network(self.make_dynamics().actions, torch.Generator())
         else:
             network = self._without_weights()
-        own = {name: weight.to("cpu", copy=True) for name, weight in weights.items()}
-        network.load_state_dict(own, assign=True)  # `to_empty` imports sympy: 0.3 s
+        copies = {name: weight.to("cpu", copy=True) for name, weight in weights.items()}
+        network.load_state_dict(copies, assign=True)  # `to_empty` imports sympy: 0.3 s
         return self._checked(network, network.actions.num_outputs).eval()
 
     def build_critic(self, generator: torch.Generator | None = None) -> ImageNetwork:
@@ -226,9 +224,11 @@ class PolicyDescription:
         if place := own_place(self.network):
             who, zeros = f"network={self.network.name}: {place}", torch.zeros(2, *self.input.shape)
             with torch.enable_grad(), errors_of(f"network={self.network.name}", place):
-                given: Any = network.eval()(zeros)  # with gradients, also numbers that overflow
+                outputs_of_zeros: Any = network.eval()(
+                    zeros
+                )  # with gradients, also numbers that overflow
                 network.train()
-            _check_returned(given, who, zeros, (2, outputs))
+            _check_returned(outputs_of_zeros, who, zeros, (2, outputs))
             if getattr(network, "num_actions", None) != outputs:
                 raise InputError(f'{who} has no last layer "logits" of {outputs} outputs; add it')
         return network

@@ -15,15 +15,10 @@ from drone_rl.utils.checkpoint import check_weights, load_checkpoint, other_form
 from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.files import last_of, parse_json, read_bytes, trained_policies
 from drone_rl.utils.overrides import COMMAND
-from drone_rl.utils.readers import with_current_names
-from drone_rl.utils.schema import Kind, Maybe, Plain, Real, Record, Text, Whole, as_mapping, shown
+from drone_rl.utils.schema import Maybe, Plain, Real, Record, Text, Whole, as_mapping
 
 MAX_HEADER = 2**20
 """Bytes of the header of an exported file."""
-_TYPES = ("F32", "F64", "I64", "I32", "U8", "BOOL")
-"""Types of weights, and of counters, indices and masks; the network's own decide which is right."""
-_ENTRY = {"dtype", "shape", "data_offsets"}
-"""Keys of each tensor in a safetensors header."""
 _FOLDER = Path(__file__).resolve().parent
 _COUNT = Whole(0, 2**62)
 _PROGRESS = Record(
@@ -35,37 +30,23 @@ _PROGRESS = Record(
         "running_reward": Real(-1e15, 1e15),
     }
 )
-
-
-class _Versions:
-    """Names of packages with their versions."""
-
-    def read(self, value: Any, where: str) -> dict[str, str]:
-        """See `drone_rl.utils.schema.Kind`."""
-        versions = Plain(most=100, deepest=1).read(as_mapping(value, where), where)
-        return {key: Text(200).read(item, f"{where}.{key}") for key, item in versions.items()}
-
-
 _PROVENANCE = Record(
-    {
-        "versions": _Versions(),
-        "git_revision": Maybe(Text(200)),
-        "machine": Plain(most=100, deepest=2),
-    },
+    {"versions": Plain(), "git_revision": Maybe(Text(200)), "machine": Plain()},
     optional=frozenset({"machine"}),
 )
-_ABOUT: dict[str, Kind] = {
-    "progress": _PROGRESS,
-    "provenance": _PROVENANCE,
-    "command": Maybe(COMMAND),
-    "verdict": Plain(),
-    "worlds": Text(20),
-    "seed": Whole(0),
-    "chosen": Maybe(Record({"runs": _COUNT, "episodes": Maybe(_COUNT)})),
-    "evaluation": Plain(),
-}
-_NOT_IN_ALL = frozenset({"verdict", "worlds", "seed", "chosen", "evaluation"})
-"""Older files have an evaluation, newer ones a verdict and what it rests on."""
+ABOUT = Record(
+    {
+        "progress": _PROGRESS,
+        "provenance": _PROVENANCE,
+        "command": Maybe(COMMAND),
+        "verdict": Plain(),
+        "worlds": Text(20),
+        "seed": Whole(0),
+        "chosen": Maybe(Record({"runs": _COUNT, "episodes": Maybe(_COUNT)})),
+    },
+    optional=frozenset({"verdict", "worlds", "seed", "chosen"}),
+)
+"""What an exported file contains about the training and the verdict of its policy."""
 
 
 def policy_names() -> list[str]:
@@ -142,20 +123,25 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     """Read a checkpoint, see `read_policy`; its "config" has plain data only."""
     state = load_checkpoint(path)
     try:
-        for key in ("policy", "progress", "provenance", "config"):
-            if key not in state:
-                raise InputError(f"it has no {key}")
-        state["config"] = Plain().read(as_mapping(state["config"], "config"), "config")
-        description = parse(state.get("description"))
-        checked = {
-            "description": description.as_dict(),
-            "policy": check_weights(state["policy"], description.expected_weights()),
-            "progress": _PROGRESS.read(_progress_of(state["progress"]), "progress"),
-            "provenance": _PROVENANCE.read(state["provenance"], "provenance"),
-        }
+        return checked_state(state)
     except InputError as error:
         raise InputError(f"checkpoint {path} can't be used: {error}") from None
-    return {**state, **checked}
+
+
+def checked_state(state: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the state of a checkpoint; raise an `InputError` if its policy is unusable."""
+    for key in ("policy", "progress", "provenance", "config"):
+        if key not in state:
+            raise InputError(f"it has no {key}")
+    description = parse(state.get("description"))
+    return {
+        **state,
+        "config": Plain().read(as_mapping(state["config"], "config"), "config"),
+        "description": description.as_dict(),
+        "policy": check_weights(state["policy"], description.expected_weights()),
+        "progress": _PROGRESS.read(state["progress"], "progress"),
+        "provenance": _PROVENANCE.read(state["provenance"], "provenance"),
+    }
 
 
 def exported_bytes(
@@ -170,16 +156,38 @@ def exported_bytes(
 
 def load_exported(path: Path) -> dict[str, Any]:
     """Read an exported policy, see `read_policy`."""
-    content = read_bytes(path, 8 + MAX_HEADER + 4 * MAX_PARAMETERS)
+    content = read_exported_bytes(path)
     try:
-        return _exported(content)
+        return parse_exported(content)
     except InputError as error:
         raise InputError(
-            f"policy {path} can't be read: {error}; give one that drone-rl export wrote"
+            f"policy {path} can't be read: {error}; give one that drone-rl export wrote, or "
+            f"convert one of an older version with drone-rl convert {path}"
         ) from None
 
 
-def _exported(content: bytes) -> dict[str, Any]:
+def read_exported_bytes(path: Path) -> bytes:
+    """Return the content of a file that is not larger than the largest exported policy."""
+    return read_bytes(path, 8 + MAX_HEADER + 4 * MAX_PARAMETERS)
+
+
+def parse_exported(content: bytes) -> dict[str, Any]:
+    """Return an exported policy, see `read_policy`, from the content of its file."""
+    data, about = metadata_of(content)
+    description = parse(data)
+    try:
+        weights = load(content)
+    except (SafetensorError, ValueError, KeyError, TypeError, RuntimeError) as error:
+        raise InputError(f"its weights are damaged ({str(error)[:100]})") from None
+    return {
+        "description": description.as_dict(),
+        "policy": check_weights(weights, description.expected_weights()),
+        **ABOUT.read(about, "about"),
+    }
+
+
+def metadata_of(content: bytes) -> tuple[Any, Any]:
+    """Return the plain data of an exported file, unchecked: its description, and `ABOUT`."""
     size = int.from_bytes(content[:8], "little")
     if not 2 <= size <= min(MAX_HEADER, len(content) - 8):
         other = None if content[8:9] == b"{" else other_format(content)
@@ -188,36 +196,12 @@ def _exported(content: bytes) -> dict[str, Any]:
     metadata = as_mapping(header.get("__metadata__", {}), "metadata")
     if metadata.get("format") != FORMAT:
         raise InputError("it is not a drone_rl policy")
-    for name in header.keys() - {"__metadata__"}:
-        entry = as_mapping(header[name], name)
-        if entry.keys() != _ENTRY:
-            raise InputError(f"the weights {shown(name)} do not state {', '.join(sorted(_ENTRY))}")
-        if entry["dtype"] not in _TYPES:
-            raise InputError(f"the weights {shown(name)} are of type {shown(entry['dtype'])}")
-    about = dict(as_mapping(_inner(metadata, "about"), "about"))
-    if "progress" in about:
-        about["progress"] = _progress_of(about["progress"])
-    description = parse(_inner(metadata, "description"))
-    try:
-        weights = load(content)
-    except (SafetensorError, ValueError, KeyError, TypeError, RuntimeError) as error:
-        raise InputError(f"its weights are damaged ({str(error)[:100]})") from None
-    return {
-        "description": description.as_dict(),
-        "policy": check_weights(weights, description.expected_weights()),
-        **Record(_ABOUT, _NOT_IN_ALL).read(about, "about"),
-    }
-
-
-def _inner(metadata: Mapping[str, Any], key: str) -> Any:
-    text = metadata.get(key)
-    if not isinstance(text, str):
-        raise InputError(f"its {key} is missing")
-    return parse_json(text, f"its {key}")
-
-
-def _progress_of(progress: Any) -> dict[str, Any]:
-    return with_current_names(as_mapping(progress, "progress"))
+    texts = {key: metadata.get(key) for key in ("description", "about")}
+    for key, text in texts.items():
+        if not isinstance(text, str):
+            raise InputError(f"its {key} is missing")
+    description, about = (parse_json(str(text), f"its {key}") for key, text in texts.items())
+    return description, about
 
 
 def fingerprint(weights: Mapping[str, torch.Tensor]) -> str:

@@ -111,7 +111,7 @@ def open_onnx(content: bytes) -> Callable[..., Tensor]:
     options.intra_op_num_threads = 1  # more would only wait for torch's, and sums depend on them
     session = runtime.InferenceSession(content, options)
 
-    sizes = {given.name: given.shape[-1] for given in session.get_inputs()[1:]}
+    sizes = {entry.name: entry.shape[-1] for entry in session.get_inputs()[1:]}
     state: dict[str, np.ndarray] = {}
 
     def probabilities(frames: Tensor, is_init: Tensor | None = None) -> Tensor:
@@ -120,9 +120,9 @@ def open_onnx(content: bytes) -> Callable[..., Tensor]:
             before = state.get(name, np.zeros((len(frames), 1, size), np.float32))
             state[name] = np.where(is_init.numpy()[..., None], np.float32(0), before)
         outputs = [PROBABILITIES, *NEXT_STATE[: len(sizes)]]
-        found, *following = session.run(outputs, {FRAMES: frames.numpy(), **state})
+        chances, *following = session.run(outputs, {FRAMES: frames.numpy(), **state})
         state.update(zip(sizes, following, strict=True))
-        return torch.from_numpy(found)
+        return torch.from_numpy(chances)
 
     return probabilities
 

@@ -10,9 +10,6 @@ from drone_rl.config import ActionSettings
 from drone_rl.sim.actions import DIRECTIONS, MOVES
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.dynamics.state import FlightState
-from drone_rl.utils.errors import InputError
-
-X, Y, HEADING, Z = range(4)
 
 
 class Mode(enum.IntEnum):
@@ -34,51 +31,19 @@ class Mode(enum.IntEnum):
     """Fraction of a rotor's full thrust, 0 to 1; all four axes are rotors then."""
 
 
-_SIDEWAYS = (Mode.RATE, Mode.ANGLE, Mode.VELOCITY, Mode.HEADING_VELOCITY, Mode.POSITION, Mode.ROTOR)
-ALLOWED = (
-    _SIDEWAYS,
-    _SIDEWAYS,
-    (Mode.RATE, Mode.ANGLE, Mode.ROTOR),
-    (Mode.THROTTLE, Mode.VELOCITY, Mode.POSITION, Mode.ROTOR),
-)
-"""Modes of each axis."""
-
 Modes = tuple[Mode, Mode, Mode, Mode]
 
 
 @dataclasses.dataclass(frozen=True)
 class Goals:
-    """Goals of drones' controllers, all in the same modes; invalid ones raise an `InputError`."""
+    """Goals of drones' controllers, all in the same modes."""
 
     modes: Modes
-    """Of x (or roll), y (or pitch), heading and height."""
+    """Of x (or roll), y (or pitch), heading and height. The first two are the same; `ROTOR` is the
+    mode of all four or of none; headings have no other mode than `RATE` and `ANGLE`."""
     values: Tensor  # (num_envs, 4) float64
     drift: Tensor | None = None  # (num_envs, 4) float64
     """Rate of change of positions and headings per second; 0 by default."""
-
-    def __post_init__(self) -> None:
-        for axis, (mode, allowed) in enumerate(zip(self.modes, ALLOWED, strict=True)):
-            if mode not in allowed:
-                known = ", ".join(m.name.lower() for m in allowed)
-                raise InputError(f"modes[{axis}]={mode!r} is unknown; give one of: {known}")
-        if 0 < self.modes.count(Mode.ROTOR) < len(ALLOWED):
-            raise InputError(f"modes={self._names}: rotor is for all axes; give it to all or none")
-        if self.modes[X] != self.modes[Y]:
-            raise InputError(f"modes={self._names}: the first two go together; give both the same")
-        if self.values.dim() != 2 or self.values.shape[1] != len(ALLOWED):
-            raise InputError(
-                f"goals of shape {tuple(self.values.shape)} are not (num_envs, 4); give a number "
-                "for each axis"
-            )
-        if self.drift is not None and self.drift.shape != self.values.shape:
-            raise InputError(
-                f"drift of shape {tuple(self.drift.shape)} is not that of the goals; give "
-                f"{tuple(self.values.shape)}"
-            )
-
-    @property
-    def _names(self) -> str:
-        return ", ".join(mode.name.lower() for mode in self.modes)
 
     @property
     def drifts(self) -> Tensor:
@@ -88,9 +53,9 @@ class Goals:
     def reference_after(self, seconds: float, body: FlightState) -> Tensor:
         """Return `FlightState.reference` after `seconds` of a command; `body` has the drones."""
         has_target = [mode is Mode.POSITION for mode in self.modes]
-        has_target[HEADING] = self.modes[HEADING] is Mode.ANGLE
-        there = self.values + seconds * self.drifts
-        return torch.where(torch.tensor(has_target), there, body.settled().reference)
+        has_target[2] = self.modes[2] is Mode.ANGLE
+        target = self.values + seconds * self.drifts
+        return torch.where(torch.tensor(has_target), target, body.settled().reference)
 
 
 def rotor_goals(rotors: Tensor) -> Goals:

@@ -7,7 +7,7 @@ left, z up; roll to the right, pitch down and yaw to the left are positive. SI u
 import warp as wp
 
 from drone_rl.sim.dynamics.control import Mode
-from drone_rl.sim.dynamics.rigid_body_kernel import Airframe, Axes, Motion
+from drone_rl.sim.dynamics.rigid_body_kernel import AirframeNumbers, Axes, Motion
 
 wp.set_module_options({"enable_backward": False})
 
@@ -25,7 +25,7 @@ def turned(angle: float) -> float:
 
 
 @wp.func
-def position_control(frame: Airframe, missing: wp.vec3) -> wp.vec3:
+def position_control(frame: AirframeNumbers, missing: wp.vec3) -> wp.vec3:
     """Return the velocity towards a place from the position error. Metres, metres a second."""
     gain = frame.position_gain
     return wp.vec3(
@@ -36,7 +36,7 @@ def position_control(frame: Airframe, missing: wp.vec3) -> wp.vec3:
 
 
 @wp.func
-def velocity_control(frame: Airframe, missing: wp.vec2) -> wp.vec2:
+def velocity_control(frame: AirframeNumbers, missing: wp.vec2) -> wp.vec2:
     """Return roll and pitch from the velocity error forward and left of the heading."""
     gain = frame.velocity_gain
     return wp.vec2(
@@ -46,19 +46,19 @@ def velocity_control(frame: Airframe, missing: wp.vec2) -> wp.vec2:
 
 
 @wp.func
-def climb_control(frame: Airframe, missing: float, integral: float) -> float:
+def climb_control(frame: AirframeNumbers, missing: float, integral: float) -> float:
     """Return the throttle, 0 to 1, from the error of the climb rate and its integral."""
     return 0.5 + 0.5 * within(frame.climb_gain * missing + integral, 1.0)
 
 
 @wp.func
-def climb_memory(frame: Airframe, missing: float, integral: float) -> float:
+def climb_memory(frame: AirframeNumbers, missing: float, integral: float) -> float:
     """Return the integral of `climb_control` after a tick, within -1 and 1."""
     return within(integral + frame.climb_integral * missing * frame.tick, 1.0)
 
 
 @wp.func
-def attitude_control(frame: Airframe, missing: wp.vec3) -> wp.vec3:
+def attitude_control(frame: AirframeNumbers, missing: wp.vec3) -> wp.vec3:
     """Return rates about the body's axes from the error of roll, pitch and yaw."""
     return wp.vec3(
         within(frame.angle_gain[0] * missing[0], 1.0) * frame.rate_limit[0],
@@ -68,7 +68,7 @@ def attitude_control(frame: Airframe, missing: wp.vec3) -> wp.vec3:
 
 
 @wp.func
-def rate_control(frame: Airframe, missing: wp.vec3) -> wp.vec3:
+def rate_control(frame: AirframeNumbers, missing: wp.vec3) -> wp.vec3:
     """Return torques, as fractions of the most about each axis, from the error of rates."""
     return wp.vec3(
         within(frame.rate_gain[0] * missing[0], 1.0),
@@ -112,7 +112,7 @@ class Goal:
 
 
 @wp.func
-def _angles_wanted(frame: Airframe, goal: Goal, motion: Motion, axes: Axes) -> wp.vec2:
+def _angles_wanted(frame: AirframeNumbers, goal: Goal, motion: Motion, axes: Axes) -> wp.vec2:
     """Return roll and pitch for goals of positions, velocities or angles."""
     if goal.modes[0] == Mode.ANGLE or goal.modes[0] == Mode.RATE:
         return wp.vec2(goal.values[0], goal.values[1])
@@ -145,7 +145,7 @@ def _angles_wanted(frame: Airframe, goal: Goal, motion: Motion, axes: Axes) -> w
 
 
 @wp.func
-def climb_missing(frame: Airframe, goal: Goal, motion: Motion) -> float:
+def climb_missing(frame: AirframeNumbers, goal: Goal, motion: Motion) -> float:
     """Return the error of the climb rate, metres a second."""
     wanted = goal.values[3]
     if goal.modes[3] == Mode.POSITION:
@@ -156,7 +156,7 @@ def climb_missing(frame: Airframe, goal: Goal, motion: Motion) -> float:
 
 
 @wp.func
-def _rates_wanted(frame: Airframe, goal: Goal, motion: Motion, axes: Axes) -> wp.vec3:
+def _rates_wanted(frame: AirframeNumbers, goal: Goal, motion: Motion, axes: Axes) -> wp.vec3:
     """Return rates about the body's axes for a goal."""
     angles = _angles_wanted(frame, goal, motion, axes)
     roll = wp.atan2(axes.left[2], axes.up[2])
@@ -178,7 +178,9 @@ def _rates_wanted(frame: Airframe, goal: Goal, motion: Motion, axes: Axes) -> wp
 
 
 @wp.func
-def rotors_wanted(frame: Airframe, goal: Goal, motion: Motion, axes: Axes, climb: float) -> wp.vec4:
+def rotors_wanted(
+    frame: AirframeNumbers, goal: Goal, motion: Motion, axes: Axes, climb: float
+) -> wp.vec4:
     """Return the fractions of full thrust that the cascade sets."""
     if goal.modes[3] == Mode.ROTOR:
         return goal.values

@@ -121,13 +121,13 @@ def make_dynamics(
         return dynamics
     dynamics, actions = dynamics or COMPUTER_VISION, actions or MOVES_SETTINGS
     if actions.kind == "moves_3d":
-        own = default()
-        if not dynamics.is_computer_vision or type(own) is not ComputerVision:
+        moves = default()
+        if not dynamics.is_computer_vision or type(moves) is not ComputerVision:
             raise InputError(
                 "actions=moves_3d needs dynamics=computer_vision and a task with moves; give them, "
                 "or actions=moves"
             )
-        return ComputerVision(own.step_length, is_3d=True)
+        return ComputerVision(moves.step_length, is_3d=True)
     if not dynamics.is_computer_vision:
         return Quadrotor(dynamics, actions)
     if actions.kind == "moves":

@@ -20,10 +20,10 @@ _WIDEST = wp.constant(1.0e12)
 
 
 @wp.struct
-class Command:
+class FlightCommand:
     """A command to drones, and the obstacles around them. World frame, SI units."""
 
-    frame: rigid.Airframe
+    frame: rigid.AirframeNumbers
     ticks: int
     modes: wp.vec4i
     goals: wp.array2d[wp.float64]
@@ -33,10 +33,13 @@ class Command:
 
 
 def make_command(
-    frame: rigid.Airframe, goals: Goals, ticks: int = 1, obstacles: fs.Obstacles | None = None
-) -> Command:
+    frame: rigid.AirframeNumbers,
+    goals: Goals,
+    ticks: int = 1,
+    obstacles: fs.Obstacles | None = None,
+) -> FlightCommand:
     """Return a command that lasts some ticks, for kernels on the device of the goals."""
-    command = Command()
+    command = FlightCommand()
     command.frame, command.ticks = frame, ticks
     command.modes = wp.vec4i(*(int(mode) for mode in goals.modes))
     command.goals = wp.from_torch(goals.values.contiguous())
@@ -59,7 +62,7 @@ class Touch:
 
 
 @wp.struct
-class Flight:
+class CommandedDrone:
     """One drone during a command."""
 
     start: wp.vec3d
@@ -117,9 +120,9 @@ def four(numbers: wp.array2d[wp.float64], world: int, first: int) -> wp.vec4:
 
 
 @wp.func
-def loaded(before: wp.array2d[wp.float64], world: int) -> Flight:
+def loaded(before: wp.array2d[wp.float64], world: int) -> CommandedDrone:
     """Return a drone at the start of a command, from its numbers."""
-    flight = Flight()
+    flight = CommandedDrone()
     for axis in range(3):
         flight.start[axis] = before[world, fs.POSITION + axis]
     flight.seed = wp.int64(before[world, fs.SEED])
@@ -137,7 +140,7 @@ def loaded(before: wp.array2d[wp.float64], world: int) -> Flight:
 
 
 @wp.func
-def goal_of(command: Command, world: int, start: wp.vec3d) -> Goal:
+def goal_of(command: FlightCommand, world: int, start: wp.vec3d) -> Goal:
     """Return a drone's goal; positions count from the start."""
     goal = Goal()
     goal.modes = command.modes
@@ -151,7 +154,9 @@ def goal_of(command: Command, world: int, start: wp.vec3d) -> Goal:
 
 
 @wp.func
-def driven(frame: rigid.Airframe, goal: Goal, before: Flight, axes: rigid.Axes) -> Flight:
+def driven(
+    frame: rigid.AirframeNumbers, goal: Goal, before: CommandedDrone, axes: rigid.Axes
+) -> CommandedDrone:
     """Return a flight whose controllers, rotors and air are a tick later; it has not moved yet."""
     flight = before
     motion = before.motion
@@ -167,14 +172,14 @@ def driven(frame: rigid.Airframe, goal: Goal, before: Flight, axes: rigid.Axes) 
 
 
 @wp.func
-def force_on(frame: rigid.Airframe, flight: Flight, axes: rigid.Axes) -> wp.vec3:
+def force_on(frame: rigid.AirframeNumbers, flight: CommandedDrone, axes: rigid.Axes) -> wp.vec3:
     """Return the force of rotors and air, newtons, world frame; without weight."""
     through = flight.motion.velocity - frame.wind - flight.gust
     return rigid.thrust_of(frame, flight.rotors) * axes.up + rigid.drag_of(frame, axes, through)
 
 
 @wp.func
-def _ticked(frame: rigid.Airframe, goal: Goal, before: Flight) -> Flight:
+def _ticked(frame: rigid.AirframeNumbers, goal: Goal, before: CommandedDrone) -> CommandedDrone:
     """Return a flight a tick later, over bare ground."""
     axes = rigid.axes_of(before.motion.attitude)
     flight = driven(frame, goal, before, axes)
@@ -193,7 +198,7 @@ def _ticked(frame: rigid.Airframe, goal: Goal, before: Flight) -> Flight:
 
 
 @wp.func
-def among(command: Command, world: int, before: Flight) -> Flight:
+def among(command: FlightCommand, world: int, before: CommandedDrone) -> CommandedDrone:
     """Return a flight after the obstacles that it touches have pushed it back."""
     flight = before
     radius = command.frame.radius
@@ -207,7 +212,7 @@ def among(command: Command, world: int, before: Flight) -> Flight:
 
 
 @wp.func
-def is_near(command: Command, world: int, flight: Flight) -> bool:
+def is_near(command: FlightCommand, world: int, flight: CommandedDrone) -> bool:
     """Return whether the drone, at its greatest speed, may touch any obstacle in the command."""
     frame = command.frame
     seconds = frame.tick * float(command.ticks)
@@ -224,7 +229,7 @@ def is_near(command: Command, world: int, flight: Flight) -> bool:
 
 
 @wp.func
-def grounded(frame: rigid.Airframe, motion: rigid.Motion, lift: float) -> rigid.Motion:
+def grounded(frame: rigid.AirframeNumbers, motion: rigid.Motion, lift: float) -> rigid.Motion:
     """Return the motion of a drone on the ground: level if its rotors can't carry it."""
     after = motion
     if lift < frame.weight:
@@ -237,7 +242,9 @@ def grounded(frame: rigid.Airframe, motion: rigid.Motion, lift: float) -> rigid.
 
 
 @wp.func
-def touched(frame: rigid.Airframe, flight: Flight, thing: int, overlap: rigid.Overlap) -> Touch:
+def touched(
+    frame: rigid.AirframeNumbers, flight: CommandedDrone, thing: int, overlap: rigid.Overlap
+) -> Touch:
     """Return the contact to record: obstacles precede the ground, later contacts earlier ones."""
     if flight.touch.thing >= 0 and thing < 0:
         return flight.touch
@@ -251,7 +258,7 @@ def touched(frame: rigid.Airframe, flight: Flight, thing: int, overlap: rigid.Ov
 
 
 @wp.func
-def write(after: wp.array2d[wp.float64], world: int, flight: Flight, ticks: int) -> None:
+def write(after: wp.array2d[wp.float64], world: int, flight: CommandedDrone, ticks: int) -> None:
     """Write a drone's numbers after some ticks of a command."""
     motion = flight.motion
     for i in range(3):
@@ -267,7 +274,9 @@ def write(after: wp.array2d[wp.float64], world: int, flight: Flight, ticks: int)
 
 
 @wp.func
-def _write_touch(after: wp.array2d[wp.float64], world: int, flight: Flight, tick: float) -> None:
+def _write_touch(
+    after: wp.array2d[wp.float64], world: int, flight: CommandedDrone, tick: float
+) -> None:
     """Write the last contact; `tick` is the duration of a tick in seconds."""
     touch = flight.touch
     after[world, fs.THING] = wp.float64(touch.thing)
@@ -280,7 +289,7 @@ def _write_touch(after: wp.array2d[wp.float64], world: int, flight: Flight, tick
 
 
 @wp.func
-def _write_reference(command: Command, after: wp.array2d[wp.float64], world: int) -> None:
+def _write_reference(command: FlightCommand, after: wp.array2d[wp.float64], world: int) -> None:
     """Write the reference after a command, see `Goals.reference_after`."""
     seconds = wp.float64(command.frame.tick) * wp.float64(command.ticks)
     for axis in range(4):
@@ -296,7 +305,10 @@ def _write_reference(command: Command, after: wp.array2d[wp.float64], world: int
 
 @wp.func
 def run(
-    command: Command, before: wp.array2d[wp.float64], after: wp.array2d[wp.float64], world: int
+    command: FlightCommand,
+    before: wp.array2d[wp.float64],
+    after: wp.array2d[wp.float64],
+    world: int,
 ) -> None:
     """Run all ticks of a command for one drone; `before` and `after` may be the same array."""
     frame = command.frame
@@ -328,7 +340,7 @@ def run(
 @wp.kernel
 def fly(
     first: int,
-    command: Command,
+    command: FlightCommand,
     before: wp.array2d[wp.float64],
     after: wp.array2d[wp.float64],
 ) -> None:

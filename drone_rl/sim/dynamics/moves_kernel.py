@@ -6,7 +6,7 @@ from torch import Tensor
 
 from drone_rl.sim.dynamics import state as fs
 from drone_rl.sim.dynamics.control import Goals, Moves
-from drone_rl.sim.dynamics.flight_kernel import Command, four, make_command, run
+from drone_rl.sim.dynamics.flight_kernel import FlightCommand, four, make_command, run
 from drone_rl.sim.dynamics.quadrotor import Quadrotor
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -16,7 +16,7 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 class Fleet:
     """Drones in flight, and the command that each move gives them."""
 
-    command: Command
+    command: FlightCommand
     lead: wp.float64
     is_gimballed: int
     moves: wp.array2d[wp.float64]

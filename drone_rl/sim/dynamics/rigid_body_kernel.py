@@ -16,7 +16,7 @@ wp.set_module_options({"enable_backward": False})
 
 
 @wp.struct
-class Airframe:
+class AirframeNumbers:
     """Fields of `DynamicsSettings` and what follows from them, in single precision and SI units."""
 
     tick: float
@@ -50,9 +50,9 @@ class Airframe:
     position_gain: float
 
 
-def make_airframe(settings: DynamicsSettings) -> Airframe:
+def make_airframe(settings: DynamicsSettings) -> AirframeNumbers:
     """Return the numbers of settings, and what follows from them."""
-    frame = Airframe()
+    frame = AirframeNumbers()
     same = set(vars(frame)) & settings.values().keys()
     for name in same:
         value = getattr(settings, name)
@@ -105,19 +105,19 @@ def axes_of(attitude: wp.vec4) -> Axes:
 
 
 @wp.func
-def answered(frame: Airframe, rotors: wp.vec4, asked: wp.vec4) -> wp.vec4:
+def answered(frame: AirframeNumbers, rotors: wp.vec4, asked: wp.vec4) -> wp.vec4:
     """Return rotors a tick later: a first-order filter of what is commanded."""
     return rotors + frame.rotor_pace * (asked - rotors)
 
 
 @wp.func
-def thrust_of(frame: Airframe, rotors: wp.vec4) -> float:
+def thrust_of(frame: AirframeNumbers, rotors: wp.vec4) -> float:
     """Return the thrust along the body's z, newtons."""
     return frame.rotor_thrust * (rotors[0] + rotors[1] + rotors[2] + rotors[3])
 
 
 @wp.func
-def torque_of(frame: Airframe, rotors: wp.vec4) -> wp.vec3:
+def torque_of(frame: AirframeNumbers, rotors: wp.vec4) -> wp.vec3:
     """Return the torque about the body's axes, newton metres, of rotors ordered as in `mix`."""
     lever = frame.arm * frame.rotor_thrust
     return wp.vec3(
@@ -128,7 +128,7 @@ def torque_of(frame: Airframe, rotors: wp.vec4) -> wp.vec3:
 
 
 @wp.func
-def drag_of(frame: Airframe, axes: Axes, velocity: wp.vec3) -> wp.vec3:
+def drag_of(frame: AirframeNumbers, axes: Axes, velocity: wp.vec3) -> wp.vec3:
     """Return the drag at a velocity through the air; newtons, metres a second, world frame."""
     forward = wp.dot(axes.forward, velocity)
     left = wp.dot(axes.left, velocity)
@@ -141,7 +141,7 @@ def drag_of(frame: Airframe, axes: Axes, velocity: wp.vec3) -> wp.vec3:
 
 
 @wp.func
-def advanced(frame: Airframe, motion: Motion, force: wp.vec3, torque: wp.vec3) -> Motion:
+def advanced(frame: AirframeNumbers, motion: Motion, force: wp.vec3, torque: wp.vec3) -> Motion:
     """Return the motion after a tick of force without weight (N, world) and torque (N m, body)."""
     tick = frame.tick
     rates = motion.rates
@@ -186,7 +186,7 @@ _SPREAD = wp.constant(3.4641016151377544)
 
 @wp.func
 def gust_after(
-    frame: Airframe, gust: wp.vec3, airspeed: float, seed: wp.int64, tick: wp.int64
+    frame: AirframeNumbers, gust: wp.vec3, airspeed: float, seed: wp.int64, tick: wp.int64
 ) -> wp.vec3:
     """Return the air's velocity minus its mean a tick later; metres a second, world frame.
 
@@ -245,7 +245,7 @@ def box_overlap(center: wp.vec3, radius: float, half: wp.vec3) -> Overlap:
 
 
 @wp.func
-def _bounced(frame: Airframe, velocity: wp.vec3, normal: wp.vec3) -> wp.vec3:
+def _bounced(frame: AirframeNumbers, velocity: wp.vec3, normal: wp.vec3) -> wp.vec3:
     """Return the velocity after a contact: Newton's restitution and Coulomb's friction."""
     into = -wp.dot(velocity, normal)
     if into <= 0.0:
@@ -261,7 +261,7 @@ def _bounced(frame: Airframe, velocity: wp.vec3, normal: wp.vec3) -> wp.vec3:
 
 
 @wp.func
-def pushed_out(frame: Airframe, motion: Motion, overlap: Overlap) -> Motion:
+def pushed_out(frame: AirframeNumbers, motion: Motion, overlap: Overlap) -> Motion:
     """Return the motion of a drone that no longer overlaps an object."""
     after = motion
     after.position = motion.position + overlap.depth * overlap.normal

@@ -56,8 +56,8 @@ class SingleQuadrotor(Quadrotor):
         if obstacles is not None:
             self._centers = torch.empty_like(obstacles.centers)
             around = Obstacles(self._centers, obstacles.half_sizes)
-        own = Goals(goals.modes, self._values, self._drifts)
-        command = flight_kernel.make_command(self.frame, own, ticks, around)
+        held = Goals(goals.modes, self._values, self._drifts)
+        command = flight_kernel.make_command(self.frame, held, ticks, around)
         arrays = [wp.from_torch(numbers) for numbers in (self._before, self._after)]
         self._launch = wp.launch(
             flight_kernel.fly, 1, inputs=[0, command, *arrays], device="cpu", record_cmd=True

@@ -40,11 +40,11 @@ def moved(mounting: Mounting | None, offset: Tensor, turn: Tensor) -> Mounting:
 
     Both are in the drone frame as the mounting has turned it.
     """
-    own = mounting or Mounting()
-    before = torch.as_tensor(own.turn, dtype=offset.dtype).to(offset.device)
-    there = torch.as_tensor(own.offset, dtype=offset.dtype).to(offset.device)
+    mounting = mounting or Mounting()
+    before = torch.as_tensor(mounting.turn, dtype=offset.dtype).to(offset.device)
+    there = torch.as_tensor(mounting.offset, dtype=offset.dtype).to(offset.device)
     return dataclasses.replace(
-        own, offset=there + rotate(before, offset), turn=product(before, turn)
+        mounting, offset=there + rotate(before, offset), turn=product(before, turn)
     )
 
 
@@ -109,8 +109,8 @@ class Distractors:
 
     def concat(self, other: "Distractors") -> "Distractors":
         """Append the distractors of another set with as many environments."""
-        own = vars(self.expand(len(other.places)))
-        both = {name: torch.cat([value, getattr(other, name)], 1) for name, value in own.items()}
+        fields = vars(self.expand(len(other.places)))
+        both = {name: torch.cat([v, getattr(other, name)], 1) for name, v in fields.items()}
         return Distractors(**both)
 
 
@@ -149,8 +149,8 @@ class Appearance:
 
     def lights(self, num_envs: int) -> dict[str, Tensor]:
         """Return the given lights by name, shapes (num_envs, 3); directions have length 1."""
-        given = {name: getattr(self, name) for name in _LIGHTS}
-        lights = {name: expand_color(v, num_envs) for name, v in given.items() if v is not None}
+        fields = {name: getattr(self, name) for name in _LIGHTS}
+        lights = {name: expand_color(v, num_envs) for name, v in fields.items() if v is not None}
         if "sun_direction" in lights:
             direction = lights["sun_direction"]
             lights["sun_direction"] = direction / direction.norm(dim=-1, keepdim=True)
@@ -160,10 +160,10 @@ class Appearance:
         """Return this appearance, completed by another where this one gives nothing."""
         if other is None:
             return self
-        given = {name: value for name, value in vars(self).items() if value is not None}
+        fields = {name: value for name, value in vars(self).items() if value is not None}
         for name in ("colors", "textures"):
-            given[name] = {**getattr(other, name), **given[name]}
-        return dataclasses.replace(other, **given)
+            fields[name] = {**getattr(other, name), **fields[name]}
+        return dataclasses.replace(other, **fields)
 
     def __getitem__(self, worlds: slice | Tensor) -> "Appearance":
         return _select(self, worlds)
@@ -192,6 +192,6 @@ def _select(value: Any, worlds: slice | Tensor, shared: int = 1) -> Any:
         return {semantic_class: _select(of, worlds) for semantic_class, of in value.items()}
     if isinstance(value, Distractors | Appearance | Texture | Mounting):
         shares = {**_SHARED_DIMENSIONS, "colors": 2 if isinstance(value, Distractors) else 1}
-        given = {n: _select(v, worlds, shares.get(n, 1)) for n, v in vars(value).items()}
-        return type(value)(**given)
+        fields = {n: _select(v, worlds, shares.get(n, 1)) for n, v in vars(value).items()}
+        return type(value)(**fields)
     return value[worlds] if isinstance(value, Tensor) and value.dim() > shared else value

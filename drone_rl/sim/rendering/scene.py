@@ -63,7 +63,7 @@ class Scene:
 
     def geoms(self, semantic_class: SemanticClass) -> list[int]:
         """Return the indices of the geoms of a class."""
-        return [i for i, found in enumerate(self.semantic_classes) if found is semantic_class]
+        return [i for i, kind in enumerate(self.semantic_classes) if kind is semantic_class]
 
     def shown(self, show_drone: bool) -> list[int]:
         """Return the indices of visible geoms; without `show_drone`, not the drone's."""
@@ -82,7 +82,7 @@ class Scene:
         """Return the boxes around the props, distractors included, in their order in `props`."""
         model, data = self.model, mujoco.MjData(self.model)
         mujoco.mj_kinematics(model, data)
-        found: list[PropBox] = []
+        boxes: list[PropBox] = []
         for prop in range(max(self.props, default=-1) + 1):
             geoms = [geom for geom, owner in enumerate(self.props) if owner == prop]
             root = model.body(model.body_rootid[model.geom_bodyid[geoms[0]]])
@@ -93,8 +93,8 @@ class Scene:
             low, high = (middle - reach).min(0), (middle + reach).max(0)
             kind = self.semantic_classes[geoms[0]]
             name = root.name.rstrip("/")
-            found.append(PropBox(name, kind, (low + high) / 2, (high - low) / 2))
-        return found
+            boxes.append(PropBox(name, kind, (low + high) / 2, (high - low) / 2))
+        return boxes
 
     def camera(self, name: str) -> int:
         """Return the index of a camera; raise an `InputError` if there is none of that name."""

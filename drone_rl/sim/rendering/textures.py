@@ -2,9 +2,8 @@
 
 import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,9 +51,9 @@ def noise() -> NDArray[np.float64]:
     return np.clip(0.78 + 0.22 * spots / spots.std() / 2, 0.0, 1.0)
 
 
-PROCEDURAL: Mapping[str, Callable[[], NDArray[np.float64]]] = MappingProxyType(
-    {texture.__name__: texture for texture in (checker, grid, bricks, noise)}
-)
+PROCEDURAL: dict[str, Callable[[], NDArray[np.float64]]] = {
+    texture.__name__: texture for texture in (checker, grid, bricks, noise)
+}
 """Textures by name. Values: in [0, 1], shape (side, side)."""
 
 

@@ -53,10 +53,10 @@ class View:
         """Raise an `InputError` if a renderer does not support all modalities of this view."""
         for modality in self.modalities:
             if modality not in supported:
-                known = ", ".join(name for name in MODALITIES if name in supported)
+                names = ", ".join(name for name in MODALITIES if name in supported)
                 raise InputError(
                     f"modality={modality!r} can't be rendered by {type(renderer).__name__}; "
-                    f"give one of: {known}"
+                    f"give one of: {names}"
                 )
 
     def new_images(

@@ -81,30 +81,33 @@ class Imu(Sensor[ImuState, ImuReading]):
 
     def _initial(self, body: BodyState, time: Tensor, generator: Generator) -> ImuState:
         """The velocity was constant before: the first reading has no acceleration but gravity's."""
-        own = self.settings
+        settings = self.settings
         still = torch.zeros_like(body.velocity)
-        gyro = own.noise * own.gyro_turn_on_bias * _DEGREES_PER_HOUR * normal(still, generator)
-        accel = own.noise * own.accel_turn_on_bias * _MILLI_G * normal(still, generator)
-        before = time - 1.0 / own.rate
+        turn_on = settings.noise * settings.gyro_turn_on_bias * _DEGREES_PER_HOUR
+        gyro = turn_on * normal(still, generator)
+        accel = settings.noise * settings.accel_turn_on_bias * _MILLI_G * normal(still, generator)
+        before = time - 1.0 / settings.rate
         return ImuState(self.sampling.start(time, 10), before, body.velocity.clone(), gyro, accel)
 
     def _sample(
         self, state: ImuState, body: BodyState, time: Tensor, generator: Generator
     ) -> ImuState:
-        own, is_due = self.settings, self.sampling.due(state.samples, time)
+        settings, is_due = self.settings, self.sampling.due(state.samples, time)
         seconds = torch.where(is_due, time - state.time, 1.0)
         force = specific_force(body.attitude, state.velocity, body.velocity, seconds)
         root = seconds.sqrt()[:, None]
-        gyro_noise = own.noise * own.gyro_random_walk * _DEGREES_PER_ROOT_HOUR / root
-        accel_noise = own.noise * own.accel_random_walk * _MILLI_G / root
+        gyro_noise = settings.noise * settings.gyro_random_walk * _DEGREES_PER_ROOT_HOUR / root
+        accel_noise = settings.noise * settings.accel_random_walk * _MILLI_G / root
         rates = body.angular_velocity + state.gyro_bias
         rates = rates + gyro_noise * normal(rates, generator)
         force = force + state.accel_bias + accel_noise * normal(force, generator)
-        gyro_step = own.noise * own.gyro_bias_stability * _DEGREES_PER_HOUR
-        accel_step = own.noise * own.accel_bias_stability * _MICRO_G
-        gyro = random_walk_step(state.gyro_bias, gyro_step, own.gyro_bias_time, seconds, generator)
+        gyro_step = settings.noise * settings.gyro_bias_stability * _DEGREES_PER_HOUR
+        accel_step = settings.noise * settings.accel_bias_stability * _MICRO_G
+        gyro = random_walk_step(
+            state.gyro_bias, gyro_step, settings.gyro_bias_time, seconds, generator
+        )
         accel = random_walk_step(
-            state.accel_bias, accel_step, own.accel_bias_time, seconds, generator
+            state.accel_bias, accel_step, settings.accel_bias_time, seconds, generator
         )
         return ImuState(
             self.sampling.take(state.samples, time, torch.cat([force, rates, body.attitude], 1)),
@@ -162,9 +165,9 @@ class Magnetometer(Sensor[MagnetometerState, MagnetometerReading]):
     def _sample(
         self, state: MagnetometerState, body: BodyState, time: Tensor, generator: Generator
     ) -> MagnetometerState:
-        own = self.settings
-        field = own.scale * body_from_world(body.attitude, self.field(body.position))
-        rows = field + state.bias + own.noise * own.white_noise * normal(field, generator)
+        settings = self.settings
+        field = settings.scale * body_from_world(body.attitude, self.field(body.position))
+        rows = field + state.bias + settings.noise * settings.white_noise * normal(field, generator)
         return MagnetometerState(self.sampling.take(state.samples, time, rows), state.bias)
 
     def _reading(self, time: Tensor, rows: Tensor) -> MagnetometerReading:
@@ -221,9 +224,11 @@ class Gps(Sensor[SensorState, GpsReading]):
     """A GPS receiver with latency, whose stated error shrinks after the start."""
 
     def __init__(self, settings: GpsSettings | None = None, home: GeoPoint = HOME) -> None:
-        own = settings or GpsSettings()
-        self.settings, self.home = own, home
-        self.sampling = Sampling(rate=own.rate, latency=own.latency, startup=own.startup)
+        self.settings = settings = settings or GpsSettings()
+        self.home = home
+        self.sampling = Sampling(
+            rate=settings.rate, latency=settings.latency, startup=settings.startup
+        )
 
     def _initial(self, body: BodyState, time: Tensor, generator: Generator) -> SensorState:
         return SensorState(self.sampling.start(time, 7))
@@ -231,11 +236,12 @@ class Gps(Sensor[SensorState, GpsReading]):
     def _sample(
         self, state: SensorState, body: BodyState, time: Tensor, generator: Generator
     ) -> SensorState:
-        own = self.settings
-        side, up = own.noise * own.horizontal_noise, own.noise * own.vertical_noise
+        settings = self.settings
+        side = settings.noise * settings.horizontal_noise
+        up = settings.noise * settings.vertical_noise
         deviations = body.position.new_tensor((side, side, up))
         position = body.position + deviations * normal(body.position, generator)
-        fast = own.noise * own.velocity_noise * normal(body.velocity, generator)
+        fast = settings.noise * settings.velocity_noise * normal(body.velocity, generator)
         place = geo_from_world(position, self.home)
         error = self.stated_error(time - state.samples.began)
         rows = torch.cat([place, body.velocity + fast, error[:, None]], 1)
@@ -250,9 +256,9 @@ class Gps(Sensor[SensorState, GpsReading]):
 
     def stated_error(self, seconds: Tensor) -> Tensor:
         """Return the stated error in metres, some seconds after the start. Shape: (num_envs,)."""
-        own = self.settings
-        left = torch.exp(-seconds / own.error_time)
-        return own.last_error + (own.first_error - own.last_error) * left
+        settings = self.settings
+        left = torch.exp(-seconds / settings.error_time)
+        return settings.last_error + (settings.first_error - settings.last_error) * left
 
 
 @dataclasses.dataclass
@@ -291,12 +297,12 @@ class Barometer(Sensor[BarometerState, BarometerReading]):
     def _sample(
         self, state: BarometerState, body: BodyState, time: Tensor, generator: Generator
     ) -> BarometerState:
-        own, is_due = self.settings, self.sampling.due(state.samples, time)
-        strength, seconds = own.noise * own.drift, time - state.time
-        drift = gauss_markov_step(state.drift, strength, own.drift_time, seconds, generator)
-        at_sea = 100.0 * own.sea_level_pressure
+        settings, is_due = self.settings, self.sampling.due(state.samples, time)
+        strength, seconds = settings.noise * settings.drift, time - state.time
+        drift = gauss_markov_step(state.drift, strength, settings.drift_time, seconds, generator)
+        at_sea = 100.0 * settings.sea_level_pressure
         exact = at_sea * pressure_ratio(self.home.altitude + body.position[:, 2])
-        noise = own.noise * own.white_noise * normal(exact, generator)
+        noise = settings.noise * settings.white_noise * normal(exact, generator)
         pressure = exact * (1 + drift[:, 0]) + noise
         altitude = altitude_from_pressure_ratio(pressure.clamp(min=1.0) / at_sea)
         return BarometerState(

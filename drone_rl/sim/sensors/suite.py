@@ -55,11 +55,11 @@ class SensorSuite:
         `number` distinguishes the noise of several batches of drones under one seed; `home` is the
         world's origin. Raises an `InputError` if the seed is not a whole number, 0 or more.
         """
-        own = settings or SensorSettings()
-        self.settings, self.home = own, home
-        self.imu, self.gps = instruments.Imu(own.imu), instruments.Gps(own.gps, home)
-        self.barometer = instruments.Barometer(own.barometer, home)
-        self.magnetometer = instruments.Magnetometer(own.magnetometer, home)
+        self.settings = settings = settings or SensorSettings()
+        self.home = home
+        self.imu, self.gps = instruments.Imu(settings.imu), instruments.Gps(settings.gps, home)
+        self.barometer = instruments.Barometer(settings.barometer, home)
+        self.magnetometer = instruments.Magnetometer(settings.magnetometer, home)
         names = ("imu", "barometer", "magnetometer", "gps")
         self._streams = {
             name: torch_generator(seed, Stream.SENSORS, number=4 * number + i)
@@ -105,12 +105,12 @@ def start_collisions(position: Tensor) -> CollisionState:
 
 def update_collisions(state: CollisionState, contact: Contact, position: Tensor) -> CollisionState:
     """Record contacts, at positions in metres, that differ from the last in time or object."""
-    known = state.contact
-    is_other = (contact.thing != known.thing) | (contact.time != known.time)
+    last = state.contact
+    is_other = (contact.thing != last.thing) | (contact.time != last.time)
     is_new = (contact.thing != NOTHING) & is_other
-    own = {k: select(is_new, v, getattr(known, k)) for k, v in vars(contact).items()}
+    changed = {k: select(is_new, v, getattr(last, k)) for k, v in vars(contact).items()}
     return CollisionState(
-        state.has_collided | is_new, Contact(**own), select(is_new, position, state.position)
+        state.has_collided | is_new, Contact(**changed), select(is_new, position, state.position)
     )
 
 

@@ -1,7 +1,7 @@
 """The rules of cube collection: the Warp function `step`.
 
-`CollectCubes.touch`, for flights without steps, and the prover (`lattice.py`, `cube_images.py`)
-state the rule of contact again: change them together.
+The rule of contact, half of the edges of cube and drone along every axis, is here for steps, in
+`common.first_contact` for paths without steps, and on purpose again in the prover.
 """
 
 import enum
@@ -26,7 +26,7 @@ from drone_rl.sim.dynamics.moves_kernel import (
 )
 from drone_rl.sim.dynamics.state import LEVEL, NUMBERS
 from drone_rl.sim.rendering.devices import on_torch_stream, start_warp
-from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, Poses
+from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, PoseArrays
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH, Side
 
 
@@ -69,7 +69,7 @@ class Cubes:
 
 
 @wp.struct
-class Outcome:
+class StepOutcome:
     """Result of a step."""
 
     reward: wp.float64
@@ -77,14 +77,14 @@ class Outcome:
 
 
 @wp.func
-def step(cubes: Cubes, env: int, drone: wp.vec3d, steps: int, is_lost: bool) -> Outcome:
+def step(cubes: Cubes, env: int, drone: wp.vec3d, steps: int, is_lost: bool) -> StepOutcome:
     """Apply Algorithms 1 and 3 after a drone has moved, and write `cubes`.
 
     A touched cube is collected and worth 1; a cube left behind vanishes; the episode ends when all
     cubes are collected, when the drone is out of bounds, or at the step limit, in this order; a
     drone whose motion has diverged ends it before all these. `steps` includes this one.
     """
-    outcome = Outcome()
+    outcome = StepOutcome()
     num_collected = int(0)
     for cube in range(cubes.places.shape[1]):
         if is_present(cubes, env, cube):
@@ -223,7 +223,7 @@ class EnvArrays:
 
 
 @wp.func
-def place(envs: EnvArrays, env: int, poses: Poses) -> None:
+def place(envs: EnvArrays, env: int, poses: PoseArrays) -> None:
     """Write the poses of drone and cubes for the renderer; only flying drones have attitudes."""
     poses.positions[env, DRONE_FRAME] = wp.vec3(envs.drones[env])
     if is_flying(envs.fleet):
@@ -264,7 +264,7 @@ class FusedCubes:
         self._drones = torch.zeros(num_envs, 3, dtype=torch.float64)
         self.steps = torch.zeros(num_envs, dtype=torch.int32)
         self.end_reasons = torch.zeros(num_envs, dtype=torch.int32)
-        cubes, self.arrays, self.poses = Cubes(), EnvArrays(), Poses()
+        cubes, self.arrays, self.poses = Cubes(), EnvArrays(), PoseArrays()
         cubes.bounds = make_bounds(settings)
         self.state = SimpleNamespace(cubes=torch.zeros(*shape, 3, dtype=torch.float64))
         """The cubes, named as in `WorldState`."""

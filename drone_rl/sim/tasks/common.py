@@ -49,8 +49,8 @@ class PropTask(Task[S]):
 
     def places(self, state: S) -> Tensor:
         """Return the props' positions, those of absent ones under the floor."""
-        known: Any = state
-        hidden = (~known.present).double() * HIDDEN_DEPTH
+        props_state: Any = state
+        hidden = (~props_state.present).double() * HIDDEN_DEPTH
         return getattr(state, self.props) - torch.nn.functional.pad(hidden[..., None], (2, 0))
 
     def next_moved(self, state: S, metres: Tensor | float) -> S:

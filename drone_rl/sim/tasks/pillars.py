@@ -2,7 +2,6 @@
 
 import dataclasses
 import enum
-import types
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -79,13 +78,11 @@ class Pillars(common.PropTask[FieldState]):
     observed = ("passed", "side", "end_reason")
     props = "pillars"
     scored = ("passed", "side", "gap", "rows")
-    remembered = types.MappingProxyType(
-        {
-            "rows": "y of the pillars, metres, row by row; infinite if absent (T, R, K)",
-            "passed": "whether each row has been passed, bool (T, R)",
-            "next_target": "index of the next row's pillar nearest to the path, P if none (T,)",
-        }
-    )
+    remembered: Mapping[str, str] = {
+        "rows": "y of the pillars, metres, row by row; infinite if absent (T, R, K)",
+        "passed": "whether each row has been passed, bool (T, R)",
+        "next_target": "index of the next row's pillar nearest to the path, P if none (T,)",
+    }
 
     def __init__(self, settings: PillarsSettings | None = None) -> None:
         self.settings = s = settings or PillarsSettings()

@@ -99,16 +99,16 @@ class OracleRule(NamedTuple):
         """Return whether an action set has all parts that the oracle uses, by name."""
         return set(self.actions.names) <= set(actions.names)
 
-    def decide(self, known: Sequence[Tensor], actions: Actions) -> Tensor:
+    def decide(self, values: Sequence[Tensor], actions: Actions) -> Tensor:
         """Return full-speed actions, (N,) and then the entry's, of a set that `can_fly` accepts.
 
-        `known` is what it reads, each of shape (N, *).
+        `values` are the entries that it reads, each of shape (N, *).
         """
-        own = self.act(*known)
+        action = self.act(*values)
         if actions == self.actions:
-            return own
+            return action
         same = torch.stack([actions.always(name) for name in self.actions.names])
-        return same.to(own.device)[self.actions.part(own)]
+        return same.to(action.device)[self.actions.part(action)]
 
 
 class Grid(NamedTuple):
@@ -339,22 +339,15 @@ def register_task(
     if isinstance(settings, Task):
         as_settings(settings)
         return
-    if not (isinstance(settings, type) and issubclass(settings, BaseTaskSettings)):
-        name = getattr(settings, "__name__", shown(settings))
+    is_class = isinstance(settings, type) and issubclass(settings, BaseTaskSettings)
+    if not is_class or not callable(make):
         raise InputError(
-            f"{name} is no class of settings; give it first, then what makes the task: "
-            "register_task(MySettings, MyTask)"
+            f"{shown(settings)} and {shown(make)} make no task; give a task, or the class of its "
+            "settings and what makes it: register_task(MySettings, MyTask)"
         )
     _require_name(settings)
-    if not callable(make):
-        what = f"give what makes the task, as in register_task({settings.__name__}, MyTask)"
-        raise InputError(f"{shown(make)} makes no task; {what}")
     if TASKS.get(settings.name, settings) is not settings:
         raise InputError(f"there is a task called {settings.name}; give another name")
-    for field in dataclasses.fields(settings):
-        if field.default is field.default_factory is dataclasses.MISSING:
-            where = f"{settings.__name__}.{field.name}"
-            raise InputError(f"{where} has no default; give it one, as in = 1.0 behind its type")
     with prefixed_errors(settings.__name__):
         settings()  # its defaults are checked
     TASKS[settings.name], MAKERS[settings] = settings, make
@@ -374,9 +367,9 @@ def as_settings(task: Any) -> Any:
     if not isinstance(task, Task):
         return task
     _require_name(type(task))
-    own: Any = getattr(task, "settings", None)
-    if type(own) in MAKERS and type(as_task(own)) is type(task):
-        return own
+    settings: Any = getattr(task, "settings", None)
+    if type(settings) in MAKERS and type(as_task(settings)) is type(task):
+        return settings
     kind = TASKS.get(task.name)
     if kind is None or not issubclass(kind, ObjectSettings):  # else a notebook's cell ran again
         names = {"name": task.name, "__module__": type(task).__module__}

@@ -15,7 +15,7 @@ from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils import schema
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
-from drone_rl.utils.limits import CERTIFICATE_BYTES, CERTIFICATE_VALUES
+from drone_rl.utils.limits import CERTIFICATE_BYTES
 from drone_rl.verification.requirements import require_cubes
 
 FORMAT = "drone_rl certificate"
@@ -80,7 +80,7 @@ def read_certificate(path: Path) -> Certificate:
     """
     content = read_bytes(path, CERTIFICATE_BYTES)
     try:
-        return parse_certificate(parse_json(content, "it", most_values=CERTIFICATE_VALUES))
+        return parse_certificate(parse_json(content, "it"))
     except InputError as error:
         raise InputError(f"certificate {path} can't be used: {error}") from None
 
@@ -143,13 +143,13 @@ _WHOLE = schema.Record(
         "format": schema.OneOf((FORMAT,)),
         "format_version": schema.Whole(FORMAT_VERSION, FORMAT_VERSION),
         "policy": schema.Record(
-            {"name": schema.Text(), "weights": schema.Text(64), "description": schema.Plain(1000)}
+            {"name": schema.Text(), "weights": schema.Text(64), "description": schema.Plain()}
         ),
         "outcomes": schema.Several(_OUTCOME, 0, MAX_OUTCOMES),
         "undecided": schema.Record({"share": _SHARE, "boxes": _LATER}),
         "finished": schema.Flag(),
         "stated": schema.Plain(),
-        "found": schema.Plain(most=1000, deepest=3),
+        "found": schema.Plain(),
         **_ORIGIN,
     },
     optional=frozenset(_ORIGIN),
@@ -174,7 +174,7 @@ def _read_outcome(read: Mapping[str, Any], where: str, cubes: int) -> Outcome:
 def _read_steps(value: Any, where: str) -> dict[int, float]:
     """Parse fractions above 0 by number of steps; the numbers have no leading zeros."""
     steps = {}
-    for name, share in schema.Plain(deepest=1).read(schema.as_mapping(value, where), where).items():
+    for name, share in schema.Plain().read(schema.as_mapping(value, where), where).items():
         if not (name.isascii() and name.isdigit() and len(name) <= _DIGITS and name[0] != "0"):
             raise InputError(
                 f"{where}.{schema.shown(name)} is not a number of steps; give one above 0"

@@ -16,7 +16,7 @@ from drone_rl.verification.prover.boxes import Boxes, blocks, merge, ragged
 from drone_rl.verification.prover.cells import Cells
 from drone_rl.verification.prover.cube_images import NOTHING
 
-BATCH, CHUNK = 4096, 256  # blocks tried at a time, and by one thread
+BATCH, CHUNK, ALONE = 4096, 256, 64  # blocks tried at a time, by one thread, and without threads
 FEW, PRICE = 8, 6.0  # images evaluated singly; cost of bounds on a block, in images
 
 
@@ -124,8 +124,8 @@ class ActionTable:
     ) -> NDArray[np.uint8]:
         """Evaluate parts of the blocks in several threads."""
         self.num_images += len(blocks)
-        if not len(blocks):
-            return np.zeros(0, np.uint8)
+        if len(blocks) <= ALONE:
+            return work(blocks) if len(blocks) else np.zeros(0, np.uint8)
         count = max(-(-len(blocks) // CHUNK), num_cores())
         parts = np.array_split(blocks, min(count, len(blocks)))  # none is empty
         return np.concatenate(list(workers().map(work, parts)))

@@ -14,7 +14,6 @@ from drone_rl.verification.prover.boxes import (
     all_placements,
     complement,
     merge,
-    ragged,
     resolve_forks,
     union,
     volumes,
@@ -233,7 +232,7 @@ def ended(known: Ended, none: Boxes) -> ProofFindings:
 
 
 def so_far(known: Ended, part: Boxes) -> ProofFindings:
-    """Return the largest boxes of each ending of a part in progress; the rest counts as undecided.
+    """Return the largest boxes of a part in progress; the rest counts as undecided.
 
     Many cubes give millions of boxes, which nobody could check one by one.
     """
@@ -241,11 +240,7 @@ def so_far(known: Ended, part: Boxes) -> ProofFindings:
         return ProofFindings({}, part, {})
     each = [np.concatenate(parts) for parts in known.values()]
     boxes, owner = np.concatenate(each), np.repeat(range(len(each)), [len(b) for b in each])
-    kinds = list(dict.fromkeys(ending for ending, _ in known))
-    kind = np.array([kinds.index(ending) for ending, _ in known])[owner]
-    order = np.lexsort((-volumes(boxes), kind))
-    rank = ragged(np.bincount(kind))[1]
-    largest = order[np.argsort(rank, kind="stable")][:MAX_STATED]
+    largest = np.argsort(-volumes(boxes), kind="stable")[:MAX_STATED]
     while (left := complement(boxes[largest], part)) is None:
         largest = largest[: len(largest) // 2]
     stated = {key: [boxes[largest[owner[largest] == i]]] for i, key in enumerate(known)}

@@ -7,19 +7,13 @@ import signal
 import sys
 
 import pytest
-from hydra.core.plugins import Plugins
 
 from drone_rl.cli.hydra.launchers import (
-    NAMESPACE,
-    LocalLauncher,
-    RayLauncher,
-    SlurmLauncher,
     SweepLauncher,
     _command,
     _job_return,
     _outcome,
     _sigterm_as_interrupt,
-    register_plugins,
 )
 from drone_rl.sweeps import executors
 from drone_rl.sweeps.manifest import Run, Sweep
@@ -55,30 +49,17 @@ def test_a_finished_run_returns_its_running_mean(run):
     assert _outcome(run) == "solved, running reward 2.980, verdict: good"
 
 
-def test_an_unfinished_run_returns_nothing_and_says_why(run):
+def test_a_failed_run_returns_nothing_and_logs_the_reason(run):
     assert _job_return(run).return_value is None
     assert _outcome(run) == "failed: reason unknown"
     (run.folder / "failure.json").write_text(json.dumps({"error": "no memory"}))
     assert _outcome(run) == "failed: no memory"
 
 
-def test_rubbish_in_a_result_is_no_number(run):
-    result = {"reason": "frames", "running_reward": "high"}
-    (run.folder / "result.json").write_text(json.dumps(result))
-    assert _job_return(run).return_value is None
-
-
 def test_the_command_is_what_was_typed(monkeypatch):
     argv = ["drone-rl train", "-m", "seed=0,1", "hydra.sweep.dir=${paths.outputs}/x"]
     monkeypatch.setattr(sys, "argv", argv)
     assert _command() == ["drone-rl", "train", "-m", "seed=0,1"]
-
-
-def test_hydra_finds_the_launchers():
-    register_plugins(LocalLauncher, SlurmLauncher, RayLauncher)
-    known = Plugins.instance().class_name_to_class
-    for launcher in (LocalLauncher, SlurmLauncher, RayLauncher):
-        assert known[f"{NAMESPACE}.{launcher.__name__}"] is launcher
 
 
 def test_sigterm_stops_a_sweep_as_ctrl_c_does_with_its_own_status():
@@ -94,7 +75,7 @@ def test_sigterm_stops_a_sweep_as_ctrl_c_does_with_its_own_status():
     assert signal.getsignal(signal.SIGTERM) is before
 
 
-def test_an_interrupted_sweep_says_how_to_go_on(run, tmp_path, monkeypatch, caplog):
+def test_an_interrupted_sweep_logs_the_command_that_resumes_it(run, tmp_path, monkeypatch, caplog):
     class Interrupted:
         def finish(self, runs):
             raise KeyboardInterrupt
@@ -129,23 +110,13 @@ def test_each_run_is_in_the_folder_that_hydra_resolves(in_process, monkeypatch, 
     assert [run["folder"] for run in runs] == [*settings]
 
 
-def test_long_names_of_folders_are_shortened_alone(in_process, monkeypatch, tmp_path):
-    monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-c", TRAINING))
-    long = [f"trainer.checkpoint_interval_s={i}" for i in range(1000, 1012)]
-    subdir = "hydra.sweep.subdir=a/../${hydra.job.override_dirname}/${hydra.job.num}"
-    done = in_process(*GRID, *long, subdir)
-    assert done.returncode == 0, done.stderr
-    runs = json.loads((tmp_path / "sweep" / "sweep.json").read_text())["runs"]
-    assert [run["folder"].rpartition("/")[2] for run in runs] == ["0", "1", "2", "3"]
-    assert all(len(run["folder"]) < 200 for run in runs)
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         ([*GRID, "hydra.sweep.subdir=${seed}"], "runs 0 and 1 have the same folder"),
         ([*GRID, "hydra.sweep.subdir=../${hydra.job.num}"], "'../0' is not inside"),
-        (["train", "-m", "seed=range(0)"], "seed=range(0): a sweep of no runs"),
+        ([*GRID, "seed=0,x"], "seed=0,x: it needs a whole number"),
+        ([*GRID, "seed=range(0)"], "a sweep of no runs"),
     ],
 )
 def test_a_sweep_that_is_refused_writes_nothing(in_process, tmp_path, words, message):

@@ -14,10 +14,9 @@ from drone_rl.cli.hydra.resuming import (
     check_folder,
     complete,
     note_settings,
+    refuse_policies,
     resume_command,
-    translate_former,
 )
-from drone_rl.sweeps.manifest import sweep_name
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.overrides import read_overrides
 
@@ -28,16 +27,16 @@ def run(tmp_path):
     (tmp_path / "checkpoints").mkdir()
     (tmp_path / "checkpoints" / "last.pt").write_bytes(b"")
     (tmp_path / ".hydra").mkdir()
-    told = ["policy=mlp", "policy.hidden=[8]", "seed=3"]
+    told = ["network=mlp", "network.hidden=[8]", "seed=3"]
     (tmp_path / ".hydra" / "overrides.yaml").write_text(yaml.safe_dump(told))
     return tmp_path
 
 
 def test_one_training_is_left_as_it_is():
-    assert complete(["seed=1", "policy=mlp"]) == ["seed=1", "network=mlp"]
+    assert complete(["seed=1", "network=mlp"]) == ["seed=1", "network=mlp"]
 
 
-def test_a_run_that_goes_on_takes_over_its_settings_in_todays_words(run):
+def test_a_run_that_goes_on_takes_over_its_settings(run):
     told = [f"resume={run}", "seed=3"]
     assert complete(told) == [
         *("network=mlp", "network.hidden=[8]"),
@@ -47,7 +46,7 @@ def test_a_run_that_goes_on_takes_over_its_settings_in_todays_words(run):
     ]
 
 
-@pytest.mark.parametrize("again", ["network=small_cnn", "policy=small_cnn"])
+@pytest.mark.parametrize("again", ["network=small_cnn"])
 def test_what_is_told_anew_is_not_taken_over(run, again):
     found = complete([f"resume={run}", again])
     assert "network=mlp" not in found
@@ -126,38 +125,7 @@ def test_a_path_in_a_run_is_answered_with_the_run(run):
             complete([f"resume={run}/{path}"])
 
 
-def test_a_setting_has_its_former_name_on_command_lines(run):
-    assert complete(["optimiser=sgd", "optimiser.lr=1"]) == ["optimizer=sgd", "optimizer.lr=1"]
-
-
-def test_a_sweep_goes_on_in_the_folder_with_the_former_name(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    typed = ["-m", "optimizer.lr=1,2"]
-    assert "optimizer.lr" in complete(typed)[-1]
-    older = sweep_name(["-m", "optimiser.lr=1,2"])
-    (tmp_path / "outputs" / "train" / "multiruns" / older).mkdir(parents=True)
-    assert complete(typed)[-1].endswith(f"/multiruns/{older}")
-    assert complete(["-m", "optimiser.lr=1,2"])[-1] == complete(typed)[-1]
-    assert "optimizer.lr" in complete([*typed, "paths.outputs=elsewhere"])[-1]
-
-
-@pytest.mark.parametrize(
-    ("former", "current"),
-    [
-        ("trainer.minibatch_frames=8,9", "trainer.chunk_frames=8,9"),
-        ("returns=gae,standardised", "returns=gae,standardized"),
-    ],
-)
-def test_a_sweep_with_former_names_goes_on_in_its_folder(tmp_path, monkeypatch, former, current):
-    monkeypatch.chdir(tmp_path)
-    older = sweep_name(["-m", "optimizer.lr=1", former])
-    assert older not in complete(["-m", "optimizer.lr=1", current])[-1]
-    (tmp_path / "outputs" / "train" / "multiruns" / older).mkdir(parents=True)
-    for override in (former, current):
-        assert complete(["-m", "optimizer.lr=1", override])[-1].endswith(f"/multiruns/{older}")
-
-
 @pytest.mark.parametrize("value", ["good", "latest", "outputs/train/runs/x"])
 def test_a_trained_policy_is_no_setting_of_a_training(value):
     with pytest.raises(InputError, match=f"policy={value}: .*resume=RUN .*network=NAME"):
-        translate_former([f"policy={value}"])
+        refuse_policies([f"policy={value}"])

@@ -1,16 +1,28 @@
-"""The vector environment equals Gymnasium's `SyncVectorEnv` of single environments."""
+"""Gymnasium environments, single and vector: checkers, `SyncVectorEnv`, options, episodes."""
+
+import dataclasses
+import pickle
+import warnings
 
 import numpy as np
 import pytest
+import torch
 
 import drone_rl
+from drone_rl.sim.tasks import Task
+from drone_rl.sim.tasks.task import EndReason
 from drone_rl.utils.errors import InputError
+from tests.second_task import Posts
 
 gymnasium = pytest.importorskip("gymnasium", minversion="1.1", reason="Gymnasium is not installed")
-from gymnasium.vector import AutoresetMode  # noqa: E402 (after the skip)
+
 
 NAME = "drone_rl/CollectCubes-v0"
+
+
 SHORT = {"num_cubes": 1, "first_distance": 3.0, "step_limit": 5, "front_margin": 3.0}
+
+
 COUNT = 5
 
 
@@ -72,7 +84,7 @@ def test_batch_equals_gymnasiums_sync_vector_env(make, mode, observations):
 
 
 def test_disabled_autoreset_requires_a_reset(make):
-    ours = make(autoreset_mode=AutoresetMode.DISABLED, **SHORT)
+    ours = make(autoreset_mode=gymnasium.vector.AutoresetMode.DISABLED, **SHORT)
     sync = {"vectorization_mode": "sync", "vector_kwargs": {"autoreset_mode": "Disabled"}}
     theirs = make(**sync, **SHORT)
     assert_same(ours.reset(seed=0), theirs.reset(seed=0))
@@ -104,18 +116,6 @@ def test_render_returns_frames_from_behind(make):
     assert [frame.shape for frame in env.render()] == [(360, 640, 3)] * 2
     with pytest.warns(UserWarning, match="render_mode='rgb_array'"):
         assert make(2).render() is None
-
-
-def test_gymnasium_wrappers_work(make):
-    env = gymnasium.wrappers.vector.RecordEpisodeStatistics(
-        make(**SHORT, autoreset_mode="SameStep")
-    )
-    env.reset(seed=0)
-    lengths = []
-    for _ in range(12):
-        *_, info = env.step(np.zeros(COUNT, int))
-        lengths += info["episode"]["l"][info["_episode"]].tolist() if "episode" in info else []
-    assert lengths and set(lengths) <= {2, 4, 5}
 
 
 @pytest.mark.parametrize(
@@ -151,14 +151,123 @@ def test_invalid_calls_raise(make):
     env.close()
 
 
-def test_step_starts_environments_that_were_never_reset(make):
-    env = make(2, observations="state", **SHORT)
-    env.reset(seed=0, options={"reset_mask": np.array([True, False])})
-    *_, info = env.step([0, 0])
-    assert info["drone"][:, 0].tolist() == [1.0, 0.0]
-
-
 def test_class_accepts_settings():
     env = drone_rl.DroneWorlds(2, drone_rl.TaskSettings(num_cubes=2), step_limit=100)
     assert env.reset(seed=0)[1]["collected"].shape == (2, 2)
+    env.close()
+
+
+WIDE = {"width": 64, "height": 64}
+
+
+@pytest.fixture
+def make_one():
+    envs = []
+
+    def build(**options):
+        envs.append(gymnasium.make(NAME, **options))
+        return envs[-1]
+
+    yield build
+    for env in envs:
+        env.close()
+
+
+def put(env, lateral):
+    """Set the lateral positions of the cubes of the running episode in meters to the left."""
+    env.unwrapped.batch.worlds.state.cubes[0, :, 1] = lateral
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"observations": "state"}, {"render_mode": "rgb_array"}, {"num_cubes": 1}]
+)
+def test_gymnasiums_checker_passes(make_one, options):
+    from gymnasium.utils.env_checker import check_env
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(make_one(**options).unwrapped)
+
+
+def test_gymnasiums_checker_passes_for_a_user_task():
+    from gymnasium.utils.env_checker import check_env
+
+    gymnasium.register("posts-v0", entry_point="drone_rl:DroneWorld", kwargs={"task": Posts()})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(gymnasium.make("posts-v0").unwrapped)
+    del gymnasium.registry["posts-v0"]
+
+
+@pytest.mark.parametrize("options", [{"observations": "state"}, {"camera": WIDE}])
+def test_stable_baselines3s_checker_passes(make_one, options):
+    reason = "Stable-Baselines3 is not installed"
+    checker = pytest.importorskip("stable_baselines3.common.env_checker", reason=reason)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        checker.check_env(make_one(**options).unwrapped)
+
+
+def test_collecting_all_cubes_terminates_with_success(make_one):
+    env = make_one(num_cubes=1, first_distance=3.0, front_margin=5.0)
+    seen, info = env.reset(seed=0)
+    put(env, 0.0)
+    assert (seen.shape, seen.dtype, info["cubes"].tolist()) == ((25, 64, 3), np.uint8, [0])
+    assert env.step(0)[1:4] == (0.0, False, False)
+    _, reward, terminated, truncated, info = env.step(0)  # 2 m ahead; contact starts at 1.65 m
+    assert (reward, terminated, truncated) == (1.0, True, False)
+    assert (info["is_success"], info["collected"].tolist()) == (True, [True])
+    ends = env.unwrapped.batch.worlds.task.ends
+    assert ends(info["end_reason"]) == ends.ALL_CUBES
+    with pytest.raises(InputError, match=r"needs a running episode; call reset\(\) first"):
+        env.step(0)
+    env.reset()
+    env.step(0)
+
+
+def test_episodes_depend_only_on_the_seed(make_one):
+    def episodes(env, seed):
+        first = env.reset(seed=seed)[1]["cube_positions"]
+        return first, env.reset()[1]["cube_positions"]
+
+    one, two = make_one(), make_one(observations="state")
+    assert np.array_equal(episodes(one, 5), episodes(two, 5))
+    assert not np.array_equal(*episodes(one, 5))
+    assert not np.array_equal(episodes(one, 5), episodes(one, 6))
+    unseeded = [make_one().reset()[1]["cube_positions"] for _ in range(2)]
+    assert not np.array_equal(*unseeded)
+
+
+def test_returned_arrays_are_copies(make_one):
+    env = make_one(observations="state")
+    seen, info = env.reset(seed=1)
+    seen[:], info["cube_positions"][:], info["collected"][:] = 7.0, 7.0, True
+    again = env.step(0)[4]
+    assert again["cube_positions"][0, 0] == 15.0 and not again["collected"].any()
+
+
+def test_second_close_is_allowed_and_spec_recreates_the_environment(make_one):
+    env = make_one(num_cubes=2, camera={"width": 32})
+    assert gymnasium.make(env.spec).observation_space.shape == (25, 32, 3)
+    assert pickle.loads(pickle.dumps(env.spec)) == env.spec
+    assert "num_cubes" in env.spec.to_json()
+    env.close()
+    env.close()
+
+
+class Far(Task):
+    name = "far"
+
+    def sample(self, random_state):
+        return torch.tensor(random_state.uniform(2.0, 4.0), dtype=torch.float64)
+
+    def step(self, state, body):
+        end = (body.position[:, 0] > state.sampled).long() * EndReason.SUCCESS
+        new = dataclasses.replace(state, body=body, steps=state.steps + 1, end_reason=end)
+        return new, end.double()
+
+
+def test_a_task_that_samples_one_number_is_observed():
+    env = drone_rl.DroneWorld(task=Far(), observations="state")
+    assert env.reset(seed=0)[0].shape == env.observation_space.shape
     env.close()

@@ -1,4 +1,4 @@
-"""Options of the batch, and observations of environments in given states."""
+"""Options of the batch, spaces and actions, and observations of environments in given states."""
 
 import itertools
 
@@ -6,14 +6,19 @@ import numpy as np
 import pytest
 import torch
 
-import drone_rl
 from drone_rl.config import CameraSettings, TaskSettings
+from drone_rl.sim.actions import MOVES, Entry
 from drone_rl.utils.errors import InputError
 from tests.fake_flight import FLIGHT, floating
 from tests.second_task import Posts
 
-pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
-from drone_rl.envs.gymnasium.world_batch import WorldBatch
+spaces = pytest.importorskip("gymnasium.spaces", reason="Gymnasium is not installed")
+from drone_rl.envs.gymnasium.world_batch import (  # noqa: E402 (after the skip)
+    WorldBatch,
+    action_space,
+    read_action,
+    vector_space,
+)
 
 TASK = "collect_cubes"
 
@@ -42,15 +47,9 @@ def test_options_set_task_and_camera(task):
             r"; did you mean num_cubes\?$",
         ),
         ({"num_cubes": 0}, "num_cubes=0 is out of range"),
-        ({"step_limit": 5}, "step_limit=5 ends every episode"),
-        ({"observations": "depth"}, "observations='depth' is unknown; give pixels, state"),
         ({"render_mode": "human"}, "render_mode='human' is unknown; give rgb_array"),
         ({"camera": {"fov": 3}}, "camera.fov is unknown; valid names: width"),
-        ({"camera": {"width": 0}}, "camera.width=0 is out of range"),
-        (
-            {"camera": 64},
-            "camera=64 is no CameraSettings; give drone_rl.config.camera.CameraSettings",
-        ),
+        ({"camera": 64}, "camera=64 is no CameraSettings"),
         ({"device": "tpu"}, "device=tpu is unknown"),
     ],
 )
@@ -63,17 +62,6 @@ def test_task_without_settings_rejects_task_options():
     assert WorldBatch(1, Posts(), {}).worlds.task.name == "posts"
     with pytest.raises(InputError, match=r"^unexpected keyword argument 'num_cubes'; valid names"):
         WorldBatch(1, Posts(), {"num_cubes": 2})
-
-
-def test_episodes_depend_only_on_the_streams():
-    stage, (one, two) = WorldBatch(2, TASK, {"observations": "state"}), streams(3, 4)
-    stage.reset(torch.arange(2), [one, two])
-    first = stage.info()["cube_positions"]
-    again = streams(4)[0].uniform(-1, 1, (3, 2))[:, 0] * 6
-    np.testing.assert_allclose(first[1, :, 1], again, rtol=1e-6)
-    stage.reset(torch.tensor([1]), [two])
-    after = stage.info()["cube_positions"]
-    assert np.array_equal(after[0], first[0]) and not np.array_equal(after[1], first[1])
 
 
 def test_state_observation_concatenates_the_true_state():
@@ -103,34 +91,6 @@ def test_state_observation_concatenates_the_true_state():
     assert (info["end_reason"].tolist(), info["is_success"].tolist()) == ([0], [False])
 
 
-def test_pixels_equal_the_batched_environment():
-    stage, env = WorldBatch(2, TASK, {}), drone_rl.make_env(2, transforms=())
-    env.reset()
-    stage.worlds.state = env.base_env.worlds.state
-    assert np.array_equal(stage.observe(), env.base_env.last_pixels.numpy())
-    assert stage.observe() is not stage.observe()
-    env.close()
-
-
-def test_terminated_and_truncated_are_distinguished():
-    stage = WorldBatch(4, TASK, {})
-    ends = stage.worlds.task.ends
-    stage.worlds.state.end_reason = torch.tensor(
-        [ends.RUNNING, ends.ALL_CUBES, ends.SIDE_BOUNDARY, ends.STEP_LIMIT]
-    )
-    terminated, truncated = stage.flags()
-    assert terminated.tolist() == [False, True, True, False]
-    assert truncated.tolist() == [False, False, False, True]
-    assert stage.info()["is_success"].tolist() == [False, True, False, False]
-
-
-def test_film_shows_the_drone_from_behind():
-    stage = WorldBatch(2, TASK, {"observations": "state", "render_mode": "rgb_array"})
-    film = stage.film()
-    assert (film.shape, film.dtype) == ((2, 360, 640, 3), np.uint8)
-    assert film[0, :, 320].std() > 10  # sky, drone, ground
-
-
 def test_options_set_dynamics_and_actions(monkeypatch):
     floating(monkeypatch)
     given = {"dynamics": {"mode": "simple_flight"}, "actions": {"move_speed": 1.0}}
@@ -143,3 +103,69 @@ def test_options_set_dynamics_and_actions(monkeypatch):
     ):
         with pytest.raises(InputError, match=f"^{message}"):
             WorldBatch(1, TASK, wrong)
+
+
+class Thrusts:
+    """Actions of two numbers from -1 to 1."""
+
+    names = ("roll", "pitch")
+    entry = Entry((2,), torch.float32, -1.0, 1.0)
+
+
+def test_state_space_concatenates_entries_and_bounds():
+    space = vector_space(
+        {
+            "flags": Entry((2,), torch.bool),
+            "side": Entry((1,), torch.int64, -1, 2),
+            "places": Entry((2, 2), torch.float64),
+        }
+    )
+    most = np.finfo(np.float32).max
+    assert space.low.tolist() == [0, 0, -1, *[-most] * 4]
+    assert space.high.tolist() == [1, 1, 2, *[most] * 4]
+    assert space.dtype == np.float32
+
+
+def test_action_space_is_discrete_or_bounded():
+    assert action_space(MOVES.entry) == spaces.Discrete(3)
+    assert action_space(Entry((2,), torch.int64, 0, 4)) == spaces.MultiDiscrete([5, 5])
+    assert action_space(Thrusts.entry) == spaces.Box(-1, 1, (2,), np.float32)
+
+
+@pytest.mark.parametrize("given", [2, np.int64(2), np.array(2), torch.tensor(2), np.uint8(2)])
+def test_read_action_returns_one_action(given):
+    action = read_action(given, MOVES)
+    assert (action.shape, action.dtype, int(action)) == ((), torch.int64, 2)
+
+
+def test_read_action_returns_one_action_per_environment():
+    assert read_action([0, 2], MOVES, (2,)).tolist() == [0, 2]
+    assert read_action(np.array([[0.5, -1]]), Thrusts(), (1,)).tolist() == [[0.5, -1]]
+
+
+_MOVES = r"one of: 0 forward, 1 left, 2 right$"
+
+
+_BOTH = r"an array of shape \(2,\) of: 0 forward, 1 left, 2 right$"
+
+
+@pytest.mark.parametrize(
+    ("given", "batch", "wanted"),
+    [
+        (3, (), _MOVES),
+        (1.0, (), _MOVES),
+        (None, (), _MOVES),
+        ([0, 3], (2,), _BOTH),
+        ([[0], [1, 2]], (2,), _BOTH),
+    ],
+)
+def test_invalid_actions_raise(given, batch, wanted):
+    with pytest.raises(InputError, match=f"^action=.* is invalid; give {wanted}") as caught:
+        read_action(given, MOVES, batch)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("given", [[0.0, 1.1], [0.0, np.nan], [0.0], 0.5])
+def test_actions_out_of_bounds_raise(given):
+    with pytest.raises(InputError, match=r"shape \(2,\) of: numbers from -1 to 1$"):
+        read_action(given, Thrusts())

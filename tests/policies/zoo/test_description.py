@@ -83,7 +83,6 @@ class Own(SmallCNN):
     ("result", "fault"),
     [
         (lambda _: None, r"returns None for input of shape \(2, 1, 25, 64\)"),
-        (lambda x: (x, 1), "returns a tuple for"),
         (lambda x: x[:, :2], r"returns a Tensor of shape \(2, 2\) .* of shape \(2, 3\)$"),
         (lambda x: x @ x, r"network=own failed in line \d+ of .*\(RuntimeError: mat1 and mat2"),
     ],
@@ -117,9 +116,6 @@ def test_a_registered_network_without_logits_is_named(registered):
     ("result", "fault"),
     [
         (lambda _: None, r"returns None for input .*; return a tensor of shape \(2, C, H, W\)$"),
-        (lambda x: x.mean(-1), r"returns a Tensor of shape \(2, 1, 25\) for input"),
-        (lambda x: x[:1], r"of shape \(1, 1, 25, 64\) .* of shape \(2, 1, 25, 64\)$"),
-        (lambda x: x.numpy(), "returns a ndarray of shape"),
         (lambda x: x.double(), "returns float64"),
         (lambda x: x * float("nan"), "returns values that are not finite"),
         (lambda x: x.nope, r"transform=own failed in line \d+ of .*\(AttributeError: 'Tensor'"),
@@ -181,63 +177,29 @@ def test_image_shape_is_predicted(camera, transforms, shape):
     [
         ("format", "drone_rl checkpoint", "format='drone_rl checkpoint'"),
         ("format_version", 3, "format_version=3"),
-        ("format_version", True, "format_version=True"),
-        ("format_version", ..., "format_version=None"),
         ("more", 1, "missing or unknown: 'more'"),
         ("task", ..., "missing or unknown: 'task'"),
         ("task.num_cubes", 10**9, r"task\.num_cubes=1000000000"),
-        ("task.num_cubes", 3.0, r"num_cubes=3\.0"),
         ("task.num_cubes", True, "num_cubes=True"),
-        ("task.num_cubes", 101, "from 1 to 100"),
-        ("task.step_limit", 0, "step_limit=0"),
-        ("task.step_limit", 100_001, "step_limit=100001"),
         ("task.spacing", float("nan"), "spacing=nan"),
-        ("task.spacing", "${oc.env:HOME}", "spacing='"),
         ("task.spacing", ..., r"task\.spacing is missing"),
         ("task.wind", 1.0, "'wind' is unknown"),
-        ("task.cube_color", [0.1, 0.2], "cube_color"),
         ("task.vertical_bound", 3.0, "fly into the floor"),
         ("camera.width", 4096, "width=4096"),
         ("camera.width", 1024, None),
-        ("camera.horizontal_fov", 171, "horizontal_fov=171"),
         ("transforms", [], "needs floats"),
-        ("transforms", {}, "transforms="),
         ("transforms", [GRAY] * 17, "0 to 16 values"),
         ("transforms", [GRAY, GRAY], "put it first"),
-        ("transforms", [{"name": "crop", "top": 0, "bottom": 9}], "crop needs channels first"),
         ("transforms", [GRAY, {"name": "crop", "top": 9, "bottom": 9}], "9 to 9 of 25"),
-        ("transforms", [GRAY, {"name": "crop", "top": 0, "bottom": 26}], "0 to 26 of 25"),
-        ("transforms", [{"name": "resize", "height": 9, "width": 9}], "resize needs floats"),
-        ("transforms", [{"name": "blur", "width": 1.0}, GRAY], "blur needs floats"),
-        ("transforms", [GRAY, {"name": "blur", "width": 17.0}], r"width=17\.0"),
-        (
-            "transforms",
-            [GRAY, {**DEAD, "count": 26}],
-            r"^transforms\.dead_rows\.count=26: the image has 25 rows",
-        ),
-        (
-            "transforms",
-            [GRAY, {**DEAD, "rows": [25]}],
-            r"^transforms\.dead_rows\.rows=\[25\]: the image has 25 rows",
-        ),
-        (
-            "transforms",
-            [GRAY, {**DEAD, "rows": [3, 3]}],
-            r"^transforms\[1\]\.rows=\[3, 3\] names a row twice",
-        ),
-        ("transforms", [GRAY, {**STACK, "N": 17}], "N=17"),
+        ("transforms", [GRAY, {**DEAD, "count": 26}], "the image has 25 rows"),
+        ("transforms", [GRAY, {**DEAD, "rows": [25]}], "the image has 25 rows"),
+        ("transforms", [GRAY, {**DEAD, "rows": [3, 3]}], "twice"),
         ("transforms", [GRAY, {**STACK, "N": 16}, {**STACK, "N": 16}, {**STACK, "N": 16}], "shape"),
         ("transforms.1.std", 0.0, r"transforms\[1\]\.std=0\.0"),
         ("transforms.0.name", "exec", r"transforms\[0\]\.name='exec' is not registered"),
-        ("transforms.0._target_", "os.system", "'_target_' is unknown"),
         ("network.name", "os.system", "network.name='os.system' is not registered"),
-        ("network.name", ["mlp"], r"network.name=\(list\) is not registered"),
-        ("network.name", ..., "network.name=None is not registered"),
         ("network.hidden", [128] * 9, "0 to 8 values"),
-        ("network.hidden", [4097], r"hidden\[0\]=4097"),
         ("network.hidden", [4096] * 3, "parameters"),
-        ("network.channels", [], "1 to 8 values"),
-        ("network.channels", [513], "513"),
         ("network.patch", 26, "too small"),
         ("network.bias", True, "'bias' is unknown"),
     ],
@@ -259,12 +221,6 @@ def test_number_of_pixels_is_bounded():
         parse({**DEFAULT, "camera": {**camera, "height": 257}, "network": network})
 
 
-@pytest.mark.parametrize("data", [None, [], "text", {}, {1: 2}])
-def test_invalid_descriptions_raise(data):
-    with pytest.raises(InputError):
-        parse(data)
-
-
 def test_parsing_and_loading_compute_nothing(tmp_path):
     """Computing on the meta device would load torch's symbolic algebra, which takes 0.5 s."""
     code = """import sys
@@ -277,12 +233,6 @@ described.load_network({name: torch.zeros(one.shape) for name, one in wanted.ite
 print("sympy" in sys.modules)"""
     done = run_forked(code, cwd=tmp_path)
     assert done.stdout == "False\n", done.stderr
-
-
-def test_frames_multiply_over_stacks():
-    assert parse(DEFAULT).frames == 1
-    stacks = [{"name": "gray"}, {"name": "stack", "N": 2}, {"name": "stack", "N": 3}]
-    assert parse({**DEFAULT, "transforms": stacks}).frames == 6
 
 
 def test_loaded_weights_keep_their_memory_layout():
@@ -335,18 +285,9 @@ def test_dynamics_and_actions_are_written_unless_default():
     [
         ("dynamics", {"mode": "simple_flight"}, r"dynamics\.camera_mount is missing"),
         ("dynamics", {**FLIGHT.values(), "mass": -1.0}, r"dynamics\.mass=-1\.0"),
-        (
-            "dynamics",
-            {**FLIGHT.values(), "mass": 50.0},
-            r"dynamics\.rotor_thrust=.*too small to control",
-        ),
-        ("dynamics", {**FLIGHT.values(), "inertia": [1.0, 1.0, 3.0]}, r"dynamics\.inertia="),
         ("dynamics", {**COMPUTER_VISION.values(), "gusts": 1.0}, r"dynamics\.gusts=1\.0 moves"),
         ("dynamics", {**FLIGHT.values(), "_target_": "os.system"}, "'_target_' is unknown"),
-        ("dynamics", None, "dynamics="),
         ("actions", {**MOVES_SETTINGS.values(), "kind": "eval"}, r"actions\.kind='eval'"),
-        ("actions", {**MOVES_SETTINGS.values(), "move_speed": True}, r"actions\.move_speed=True"),
-        ("actions", [], "actions="),
     ],
 )
 def test_out_of_bounds_dynamics_and_actions_are_named(part, value, message):
@@ -372,21 +313,6 @@ def test_environment_uses_described_or_given_dynamics(monkeypatch):
     turning = Turning()
     assert flown(dynamics=turning) is turning
     assert type(flown(dynamics=COMPUTER_VISION)) is ComputerVision
-
-
-def test_a_loaded_network_has_no_dropout(registered):
-    @register_network("own")
-    class Dropping(PolicyNetwork):
-        def __init__(self, in_shape, num_actions, *, generator=None):
-            layers = OrderedDict(flatten=nn.Flatten(), drop=nn.Dropout(0.5))
-            layers["logits"] = nn.Linear(1600, num_actions)
-            super().__init__(in_shape, layers, lambda *_: None)
-
-    registered(Dropping)
-    described = parse({**DEFAULT, "network": {"name": "own"}})
-    network = described.load_network(described.build_network().state_dict())
-    pixels = torch.ones(1, 1, 25, 64)
-    assert torch.equal(network(pixels), network(pixels))
 
 
 def test_values_that_are_no_weights_survive_loading(registered):

@@ -1,63 +1,255 @@
+"""The cascaded controller for ideal rotors, its step responses, and the goals of actions."""
+
+import math
+
+import numpy as np
 import pytest
 import torch
 
-from drone_rl.sim.dynamics import Goals, Mode
-from drone_rl.sim.dynamics.control import rotor_goals
-from drone_rl.utils.errors import InputError
-from tests.flying import POSITIONS, doubles
-
-FOUR = doubles((1.0, 2.0, 3.0, 4.0))
-
-
-def test_drifts_default_to_zero():
-    assert Goals(POSITIONS, FOUR).drifts.tolist() == [[0, 0, 0, 0]]
-    assert Goals(POSITIONS, FOUR, FOUR).drifts is FOUR
-
-
-def test_rotor_goals_use_rotor_modes():
-    goals = rotor_goals(FOUR)
-    assert goals.modes == (Mode.ROTOR,) * 4 and goals.values is FOUR
-
-
-P, V, A, R, H, T, S = (
-    Mode.POSITION,
-    Mode.VELOCITY,
-    Mode.ANGLE,
-    Mode.RATE,
-    Mode.HEADING_VELOCITY,
-    Mode.THROTTLE,
-    Mode.ROTOR,
+from drone_rl.config import ActionSettings
+from drone_rl.sim.actions import Move
+from drone_rl.sim.dynamics import FlightState, Mode
+from drone_rl.sim.dynamics.control import Moves, Velocities
+from tests.flying import (
+    ANGLES,
+    POSITIONS,
+    VELOCITIES,
+    StepResponse,
+    angles,
+    doubles,
+    hovering,
+    make_goals,
+    quadrotor,
+    trajectory,
 )
+
+RATES = (Mode.RATE, Mode.RATE, Mode.RATE, Mode.POSITION)
+
+
+BARE = (Mode.RATE, Mode.RATE, Mode.RATE, Mode.THROTTLE)
+
+
+HEADS = (Mode.HEADING_VELOCITY, Mode.HEADING_VELOCITY, Mode.RATE, Mode.VELOCITY)
+
+
+def setpoints(modes, *values, yaw=0.0, drift=None, change=None):
+    """Return the rotor setpoints of a drone hovering at (0, 0, 100) in the first tick."""
+    drone = quadrotor(rotor_time_constant=0.0)
+    state = hovering(drone)
+    state.attitude[:] = doubles((math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)))
+    for name, value in (change or {}).items():
+        getattr(state, name)[:] = doubles(value)
+    return drone.fly(state, make_goals(modes, *values, drift=drift), 1).rotors[0].numpy()
+
+
+def control(rotors):
+    """Return the throttle and the control about each axis."""
+    rows = np.array([[1, 1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1], [-1, -1, 1, 1]])
+    return rows @ rotors / 4
+
+
+HOVER = 9.81 / (4 * 4.179446268)
+
+
+def test_rate_goals_are_followed_and_limited():
+    """The gain is 0.25 of the control per rad/s."""
+    np.testing.assert_allclose(
+        control(setpoints(BARE, 0.2, 0.4, 0.6, 0.5)), (0.5, 0.05, 0.1, 0.15), atol=1e-6
+    )
+    spinning = setpoints(BARE, 0.2, 0.4, 0.6, 0.5, change={"angular_velocity": (0.2, 0.4, 0.2)})
+    np.testing.assert_allclose(control(spinning), (0.5, 0.0, 0.0, 0.1), atol=1e-6)
+    np.testing.assert_allclose(
+        control(setpoints(BARE, 90.0, 0.0, 0.0, 0.5))[1]
+        / control(setpoints(BARE, 2.5, 0, 0, 0.5))[1],
+        1.0,
+    )
+    assert control(setpoints(BARE, 0.0, 0.0, -90.0, 0.2))[3] < 0
 
 
 @pytest.mark.parametrize(
-    ("modes", "message"),
+    ("goal", "rotors"),
     [
-        ((T, P, A, P), r"modes\[0\]=.* is unknown; give one of: rate"),
-        ((P, P, P, P), r"modes\[2\]=.* is unknown; give one of: rate, angle, rotor"),
-        ((P, P, A, R), r"modes\[3\]=.* is unknown; give one of: throttle, velocity"),
-        ((S, S, S, P), "modes=rotor, rotor, rotor, position: rotor is for all axes"),
-        ((H, V, A, P), "modes=heading_velocity, velocity, angle, position: the first two go"),
-        ((A, V, A, P), "the first two go together; give both the same"),
-        ((R, A, A, P), "the first two go together"),
+        ((0.4, 0.0, 0.0, 0.5), (0.4, 0.6, 0.6, 0.4)),
+        ((0.0, 0.4, 0.0, 0.5), (0.4, 0.6, 0.4, 0.6)),
+        ((0.0, 0.0, 0.4, 0.5), (0.4, 0.4, 0.6, 0.6)),
+        ((0.04, 0.08, 0.16, 0.5), (0.43, 0.49, 0.53, 0.55)),
+        ((0.8, 0.0, 0.0, 0.0), (0.0, 0.4, 0.4, 0.0)),  # torque without thrust adds thrust
+        ((0.8, 0.0, 0.0, 0.1), (0.0, 0.4, 0.4, 0.0)),
+        ((0.8, 0.0, 0.0, 1.0), (2 / 3, 1.0, 1.0, 2 / 3)),  # 0.8 and 1.2, divided by 1.2
+        ((2.4, 2.4, 2.4, 0.5), (0.0, 1.0, 1.0, 1.0)),  # -1.3, 1.1, ... are shifted and scaled
     ],
 )
-def test_invalid_mode_combinations_raise(modes, message):
-    with pytest.raises(InputError, match=message):
-        Goals(modes, FOUR)
+def test_mixer_assigns_torques_to_rotors(goal, rotors):
+    """Front right, rear left, front left, rear right; a rate of 0.4 sets a torque of 0.1."""
+    np.testing.assert_allclose(setpoints(BARE, *goal), rotors, atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    "modes", [(P, P, A, P), (V, V, R, T), (A, A, R, V), (R, R, A, T), (H, H, R, P)]
-)
-def test_valid_mode_combinations_are_accepted(modes):
-    assert Goals(modes, FOUR).modes == modes
+def test_angle_goals_set_control():
+    """0.1 rad sets 0.625 rad/s, and so 0.15625 of the control."""
+    found = control(setpoints((*ANGLES[:3], Mode.THROTTLE), 0.1, -0.1, 0.05, 0.5))
+    np.testing.assert_allclose(found, (0.5, 0.15625, -0.15625, 0.078125), atol=1e-6)
 
 
-def test_goals_and_drifts_of_wrong_shape_raise():
-    with pytest.raises(InputError, match=r"goals of shape \(4,\) are not \(num_envs, 4\)"):
-        Goals(POSITIONS, FOUR[0])
-    with pytest.raises(InputError, match=r"goals of shape \(1, 3\)"):
-        Goals(POSITIONS, FOUR[:, :3])
-    with pytest.raises(InputError, match=r"drift of shape \(4,\) is not that of the goals"):
-        Goals(POSITIONS, FOUR, torch.zeros(4))
+def test_heading_takes_the_shorter_turn():
+    modes = (*ANGLES[:3], Mode.THROTTLE)
+    assert control(setpoints(modes, 0, 0, -3.0, 0.5, yaw=3.0))[3] > 0.1
+    assert control(setpoints(modes, 0, 0, 3.0, 0.5, yaw=-3.0))[3] < -0.1
+    np.testing.assert_allclose(control(setpoints(modes, 0, 0, 3.0, 0.5, yaw=3.0))[3], 0, atol=1e-6)
+
+
+def test_drifting_heading_sets_its_rate():
+    modes = (*ANGLES[:3], Mode.THROTTLE)
+    found = control(setpoints(modes, 0, 0, 0.0, 0.5, drift=(0, 0, 0.4, 0)))
+    np.testing.assert_allclose(found[3], 0.1, atol=1e-6)
+
+
+SHARE = 0.2 * math.pi / 5.5 * 2.5 * 2.5 * 0.25
+"""Control per m/s: product of the gains of velocity, angle and rate."""
+
+
+@pytest.mark.parametrize("yaw", [0.0, 1.0, -2.5, math.pi])
+def test_velocity_goals_are_in_world_or_heading_frame(yaw):
+    x, y, c, s = 0.3, -0.2, math.cos(yaw), math.sin(yaw)
+    world = control(setpoints(VELOCITIES, x, y, 0.0, 0.0, yaw=yaw))
+    forward, left = c * x + s * y, c * y - s * x
+    np.testing.assert_allclose(world, (HOVER, -SHARE * left, SHARE * forward, 0), atol=1e-6)
+    same = control(setpoints(HEADS, forward, left, 0.0, 0.0, yaw=yaw))
+    np.testing.assert_allclose(same, world, atol=1e-6)
+    moving = {"velocity": (x, y, 0.0)}
+    for modes, goal in ((VELOCITIES, (x, y)), (HEADS, (forward, left))):
+        at_it = control(setpoints(modes, *goal, 0.0, 0.0, yaw=yaw, change=moving))
+        np.testing.assert_allclose(at_it, (HOVER, 0, 0, 0), atol=1e-6)
+
+
+def test_position_goals_set_velocities():
+    """0.5 m ahead sets 0.75 m/s; 1 m up sets 1 m/s, which needs full thrust."""
+    found = control(setpoints(POSITIONS, 0.5, -0.5, 0.0, 100.0))
+    np.testing.assert_allclose(found, (HOVER, 0.75 * SHARE, 0.75 * SHARE, 0), atol=1e-6)
+    found = control(setpoints(POSITIONS, 0.0, 0.0, 0.0, 100.1))
+    np.testing.assert_allclose(found[0], HOVER + 0.5 * 2.0 * 0.1, atol=1e-6)
+    assert control(setpoints(POSITIONS, 0.0, 0.0, 0.0, 101.0))[0] == pytest.approx(1.0)
+
+
+def test_drifting_position_sets_its_velocity():
+    found = control(setpoints(POSITIONS, 0.0, 0.0, 0.0, 100.0, drift=(0.3, -0.2, 0.0, 0.05)))
+    np.testing.assert_allclose(found, (HOVER + 0.05, 0.2 * SHARE, 0.3 * SHARE, 0), atol=1e-6)
+    far = control(setpoints(POSITIONS, 50.0, 0.0, 0.0, 100.0, drift=(50.0, 0.0, 0.0, 0.0)))
+    moving = {"velocity": (6.0, 0.0, 0.0)}
+    fast = control(setpoints(POSITIONS, 50.0, 0, 0, 100.0, drift=(50.0, 0, 0, 0), change=moving))
+    assert far[2] > 0.1 and fast[2] == pytest.approx(0.0, abs=1e-6)  # the limit is 6 m/s
+
+
+def test_rotor_goals_bypass_controllers():
+    every = (Mode.ROTOR,) * 4
+    np.testing.assert_allclose(
+        setpoints(every, 0.1, 0.2, 0.3, 0.4), (0.1, 0.2, 0.3, 0.4), atol=1e-7
+    )
+
+
+STEPS = {  # modes, goal, axis, quantity, rise time, overshoot
+    "rate": (RATES, (0, 0, 1.0, 100.0), 2, "rates", 0.6, 0.01),
+    "angle": (ANGLES, (0.3, 0, 0, 100.0), 0, "angles", 0.6, 0.02),
+    "velocity": (VELOCITIES, (2.0, 0, 0, 0), 0, "speed", 3.0, 0.05),
+    "climb": (VELOCITIES, (0, 0, 0, 1.0), 2, "speed", 1.0, 0.2),
+    "position": (POSITIONS, (2.0, 0, 0, 100.0), 0, "place", 3.5, 0.33),
+    "height": (POSITIONS, (0, 0, 0, 101.0), 2, "place", 3.5, 0.1),
+}
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_step_responses(name):
+    modes, goal, axis, what, rise, overshoot = STEPS[name]
+    drone = quadrotor()
+    states = trajectory(drone, hovering(drone), make_goals(modes, *goal), 3300, 3)
+    read = {
+        "rates": lambda s: s.angular_velocity,
+        "angles": angles,
+        "speed": lambda s: s.velocity,
+        "place": lambda s: s.position,
+    }[what]
+    values = torch.cat([read(s) for s in states]).numpy()[:, axis]
+    start = 100.0 if name == "height" else 0.0
+    wanted = 1.0 if name in ("rate", "climb", "height") else max(goal[:3])
+    response = StepResponse(values - start, wanted, tick=0.009)
+    assert 0.0 < response.rise < rise
+    assert response.overshoot < overshoot
+    assert response.settling_time(0.05) < 2.0 * rise
+
+
+def test_limits_hold_for_random_goals():
+    """60 drones with random goals stay near the limits of the controllers."""
+    drone, source = quadrotor(), np.random.default_rng(0)
+    state = hovering(drone, count=60)
+    most = np.zeros(4)
+    for _ in range(10):
+        values = torch.tensor(source.uniform(-20, 20, (60, 4)))
+        values[:, 2] /= 7
+        values[:, 3] += 100
+        goals = make_goals(POSITIONS, 0, 0, 0, 0, count=60)
+        goals.values[:] = values
+        for _ in range(10):
+            state = drone.fly(state, goals, 33)
+            tilt = angles(state)[:, :2].abs().max()
+            speed = state.velocity.abs()
+            spin = state.angular_velocity.abs().max()
+            now = [speed[:, :2].max(), speed[:, 2].max(), tilt, spin]
+            most = np.maximum(most, [float(v) for v in now])
+            assert float(state.rotors.min()) >= 0.0 and float(state.rotors.max()) <= 1.0
+    assert not state.is_lost.any()
+    assert most[0] < 6.0 * 1.2 and most[1] < 4.0 * 1.6
+    assert most[2] < math.pi / 5.5 * 1.3 and most[3] < 2.5 * 2**0.5 * 1.1
+
+
+def test_reference_after_a_command():
+    state = hovering(quadrotor())
+    state.attitude[:] = doubles((math.cos(0.2), 0.0, 0.0, math.sin(0.2)))
+    goals = make_goals(POSITIONS, 1.0, 2.0, 0.5, 101.0, drift=(0.1, 0.2, 0.3, 0.4))
+    np.testing.assert_allclose(goals.reference_after(2.0, state)[0], (1.2, 2.4, 1.1, 101.8))
+    free = make_goals(VELOCITIES, 1.0, 2.0, 0.5, 1.0)
+    np.testing.assert_allclose(free.reference_after(2.0, state)[0], (0, 0, 0.4, 100), atol=1e-9)
+
+
+MOVES_SETTINGS = ActionSettings(move_speed=4.0, move_lead=0.5)
+
+
+VELOCITY_SETTINGS = ActionSettings(kind="velocity", forward_speed=4, sideways_speed=3, yaw_rate=90)
+
+
+def drones():
+    place = torch.tensor([[1.0, 2.0, 2.5]] * 3, dtype=torch.float64)
+    return FlightState.at_rest(place)
+
+
+def test_move_shifts_the_position_goal():
+    goals = Moves(MOVES_SETTINGS).goals(
+        drones(), torch.tensor([Move.FORWARD, Move.LEFT, Move.RIGHT])
+    )
+    assert goals.modes == (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.POSITION)
+    assert goals.values.tolist() == [[1.0, 2.0, 0.0, 2.5]] * 3
+    assert goals.drifts.tolist() == [[4, 0, 0, 0], [0, 4, 0, 0], [0, -4, 0, 0]]
+
+
+def test_position_goal_stays_within_its_lead():
+    body = drones()
+    body.reference[:] = torch.tensor([[1.3, 9.0, 0.1, 2.5], [-7.0, 1.8, 0.1, 2.5], [1, 2, 0.1, 3]])
+    goals = Moves(MOVES_SETTINGS).goals(body, torch.zeros(3, dtype=torch.int64))
+    expected = [[1.3, 2.5, 0.1, 2.5], [0.5, 1.8, 0.1, 2.5], [1.0, 2.0, 0.1, 3.0]]
+    assert goals.values.tolist() == [pytest.approx(row) for row in expected]
+    assert body.reference[0, 1] == 9.0
+
+
+def test_velocity_actions_use_the_heading_frame_and_keep_height():
+    body = drones()
+    body.reference[:, 3] = 2.0
+    action = torch.tensor([[-1.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.0, -0.5, -2.0]])
+    goals = Velocities(VELOCITY_SETTINGS).goals(body, action)
+    assert goals.modes == (
+        Mode.HEADING_VELOCITY,
+        Mode.HEADING_VELOCITY,
+        Mode.RATE,
+        Mode.POSITION,
+    )
+    turn = math.pi / 2
+    expected = [[0, 0, 0, 2.0], [4, 3, turn, 2.0], [2, -1.5, -turn, 2.0]]
+    assert goals.values.tolist() == [pytest.approx(row) for row in expected]
+    assert goals.drift is None

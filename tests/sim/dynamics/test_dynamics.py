@@ -1,18 +1,33 @@
-"""User-defined dynamics work in batches, dm_control and TorchRL."""
+"""Dynamics without inertia, dynamics of a user, and the choice by settings."""
 
+import math
+
+import numpy as np
 import pytest
 import torch
-from torchrl.envs.utils import check_env_specs
 
-from drone_rl.config import MOVES_SETTINGS, DynamicsSettings
+from drone_rl.config import (
+    COMPUTER_VISION,
+    MOVES_SETTINGS,
+    ActionSettings,
+    DynamicsSettings,
+    TaskSettings,
+)
 from drone_rl.envs import DroneEnv
-from drone_rl.sim.composer_task import make_environment
-from drone_rl.sim.dynamics import ComputerVision, Dynamics, make_dynamics
+from drone_rl.sim.actions import Move
+from drone_rl.sim.continuous_actions import ContinuousActions
+from drone_rl.sim.dynamics import (
+    ComputerVision,
+    Kinematic,
+    Quadrotor,
+    draw_seeds,
+    make_dynamics,
+)
+from drone_rl.sim.dynamics.state import heading_of
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state
-from tests.composer_env import ComposerEnv
 from tests.fake_flight import FLIGHT, Floating, floating
 from tests.second_dynamics import TURN, Turning
 
@@ -43,46 +58,6 @@ def test_camera_turns_with_the_drone():
     worlds.close()
 
 
-def test_dm_control_reaches_the_same_poses():
-    env = make_environment(dynamics=Turning(), pixels=False, random_state=world_random_state(0, 0))
-    worlds = Worlds(1, dynamics=Turning())
-    env.reset()
-    worlds.reset(torch.arange(1), [world_random_state(0, 0)])
-    assert env.action_spec().num_values == 5
-    for action in (0, 1, 0, 3, 2, 4, 0):
-        env.step(action)
-        worlds.step(torch.arange(1), torch.tensor([action]))
-        for name, value in vars(worlds.state.body).items():
-            found = getattr(env.task.state.body, name)
-            torch.testing.assert_close(found, value, atol=1e-12, rtol=0, msg=name)
-    position, attitude = env.task.drone.get_pose(env.physics)
-    torch.testing.assert_close(torch.tensor(position)[None], worlds.state.body.position)
-    torch.testing.assert_close(torch.tensor(attitude)[None], worlds.state.body.attitude)
-
-
-def test_torchrl_specs_follow_the_dynamics():
-    env = DroneEnv(2, dynamics=Turning())
-    check_env_specs(env)
-    assert env.action_spec.space.n == 5
-    state = env.reset()
-    after = env.step(state.set("action", torch.tensor([1, 0])))["next", "info"]
-    torch.testing.assert_close(
-        after["attitude"], torch.tensor([[0.5**0.5, 0, 0, 0.5**0.5], [1, 0, 0, 0]])
-    )
-    torch.testing.assert_close(after["drone"][:, :2], torch.tensor([[0.0, 0.2], [0.2, 0.0]]))
-    env.close()
-    single = make_environment(dynamics=Turning(), pixels=False, random_state=0)
-    assert ComposerEnv(single).action_spec.space.n == 5
-
-
-def test_base_class_has_defaults():
-    class Static(Dynamics):
-        pass
-
-    static = Static()
-    assert (static.mount, static.is_random, static.needs_obstacles) == ("body", False, False)
-
-
 def test_random_dynamics_are_seeded_by_the_environments_stream():
     gusty = Floating(FLIGHT.replace(gusts=1.0), MOVES_SETTINGS)
     calm = Floating(FLIGHT, MOVES_SETTINGS)
@@ -102,16 +77,6 @@ def test_random_dynamics_are_seeded_by_the_environments_stream():
     assert worlds.start(states["calm"].cubes).body.seed.tolist() == [0, 0]
 
 
-def test_dm_control_samples_the_same_seed():
-    gusty = Floating(FLIGHT.replace(gusts=1.0), MOVES_SETTINGS)
-    env = make_environment(dynamics=gusty, pixels=False, random_state=world_random_state(0, 0))
-    env.reset()
-    worlds = Worlds(1, dynamics=gusty)
-    worlds.reset(torch.arange(1), [world_random_state(0, 0)])
-    assert torch.equal(env.task.state.body.seed, worlds.state.body.seed)
-    assert worlds.state.body.seed.item() > 0
-
-
 @pytest.mark.parametrize("mount", ["gimbal", "body"])
 def test_gimbal_keeps_cameras_level(mount):
     dynamics = Floating(FLIGHT.replace(camera_mount=mount), MOVES_SETTINGS)
@@ -122,27 +87,6 @@ def test_gimbal_keeps_cameras_level(mount):
     shown = worlds.poses(worlds.state).attitude
     torch.testing.assert_close(shown, level if mount == "gimbal" else tilted)
     torch.testing.assert_close(worlds.state.body.attitude, tilted)
-    env = make_environment(dynamics=dynamics, pixels=False, random_state=0)
-    env.reset()
-    env.step(0)
-    torch.testing.assert_close(env.task.state.body.attitude, tilted)
-    attitude = torch.tensor(env.task.drone.get_pose(env.physics)[1])[None]
-    torch.testing.assert_close(attitude, shown)
-    env.task.drone.set_pose(env.physics, [0.0, 0.0, 2.5], [0.0, 0.0, 0.0, 1.0])
-    env.step(0)  # after setting the attitude
-    assert env.task.state.body.attitude.tolist() == [[0.0, 0.0, 0.0, 1.0]]
-
-
-def test_settings_are_accepted_in_place_of_dynamics(monkeypatch):
-    floating(monkeypatch)
-    windy = FLIGHT.replace(wind=(1.0, 0.0, 0.0))
-    for made in (
-        Worlds(1, dynamics=windy).dynamics,
-        DroneEnv(1, dynamics=windy, pixels=False).worlds.dynamics,
-        make_environment(dynamics=windy, pixels=False).task.dynamics,
-    ):
-        assert isinstance(made, Floating) and made.settings == windy
-        assert made.action_settings == MOVES_SETTINGS
 
 
 def test_lost_drone_ends_only_its_own_episode():
@@ -161,3 +105,98 @@ def test_values_of_another_type_are_named():
             make_dynamics(ComputerVision, wrong)  # pyright: ignore[reportArgumentType]
     with pytest.raises(InputError, match=r"^actions='moves'"):
         make_dynamics(ComputerVision, None, "moves")  # pyright: ignore[reportArgumentType]
+
+
+TASK = CollectCubes(TaskSettings(step_length=0.5))
+
+
+VELOCITY = ActionSettings(kind="velocity")
+
+
+@pytest.mark.parametrize("dynamics", [None, COMPUTER_VISION, DynamicsSettings(mass=0.5)])
+@pytest.mark.parametrize("actions", [None, MOVES_SETTINGS, ActionSettings(move_speed=1.0)])
+def test_computer_vision_moves_use_the_tasks_step(dynamics, actions):
+    made = make_dynamics(TASK.make_dynamics, dynamics, actions)
+    assert type(made) is ComputerVision and made.step_length == 0.5
+    assert (made.mount, made.is_random, made.needs_obstacles) == ("body", False, False)
+
+
+def test_quadrotor_uses_dynamics_and_action_settings(monkeypatch):
+    floating(monkeypatch)
+    slow = ActionSettings(move_speed=1.0)
+    made = make_dynamics(TASK.make_dynamics, FLIGHT, slow)
+    assert isinstance(made, Floating) and (made.settings, made.action_settings) == (FLIGHT, slow)
+    assert make_dynamics(TASK.make_dynamics, FLIGHT).action_settings == MOVES_SETTINGS
+
+
+def test_computer_vision_velocities_last_one_control_step():
+    made = make_dynamics(TASK.make_dynamics, COMPUTER_VISION, VELOCITY)
+    assert type(made) is Kinematic and made.timestep == COMPUTER_VISION.control_timestep
+    assert made.actions == ContinuousActions.of(VELOCITY)
+
+
+def test_velocities_are_supported_by_the_quadrotor():
+    made = make_dynamics(TASK.make_dynamics, FLIGHT, VELOCITY)
+    assert type(made) is Quadrotor and made.actions == ContinuousActions.of(VELOCITY)
+
+
+def test_dynamics_objects_are_used_with_their_actions():
+    turning = Turning()
+    assert make_dynamics(TASK.make_dynamics, turning) is turning
+    with pytest.raises(InputError, match=r"^actions=velocity, but dynamics=Turning brings its own"):
+        make_dynamics(TASK.make_dynamics, turning, VELOCITY)
+
+
+def test_seeds_come_from_each_stream():
+    streams = [np.random.RandomState(i) for i in (3, 4)]
+    seeds = draw_seeds(streams)
+    expected = [np.random.RandomState(i).randint(2**31 - 1) for i in (3, 4)]
+    assert seeds.tolist() == expected and seeds.dtype == torch.int64
+
+
+def test_moves_are_one_meter_forward_left_and_right():
+    body = ComputerVision().start(torch.zeros(3, 3, dtype=torch.float64))
+    moved = ComputerVision().step(body, torch.tensor([Move.FORWARD, Move.LEFT, Move.RIGHT]))
+    assert moved.position.tolist() == [[1, 0, 0], [0, 1, 0], [0, -1, 0]]
+    assert moved.attitude.tolist() == [[1, 0, 0, 0]] * 3
+    assert not moved.velocity.any() and not moved.angular_velocity.any()
+    assert not body.position.any()  # the input is unchanged
+    half = ComputerVision(0.5).step(moved, torch.tensor([Move.LEFT] * 3))
+    assert half.position.tolist() == [[1, 0.5, 0], [0, 1.5, 0], [0, -0.5, 0]]
+
+
+SETTINGS = ActionSettings(kind="velocity", forward_speed=4, sideways_speed=3, yaw_rate=90)
+
+
+def flown(*actions, timestep=0.1):
+    dynamics = Kinematic(SETTINGS, timestep)
+    body = dynamics.start(torch.tensor([[1.0, 2.0, 3.0]], dtype=torch.float64))
+    for action in actions:
+        body = dynamics.step(body, torch.tensor([action], dtype=torch.float32))
+    return body
+
+
+def test_step_length_follows_from_the_velocity():
+    body = flown((0.0, 0.5, 0.0))
+    assert body.position[0].tolist() == pytest.approx([1.2, 2.15, 3.0])  # 2 and 1.5 m/s
+    assert body.velocity[0].tolist() == pytest.approx([2.0, 1.5, 0.0])
+    assert body.attitude.tolist() == [[1, 0, 0, 0]]
+    assert flown((-1.0, 0.0, 0.0)).position.tolist() == [[1.0, 2.0, 3.0]]
+    assert flown((1.0, 0.0, 0.0), timestep=0.5).position[0, 0] == 3.0
+
+
+def test_turn_takes_effect_in_the_next_step():
+    """1 s at 90 degrees/s, then 4 m/s forward, which is world left, and left, which is back."""
+    turned = flown((-1.0, 0.0, 1.0), timestep=1.0)
+    assert turned.angular_velocity[0].tolist() == pytest.approx([0, 0, math.pi / 2])
+    half = math.sqrt(0.5)
+    assert turned.attitude[0].tolist() == pytest.approx([half, 0, 0, half])
+    assert turned.position.tolist() == [[1.0, 2.0, 3.0]]
+    there = flown((-1.0, 0.0, 1.0), (1.0, 1.0, 0.0), timestep=1.0)
+    assert there.position[0].tolist() == pytest.approx([-2.0, 6.0, 3.0])
+
+
+def test_heading_wraps_around():
+    around = flown(*[(-1.0, 0.0, 0.5)] * 8, timestep=1.0)  # 8 times 45 degrees
+    assert heading_of(around.attitude).item() == pytest.approx(0, abs=1e-12)
+    assert heading_of(flown((0, 0, -1.0)).attitude).item() == pytest.approx(-math.radians(9))

@@ -1,21 +1,34 @@
+"""The quadrotor: moves, presets; the single drone and the fused moves, bit for bit."""
+
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+import warp as wp
 import yaml
 
-from drone_rl.config import ActionSettings, DynamicsSettings
+from drone_rl.config import DynamicsSettings
 from drone_rl.sim.actions import Move
-from drone_rl.sim.dynamics import Quadrotor
+from drone_rl.sim.dynamics import FlightState, Obstacles, Quadrotor, SingleQuadrotor
+from drone_rl.sim.dynamics.moves_kernel import (
+    Fleet,
+    camera_attitude,
+    fly_move,
+    is_flying,
+    is_lost,
+    make_fleet,
+)
+from drone_rl.sim.dynamics.state import twist_about_z
+from drone_rl.sim.rendering.devices import start_warp
 from tests.flying import (
     POSITIONS,
+    VELOCITIES,
     angles,
     doubles,
     hovering,
     make_goals,
     quadrotor,
-    settings,
     trajectory,
 )
 
@@ -40,28 +53,6 @@ def test_moves_shift_the_reference():
     torch.testing.assert_close(moved.reference, doubles(*expected))
     assert moved.position[0, 0] > 0 and moved.position[1, 1] > 0 > moved.position[2, 1]
     assert not state.position[:, :2].any() and moved.ticks.tolist() == [33] * 3
-
-
-def test_lead_of_the_reference_is_limited():
-    drone = Quadrotor(settings(), ActionSettings(move_lead=0.25))
-    state = hovering(drone)
-    state.reference[0, 0] = 10.0
-    assert drone.steering.goals(state, torch.tensor([0])).values[0].tolist() == [0.25, 0, 0, 100]
-
-
-def test_ten_moves_forward_reach_cruise_speed():
-    drone = quadrotor()
-    state = hovering(drone)
-    for _ in range(30):
-        state = drone.step(state, torch.tensor([Move.FORWARD]))
-    assert state.velocity[0, 0].item() == pytest.approx(4.0, rel=0.15)
-    assert state.position[0, 1:].tolist() == pytest.approx([0.0, 100.0], abs=0.05)
-
-
-def test_properties_of_the_quadrotor():
-    drone = quadrotor(camera_mount="body")
-    assert drone.mount == "body" and drone.needs_obstacles and not drone.is_random
-    assert drone.actions.entry.high == 2
 
 
 def test_empty_batch_is_supported():
@@ -105,3 +96,96 @@ def test_gpu_equals_cpu():
     there = type(goals)(moved.modes, moved.values.cuda())
     away = drone.fly(type(state)(state.numbers.cuda()), there, 330)
     torch.testing.assert_close(away.numbers.cpu(), here.numbers, atol=1e-3, rtol=0)
+
+
+WINDY = DynamicsSettings(mode="simple_flight", wind=(3.0, -1.0, 0.0), gusts=1.0)
+
+
+def boxes(x, y=0.0, z=1.0):
+    return Obstacles(doubles((x, y, z), (0.0, 90.0, 1.0))[None], (1.0, 1.0, 1.0))
+
+
+def test_states_are_those_of_a_quadrotor():
+    """Goals, ticks and obstacles change on the way; a box is then put where the drone is."""
+    plain, single = Quadrotor(WINDY), SingleQuadrotor(WINDY)
+    one = plain.start(doubles((0.0, 0.0, 1.0)), torch.tensor([5]))
+    other = FlightState(one.numbers.clone())
+    script = [
+        (make_goals(POSITIONS, 1.0, 2.0, 0.5, 3.0), 7, None),
+        (make_goals(POSITIONS, -1.0, 2.0, 0.5, 3.0), 7, None),
+        (make_goals(VELOCITIES, 3.0, 0.0, 0.1, 0.0), 7, boxes(50.0)),
+        (make_goals(VELOCITIES, 3.0, 0.0, 0.1, 0.0), 7, "here"),
+        (make_goals(VELOCITIES, 3.0, 0.0, 0.1, 0.0), 3, "here"),
+        (make_goals(VELOCITIES, 0.0, 1.0, 0.0, 0.0), 7, None),
+    ]
+    touched = False
+    for goals, ticks, place in script:
+        around = boxes(*one.position[0].tolist()) if place == "here" else place
+        for _ in range(40):
+            one = plain.fly(one, goals, ticks, around)
+            other = single.fly(other, goals, ticks, around)
+            touched |= int(one.contact.thing[0]) == 0
+        assert torch.equal(one.numbers, other.numbers)
+    assert touched
+
+
+def test_states_that_were_returned_stay_as_they_are():
+    single = SingleQuadrotor(WINDY)
+    state = single.start(doubles((0.0, 0.0, 1.0)))
+    goals = make_goals(POSITIONS, 5.0, 0.0, 0.0, 1.0)
+    first = single.fly(state, goals, 7)
+    kept = first.numbers.clone()
+    single.fly(first, goals, 7)
+    assert torch.equal(first.numbers, kept)
+
+
+start_warp("cpu")
+
+
+@wp.kernel(enable_backward=False, module="unique")
+def moved(
+    fleet: Fleet,
+    action: int,
+    places: wp.array(dtype=wp.vec3d),
+    turns: wp.array(dtype=wp.vec4),
+    flags: wp.array(dtype=int),
+) -> None:
+    world = wp.tid()
+    if is_flying(fleet):
+        places[world] = fly_move(fleet, world, action)
+        turns[world] = camera_attitude(fleet, world)
+        if is_lost(fleet, world):
+            flags[world] = 1
+
+
+@pytest.mark.parametrize("mount", ["gimbal", "body"])
+def test_moves_equal_quadrotor_steps(mount):
+    settings = DynamicsSettings(mode="simple_flight", camera_mount=mount, wind=(1.0, -2.0, 0.3))
+    quadrotor = Quadrotor(settings)
+    state = quadrotor.start(torch.tensor([[0.0, 0.0, 2.5], [9.0, -3.0, 4.0]], dtype=torch.float64))
+    fleet = make_fleet(quadrotor, state.numbers.clone())
+    places, turns = torch.zeros(2, 3, dtype=torch.float64), torch.zeros(2, 4)
+    flags = torch.zeros(2, dtype=torch.int32)
+    for action in (0, 0, 1, 2, 2, 1, 0):
+        state = quadrotor.step(state, torch.full((2,), action))
+        given = [wp.from_torch(places, dtype=wp.vec3d), wp.from_torch(turns, dtype=wp.vec4)]
+        inputs = [fleet, action, *given, wp.from_torch(flags)]
+        wp.launch(moved, 2, inputs=inputs, device="cpu")
+        assert torch.equal(places, state.position)
+        assert torch.equal(wp.to_torch(fleet.numbers), state.numbers)
+        seen = state.attitude if mount == "body" else twist_about_z(state.attitude)
+        assert torch.equal(turns, seen.float())
+    assert not flags.any()
+    assert state.attitude[0, 2].abs() > 1e-3  # the drone is tilted, so mounts differ
+
+
+def test_lost_drone_is_flagged():
+    quadrotor = Quadrotor(DynamicsSettings(mode="simple_flight"))
+    state = quadrotor.start(torch.zeros(1, 3, dtype=torch.float64))
+    state.velocity[:] = torch.nan
+    fleet = make_fleet(quadrotor, state.numbers.clone())
+    places, turns = torch.zeros(1, 3, dtype=torch.float64), torch.zeros(1, 4)
+    flags = torch.zeros(1, dtype=torch.int32)
+    given = [wp.from_torch(places, dtype=wp.vec3d), wp.from_torch(turns, dtype=wp.vec4)]
+    wp.launch(moved, 1, inputs=[fleet, 0, *given, wp.from_torch(flags)], device="cpu")
+    assert flags.tolist() == [1] and places.tolist() == [[0.0, 0.0, 0.0]]

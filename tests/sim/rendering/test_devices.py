@@ -1,14 +1,14 @@
-import functools
+"""Devices, the start of Warp, loading of kernels, and worker threads."""
+
 import time
 import types
-from concurrent.futures import ThreadPoolExecutor
 from threading import get_ident
 
 import pytest
 import torch
 
 from drone_rl.sim.rendering import devices
-from drone_rl.sim.rendering.devices import check_device, load_kernels
+from drone_rl.sim.rendering.devices import WorkerPool, check_device, load_kernels
 from drone_rl.utils.errors import InputError
 from tests.forked import run_forked
 
@@ -31,15 +31,6 @@ def test_warp_starts_without_output(tmp_path):
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
-def test_counting_gpus_does_not_print_the_version_of_warp(tmp_path):
-    code = (
-        "import torch; torch.cuda.is_available = lambda: True\n"
-        "from drone_rl.sim.rendering.devices import check_device; check_device('cuda')"
-    )
-    done = run_forked(code, cwd=tmp_path)
-    assert "initialized" not in done.stdout + done.stderr
-
-
 def test_kernels_are_loaded_once_in_a_thread(monkeypatch):
     loaded = []
     monkeypatch.setattr(devices.wp, "load_module", lambda *_, **__: loaded.append(get_ident()))
@@ -51,39 +42,12 @@ def test_kernels_are_loaded_once_in_a_thread(monkeypatch):
     assert loaded[0] != get_ident()
 
 
-def test_compiler_errors_reach_the_caller(monkeypatch):
-    def refuse(*_, **__):
-        raise RuntimeError("no such kernel")
-
-    monkeypatch.setattr(devices.wp, "load_module", refuse)
-    with pytest.raises(RuntimeError, match="no such kernel"):
-        load_kernels(types.ModuleType("kernels")).result()
-
-
 def test_forked_process_reloads_kernels(monkeypatch):
     monkeypatch.setattr(devices.wp, "load_module", lambda *_, **__: None)
     kernels = types.ModuleType("kernels")
     here = load_kernels(kernels)
     monkeypatch.setattr(devices.os, "getpid", lambda: -1)  # as in a fork
     assert load_kernels(kernels) is not here
-
-
-def test_concurrent_requests_load_once(monkeypatch):
-    loaded = []
-    monkeypatch.setattr(devices.wp, "load_module", lambda *_, **__: loaded.append(get_ident()))
-    begin = devices._load_kernels.__wrapped__
-    slow = functools.cache(lambda *key: time.sleep(0.05) or begin(*key))
-    monkeypatch.setattr(devices, "_load_kernels", slow)
-    kernels = types.ModuleType("kernels")
-    with ThreadPoolExecutor(4) as pool:
-        futures = [f.result() for f in [pool.submit(load_kernels, kernels) for _ in range(4)]]
-    assert len({id(future) for future in futures}) == 1
-    assert futures[0].result() is None and len(loaded) == 1
-
-
-def test_warp_reports_only_errors_on_cpu():
-    devices.start_warp("cpu")
-    assert devices.wp.config.log_level >= devices.wp.LOG_ERROR
 
 
 @pytest.mark.parametrize(
@@ -99,3 +63,48 @@ def test_gpus_that_do_not_exist_are_refused(device, message, monkeypatch):
     check_device("cuda:1")
     with pytest.raises(InputError, match=message):
         check_device(device)
+
+
+def spans(pool, first, last):
+    given = []
+    pool.map_spans(first, last, lambda *span: given.append(span))
+    return sorted(given)
+
+
+@pytest.fixture
+def pool():
+    pool = WorkerPool(100, 3)
+    yield pool
+    pool.close()
+
+
+def test_rows_are_split_evenly(pool):
+    assert spans(pool, 10, 17) == [(0, 10, 13), (1, 13, 16), (2, 16, 17)]
+
+
+def test_fewer_rows_than_workers(pool):
+    assert spans(pool, 0, 2) == [(0, 0, 1), (1, 1, 2)]
+    assert spans(pool, 5, 5) == []
+
+
+def test_worker_exceptions_reach_the_caller(pool):
+    def fail(worker, first, last):
+        if worker == 2:
+            raise KeyError(first)
+
+    with pytest.raises(KeyError, match="2"):
+        pool.map_spans(0, 3, fail)
+
+
+def test_the_callers_own_error_is_raised_after_the_others_have_ended(pool):
+    ended = []
+
+    def fail_first(worker, first, last):
+        if worker == 0:
+            raise KeyError(first)
+        time.sleep(0.05)
+        ended.append(worker)
+
+    with pytest.raises(KeyError, match="0"):
+        pool.map_spans(0, 3, fail_first)
+    assert sorted(ended) == [1, 2]

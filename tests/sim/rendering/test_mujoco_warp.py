@@ -1,4 +1,4 @@
-"""Threads and GPUs with MuJoCo Warp; test_renderers tests all else."""
+"""Threads, GPUs and appearances of MuJoCo Warp; test_renderers tests all else."""
 
 from concurrent.futures import ThreadPoolExecutor
 

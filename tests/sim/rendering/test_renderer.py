@@ -1,4 +1,4 @@
-"""A user-defined renderer of one color."""
+"""The choice of a renderer, and a user-defined one of one color."""
 
 import pytest
 import torch
@@ -6,7 +6,8 @@ from torchrl.envs.utils import check_env_specs
 
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
 from drone_rl.explanations.scenes import Scenes, place_target
-from drone_rl.sim.rendering import Appearance
+from drone_rl.sim.rendering import Appearance, Raytracer
+from drone_rl.sim.rendering.mujoco_warp import WarpRenderer
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
@@ -68,3 +69,10 @@ def test_explanations_use_its_images():
     seen = scenes.observe(place_target(scenes, torch.tensor([5.0, 9.0]), torch.zeros(2)))
     assert seen.shape == (2, 1, 25, 64) and len(seen.unique()) == 1
     env.close()
+
+
+def test_default_renderer_is_the_ray_tracer():
+    for options, kind in (({}, Raytracer), ({"renderer": "mujoco_warp"}, WarpRenderer)):
+        worlds = Worlds(1, **options)
+        assert isinstance(worlds.renderer, kind)
+        worlds.close()

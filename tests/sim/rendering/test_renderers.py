@@ -51,13 +51,6 @@ def test_shards_render_the_same_images(worlds, renderer):
     double.close()
 
 
-def test_more_states_than_environments(worlds):
-    index = torch.tensor([0, 1, 2, 0, 1])
-    assert torch.equal(
-        worlds.render(worlds.state[index]), worlds.render(worlds.state)[[0, 1, 2, 0, 1]]
-    )
-
-
 def test_depth_of_the_cube_ahead(worlds):
     state = worlds.state[torch.tensor([0])]
     state.cubes[0, :, 1] = 0.0
@@ -65,16 +58,6 @@ def test_depth_of_the_cube_ahead(worlds):
     # the camera is 0.4 m ahead of the drone's center, the front face 1.25 m before the cube's
     assert depth[0, 12, 32].item() == pytest.approx(15.0 - 1.25 - 0.4, abs=1e-3)
     assert depth[0, 0, 0].item() == 0.0  # sky
-
-
-def test_segmentation_identifies_geoms(worlds):
-    state = worlds.state[torch.tensor([0])]
-    state.cubes[0, :, 1] = 0.0
-    seen = worlds.render(state, worlds.view(modality="segmentation"))[0]
-    name = worlds.scene.model.geom
-    assert name(int(seen[12, 32])).name == "cube_0/geom"
-    assert name(int(seen[24, 32])).name == "floor"
-    assert seen[0, 0].item() == -1
 
 
 @pytest.mark.parametrize("camera", [c.name for c in (*DRONE_CAMERAS, CHASE)])
@@ -112,13 +95,6 @@ def test_drone_is_visible_only_to_the_chase_camera(worlds):
     assert names_seen(worlds, own) == {"floor"}
 
 
-def test_removed_cube_is_not_rendered(worlds):
-    state = worlds.state[torch.tensor([0])]
-    state.collected[:] = True
-    seen = worlds.render(state, worlds.view(modality="segmentation"))
-    assert names_seen(worlds, seen) == {"floor"}
-
-
 def test_invalid_views_raise(worlds):
     with pytest.raises(InputError, match="choose from"):
         worlds.render(worlds.state, worlds.view("no_such_camera"))
@@ -126,13 +102,6 @@ def test_invalid_views_raise(worlds):
         worlds.view(modality="heat")
     with pytest.raises(InputError, match="is more than one image; call render_all"):
         worlds.render(worlds.state, worlds.view(modality=("rgb", "depth")))
-
-
-def test_unsupported_view_raises_one_line(worlds, renderer):
-    view = worlds.view()
-    object.__setattr__(view, "modalities", ("heat",))  # as a view for another renderer
-    with pytest.raises(InputError, match=f"'heat' can't be rendered by {renderer.__name__}; give"):
-        worlds.prepare(view)
 
 
 @pytest.fixture

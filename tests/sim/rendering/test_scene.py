@@ -1,3 +1,5 @@
+"""A compiled model with semantic classes."""
+
 import mujoco
 import numpy as np
 import pytest
@@ -69,8 +71,3 @@ def test_boxes_around_props_are_relative_to_their_positions():
     np.testing.assert_allclose([post.center, post.half_size], [[0, 0, 0], [2, 1, 3]], atol=1e-9)
     assert (pair.name, pair.semantic_class) == ("pair", SemanticClass.TARGET)
     np.testing.assert_allclose([pair.center, pair.half_size], [[2, 0, 0], [3, 1, 2]], atol=1e-9)
-
-
-def test_a_scene_without_props_has_no_boxes():
-    model = mujoco.MjModel.from_xml_string("<mujoco/>")
-    assert Scene(model, (), (), (0.0, 0.0, 1.0)).prop_boxes() == []

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from drone_rl.sim.rendering import textures
 from drone_rl.sim.rendering.textures import PROCEDURAL, levels, load
 from drone_rl.utils.errors import InputError
 
@@ -56,11 +55,6 @@ def test_invalid_image_raises_with_its_name(tmp_path, content, words):
     assert str(path) in str(refused.value) and "checker" in str(refused.value)
 
 
-def test_folder_raises(tmp_path):
-    with pytest.raises(InputError, match="can't be read as an image"):
-        load(str(tmp_path))
-
-
 def test_too_large_image_raises_with_its_size(tmp_path):
     path = tmp_path / "wide.png"
     Image.new("L", (4097, 1)).save(path)
@@ -75,43 +69,3 @@ def test_mip_level_is_the_mean_of_four_texels():
     assert len(rows) == 16 + 4 + 1
     assert rows[16:20].tolist() == [[100, 10, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0]]
     assert rows[20].tolist() == [25, 2, 0]
-
-
-def test_lines_of_the_grid_texture():
-    lines = PROCEDURAL["grid"]()
-    assert (lines == lines.T).all()
-    row = lines[32]  # between lines
-    dark, fine = [*range(4), *range(252, 256)], [63, 64, 127, 128, 191, 192]
-    assert (row[dark] == 0.45).all() and (row[fine] == 0.8).all()
-    assert (np.delete(row, dark + fine) == 1.0).all()
-    assert lines[63, 32] == 0.8 and lines[2, 63] == 0.45
-
-
-def test_courses_of_the_brick_texture():
-    bricks = PROCEDURAL["bricks"]()
-    bright = np.random.RandomState(0).uniform(0.75, 1.0, (8, 4))
-    for course, shift in ((0, 0), (1, 32), (2, 0), (7, 32)):
-        assert (bricks[32 * course : 32 * course + 3] == 0.55).all()
-        row = np.roll(bricks[32 * course + 10], shift)
-        for brick in range(4):
-            assert (row[64 * brick : 64 * brick + 3] == 0.55).all()
-            assert (row[64 * brick + 3 : 64 * brick + 64] == bright[course, brick]).all()
-
-
-def test_spots_are_smooth_and_seamless():
-    spots = textures._stretched(np.array([[0.0, 4.0], [8.0, 12.0]]))
-    assert spots.shape == (256, 256)
-    places = {
-        (0, 0): 0.0, (0, 128): 4.0, (128, 0): 8.0, (128, 128): 12.0,
-        (0, 64): 2.0, (0, 192): 2.0, (64, 0): 4.0, (192, 0): 4.0, (64, 64): 6.0,
-        (0, 32): 4 * 0.15625, (32, 0): 8 * 0.15625,  # 3 / 16 - 2 / 64
-    }  # fmt: skip
-    for (row, column), value in places.items():
-        assert spots[row, column] == pytest.approx(value), (row, column)
-
-
-def test_noise_has_the_configured_mean_and_deviation():
-    noise = PROCEDURAL["noise"]()
-    assert noise.mean() == pytest.approx(0.78, abs=0.02)
-    assert noise.std() == pytest.approx(0.11, abs=0.01)
-    assert 0.0 <= noise.min() < 0.5 and noise.max() == 1.0

@@ -1,19 +1,15 @@
+"""Requests to a renderer, and gray."""
+
 import dataclasses
 
 import pytest
 import torch
 
 from drone_rl.sim.rendering import View
+from drone_rl.sim.rendering.view import LUMA, WEIGHTS, to_gray
 from drone_rl.utils.errors import InputError
 
 VIEW = View(cameras=("drone/front_center",), height=25, width=64)
-
-
-def test_view_is_hashable_and_frozen():
-    assert {VIEW: 1}[View(cameras=("drone/front_center",), height=25, width=64)] == 1
-    assert dataclasses.replace(VIEW, modalities=("depth",)) != VIEW
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        VIEW.height = 3
 
 
 @pytest.mark.parametrize(
@@ -34,28 +30,12 @@ def test_invalid_views_raise(change, message):
         dataclasses.replace(VIEW, **change)
 
 
-@pytest.mark.parametrize(
-    ("modality", "shape", "dtype"),
-    [
-        ("rgb", (5, 2, 25, 64, 3), torch.uint8),
-        ("gray", (5, 2, 25, 64), torch.float32),
-        ("depth", (5, 2, 25, 64), torch.float32),
-        ("distance", (5, 2, 25, 64), torch.float32),
-        ("segmentation", (5, 2, 25, 64), torch.int32),
-        ("normals", (5, 2, 25, 64, 3), torch.float32),
-    ],
-)
-def test_images_have_the_shape_and_type_of_their_modality(modality, shape, dtype):
-    view = dataclasses.replace(VIEW, cameras=("a", "b"), modalities=(modality, "rgb"))
-    images = view.new_images(5)
-    assert set(images) == {modality, "rgb"}
-    assert (tuple(images[modality].shape), images[modality].dtype) == (shape, dtype)
+def test_gray_is_the_luma_with_white_one():
+    colors = torch.tensor([[255, 255, 255], [0, 0, 0], [255, 0, 0], [0, 255, 0], [0, 0, 255]])
+    gray = to_gray(colors.to(torch.uint8))
+    assert gray.dtype == torch.float32
+    assert gray.tolist() == pytest.approx([1.0, 0.0, *LUMA])
 
 
-def test_unsupported_modality_raises():
-    VIEW.check_modalities(object(), {"rgb"})
-    depth = dataclasses.replace(VIEW, modalities=("rgb", "depth"))
-    with pytest.raises(
-        InputError, match=r"modality='depth' can't be rendered by object; give one of: rgb$"
-    ):
-        depth.check_modalities(object(), {"rgb"})
+def test_weights_are_rounded_to_float32():
+    assert torch.tensor(WEIGHTS).tolist() == (torch.tensor(LUMA) / 255.0).tolist() == list(WEIGHTS)

@@ -1,9 +1,11 @@
+"""Sampling at a rate with latency, and noise processes."""
+
 import math
 
 import pytest
 import torch
 
-from drone_rl.sim.sensors.sensor import Sampling
+from drone_rl.sim.sensors.sensor import Sampling, gauss_markov_step, normal, random_walk_step
 
 TICK = 0.003
 
@@ -32,17 +34,6 @@ def test_reading_rate_does_not_depend_on_ticks():
     times = sorted({taken for _, _, taken, _ in seen})
     marks = [math.ceil(k * 20 / 3) * TICK for k in range(151)]
     assert times == pytest.approx(marks, abs=1e-9)
-
-
-def test_last_reading_is_held():
-    held = [round(taken / TICK) for _, _, taken, _ in follow(Sampling(rate=50.0), 14)]
-    assert held == [0] * 7 + [7] * 7 + [14]
-
-
-def test_rate_above_the_ticks_gives_one_reading_per_tick():
-    for time, count, taken, row in follow(Sampling(rate=1000.0), 100):
-        assert taken == row == time
-        assert count == round(time * 1000) + 1
 
 
 def test_delayed_readings_appear_after_their_latency():
@@ -92,3 +83,36 @@ def test_each_drone_has_its_own_clock():
     assert sampling.read(after, later)[0].tolist() == [0.1, 5.0]
     after[torch.tensor([0])] = sampling.start(torch.tensor([7.0], dtype=torch.float64), 1)
     assert sampling.read(after, torch.tensor([7.0, 5.05]).double())[0].tolist() == [-math.inf, 5.0]
+
+
+def generator():
+    return torch.Generator().manual_seed(3)
+
+
+def test_white_noise_has_mean_0_and_deviation_1():
+    drawn = normal(torch.zeros(10_000, 2, dtype=torch.float64), generator())
+    assert drawn.dtype == torch.float64
+    assert abs(drawn.mean().item()) < 0.03 and drawn.std().item() == pytest.approx(1.0, abs=0.02)
+    again = normal(torch.zeros(10_000, 2, dtype=torch.float64), generator())
+    assert torch.equal(drawn, again)
+
+
+@pytest.mark.parametrize("steps", [1, 40])
+def test_random_walk_does_not_depend_on_the_step_size(steps):
+    """The deviation is 2 after 5 s, and twice that after 20 s."""
+    value, stream = torch.zeros(20_000, 1, dtype=torch.float64), generator()
+    seconds = torch.full((20_000,), 20.0 / steps, dtype=torch.float64)
+    for _ in range(steps):
+        value = random_walk_step(value, 2.0, 5.0, seconds, stream)
+    assert value.std().item() == pytest.approx(4.0, rel=0.02)
+
+
+@pytest.mark.parametrize("steps", [1, 40])
+def test_gauss_markov_process_does_not_depend_on_the_step_size(steps):
+    """After one time constant, 37% of the initial 3 and 1 - e^-2 of the variance remain."""
+    value, stream = torch.full((20_000, 1), 3.0, dtype=torch.float64), generator()
+    seconds = torch.full((20_000,), 60.0 / steps, dtype=torch.float64)
+    for _ in range(steps):
+        value = gauss_markov_step(value, 0.5, 60.0, seconds, stream)
+    assert value.mean().item() == pytest.approx(3.0 * 0.36788, abs=0.02)
+    assert value.std().item() == pytest.approx(0.5 * 0.92987, rel=0.02)

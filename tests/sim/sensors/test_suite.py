@@ -1,3 +1,5 @@
+"""All sensors together, their random streams, and collisions."""
+
 import dataclasses
 import math
 
@@ -5,8 +7,17 @@ import pytest
 import torch
 
 from drone_rl.config.sensors import GpsSettings, SensorSettings
-from drone_rl.sim.dynamics.state import GROUND, THING, TIME, BodyState, FlightState
+from drone_rl.sim.dynamics.state import (
+    GROUND,
+    NOTHING,
+    THING,
+    TIME,
+    BodyState,
+    Contact,
+    FlightState,
+)
 from drone_rl.sim.sensors import SensorSuite
+from drone_rl.sim.sensors import suite as collisions
 from drone_rl.utils.errors import InputError
 
 
@@ -69,15 +80,6 @@ def test_contacts_of_quadrotors_are_reported():
     assert suite.read_collision(grounded)[0].contact.thing.item() == GROUND
 
 
-def test_readings_are_copies():
-    """Kernels write into the drone's tensors."""
-    suite, body = SensorSuite(), touching(3, 0.5)
-    state = suite.update(suite.start(body), body, 0.003)
-    before = [part.clone() for part in tensors(state)]
-    body.numbers[:] = 9.0
-    assert all(torch.equal(a, b) for a, b in zip(before, tensors(state), strict=True))
-
-
 def test_noise_depends_only_on_the_seed():
     def flown(**choice):
         suite = SensorSuite(**choice)
@@ -89,26 +91,6 @@ def test_noise_depends_only_on_the_seed():
         assert not same(flown(seed=4), flown(**other))
     with pytest.raises(InputError, match="whole number"):
         SensorSuite(seed=-1)
-
-
-def test_no_samples_are_drawn_between_readings():
-    """The sensors sample at 50 Hz."""
-    suite, others = SensorSuite(), SensorSuite()
-    one, two = suite.start(resting(2)), others.start(resting(2))
-    for _ in range(6):
-        one = suite.update(one, resting(2), 0.003)
-    one, two = suite.update(one, resting(2), 0.003), others.update(two, resting(2), 0.021)
-    readings = (
-        reading(suite, "barometer", one),
-        reading(others, "barometer", two),
-    )
-    assert torch.equal(readings[0].pressure, readings[1].pressure)
-    assert readings[0].time.tolist() == pytest.approx([0.021] * 2)
-    readings = (
-        reading(suite, "magnetometer", one),
-        reading(others, "magnetometer", two),
-    )
-    assert torch.equal(readings[0].field, readings[1].field)
 
 
 def test_sensors_use_separate_random_streams():
@@ -132,3 +114,60 @@ def test_partial_reset_restarts_sensors():
     assert readings.time.tolist() == [-math.inf] * 3
     state = suite.update(state, resting(3), 0.2)
     assert reading(suite, "gps", state).is_valid.tolist() == [True, False, True]
+
+
+def contact(things, times):
+    """Return contacts at distinct positions."""
+    count = len(things)
+    numbers = torch.arange(1.0, count + 1, dtype=torch.float64)
+    up = torch.tensor([[0.0, 0.0, 1.0]], dtype=torch.float64).repeat(count, 1)
+    time = torch.tensor(times, dtype=torch.float64)
+    return Contact(torch.tensor(things), up, up * numbers[:, None], 0.01 * numbers, time)
+
+
+def place(x):
+    return torch.full((2, 3), float(x), dtype=torch.float64)
+
+
+def test_collision_is_kept_until_it_is_read():
+    state = collisions.start_collisions(place(0))
+    assert state.has_collided.tolist() == [False, False]
+    state = collisions.update_collisions(state, contact([NOTHING] * 2, [0.0] * 2), place(1))
+    assert state.has_collided.tolist() == [False, False]
+    touched = contact([NOTHING, 3], [0.0, 0.5])
+    state = collisions.update_collisions(state, touched, place(2))
+    state = collisions.update_collisions(state, touched, place(3))
+    assert state.has_collided.tolist() == [False, True]
+    collision, state = collisions.read_collisions(state)
+    assert collision.has_collided.tolist() == [False, True]
+    assert collision.contact.thing.tolist() == [NOTHING, 3]
+    assert collision.contact.normal[1].tolist() == [0.0, 0.0, 1.0]
+    assert collision.contact.point[1].tolist() == [0.0, 0.0, 2.0]
+    assert collision.contact.depth[1].item() == 0.02
+    assert collision.contact.time[1].item() == 0.5
+    assert collision.position[1].tolist() == [2.0, 2.0, 2.0]
+    again, state = collisions.read_collisions(state)
+    assert again.has_collided.tolist() == [False, False]
+    assert again.contact.thing.tolist() == [NOTHING, 3]
+    state = collisions.update_collisions(state, touched, place(4))
+    assert state.has_collided.tolist() == [False, False]
+
+
+def test_later_contact_with_the_same_object_is_new():
+    state = collisions.update_collisions(
+        collisions.start_collisions(place(0)), contact([GROUND] * 2, [0.0] * 2), place(1)
+    )
+    _, state = collisions.read_collisions(state)
+    state = collisions.update_collisions(state, contact([GROUND] * 2, [0.0, 0.003]), place(2))
+    assert state.has_collided.tolist() == [False, True]
+    assert state.position[:, 0].tolist() == [1.0, 2.0]
+
+
+def test_collisions_are_read_per_drone():
+    state = collisions.update_collisions(
+        collisions.start_collisions(place(0)), contact([1, 2], [0.1] * 2), place(1)
+    )
+    collision, after = collisions.read_collisions(state, torch.tensor([1]))
+    assert collision.contact.thing.tolist() == [2]
+    assert after.has_collided.tolist() == [True, False]
+    assert state.has_collided.tolist() == [True, True]

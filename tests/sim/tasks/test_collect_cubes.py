@@ -1,4 +1,7 @@
+"""Rules, scene, oracle, goals, replay and explanations of cube collection, computed by hand."""
+
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -6,12 +9,21 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drone_rl.config import TaskSettings
+from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.sim.actions import DOWN, MOVES_3D, UP, Move
 from drone_rl.sim.dynamics import BodyState, ComputerVision
-from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason, Side
+from drone_rl.sim.tasks import FailureReplayTask
+from drone_rl.sim.tasks.collect_cubes import (
+    CollectCubes,
+    CubeGoals,
+    EndReason,
+    Side,
+    inflated,
+    turn_towards,
+)
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.seeding import world_random_state
 from tests.fake_flight import FLIGHT, Floating
 
 SETTINGS = TaskSettings()  # contact up to 1.65 m on each axis
@@ -173,12 +185,6 @@ def test_side_is_recorded_when_the_cube_becomes_next():
     assert state.lateral.tolist() == [[5.0, -10.0, -0.5]]  # meters to the left at that time
 
 
-def test_lateral_offset_is_unknown_until_a_cube_is_the_next_one():
-    state = at(5.0, -5.0, 0.5)
-    assert state.lateral[0, 0] == 5.0
-    assert state.lateral[0, 1:].isnan().all()
-
-
 def test_side_is_ahead_up_to_the_contact_distance():
     for y, side in ((1.65, Side.AHEAD), (beyond(1.65), Side.LEFT)):
         for sign in (1, -1):
@@ -227,51 +233,6 @@ def test_lost_drone_ends_only_its_own_episode():
     assert ended.end_reason.tolist() == [EndReason.SIDE_BOUNDARY, EndReason.LOST_CONTROL]
 
 
-def test_collecting_all_cubes_ends_the_episode():
-    state = at(0.0, 0.0)
-    state.collected[:, 0] = True
-    assert fly(state, 24.0, 0.0)[0].end_reason.item() == EndReason.ALL_CUBES
-    state.collected[:], state.passed[:] = False, True
-    assert fly(state, 26.0, 0.0)[0].end_reason.item() == EndReason.RUNNING
-
-
-def test_enumeration_names_are_those_of_files():
-    assert [a.value for a in Move] == [0, 1, 2] and Move(1).name == "LEFT"
-    assert [s.name for s in Side] == ["LEFT", "AHEAD", "RIGHT"]
-    assert [s.value for s in Side] == [0, 1, 2]
-    names = ["RUNNING", "ALL_CUBES", "FRONT_BOUNDARY", "SIDE_BOUNDARY", "STEP_LIMIT"]
-    assert [EndReason(i).name for i in range(5)] == names
-
-
-def test_next_cube_is_the_number_of_cubes_if_none_is_present():
-    state = at(0.0, 0.0, 0.0)
-    for collected, passed, index in (
-        ([0, 0, 0], [0, 0, 0], 0),
-        ([1, 0, 0], [0, 0, 0], 1),
-        ([0, 1, 0], [1, 0, 0], 2),
-        ([0, 1, 0], [0, 0, 0], 0),
-        ([1, 0, 1], [0, 1, 0], 3),
-        ([1, 0, 0], [1, 0, 0], 1),
-    ):
-        state.collected, state.passed = torch.tensor([collected]) > 0, torch.tensor([passed]) > 0
-        assert state.next_cube.tolist() == [index]
-        assert state.present.tolist() == [
-            [not (c or p) for c, p in zip(collected, passed, strict=True)]
-        ]
-
-
-def test_start_state_is_at_the_altitude():
-    cubes = torch.arange(3.0).double()[:, None, None].expand(3, 2, 3)
-    state = CollectCubes(TaskSettings(altitude=4.0)).start(cubes)
-    assert state.drone.tolist() == [[0.0, 0.0, 4.0]] * 3 and state.drone.dtype == torch.float64
-    assert state.cubes[2].unique().tolist() == [2.0]
-    assert state.collected.shape == state.passed.shape == (3, 2)
-    assert not state.collected.any() and not state.passed.any()
-    assert state.collected is not state.passed
-    assert state.steps.tolist() == state.end_reason.tolist() == [0, 0, 0]
-    assert state.to("cpu").side.tolist() == state.side.tolist()
-
-
 def test_samples_follow_the_random_stream_in_order():
     """Samples are lateral and vertical offsets of each cube in turn; published figures use them."""
     task = TaskSettings(vertical_bound=1.0, num_cubes=2)
@@ -280,9 +241,15 @@ def test_samples_follow_the_random_stream_in_order():
     assert CollectCubes(task).sample(np.random.RandomState(5)).tolist() == expected
 
 
-MOVES = st.lists(st.sampled_from(list(Move)), min_size=1, max_size=60)
+MOVE_LISTS = st.lists(st.sampled_from(list(Move)), min_size=1, max_size=60)
+
+
 PLACES = st.lists(st.floats(-6, 6), min_size=1, max_size=3)
+
+
 QUICK = settings(max_examples=30, deadline=None)
+
+
 NEAR = TaskSettings(num_cubes=3, first_distance=4.0, spacing=4.0, front_margin=3.0)
 
 
@@ -297,28 +264,7 @@ def flight(places, moves, task=NEAR):
     return states, rewards
 
 
-@given(PLACES, MOVES)
-@QUICK
-def test_collected_and_passed_are_monotone(places, moves):
-    states, rewards = flight(places, moves)
-    for before, after, reward in zip(states[:-1], states[1:], rewards, strict=True):
-        assert (before.collected <= after.collected).all()
-        assert (before.passed <= after.passed).all()
-        assert not (after.collected & after.passed).any()
-        assert reward == int(after.collected.sum() - before.collected.sum())
-        assert (
-            after.next_cube >= before.next_cube or not after.collected[0, : after.next_cube].all()
-        )
-        known = before.side >= 0
-        assert torch.equal(after.side[known], before.side[known])
-        assert torch.equal(after.lateral[known], before.lateral[known])
-        assert torch.equal(after.side < 0, after.lateral.isnan())
-        seen = torch.arange(len(places)) <= after.next_cube
-        assert torch.equal(after.side >= 0, (before.side >= 0) | seen)
-    assert states[-1].steps.item() == len(moves)
-
-
-@given(PLACES, MOVES)
+@given(PLACES, MOVE_LISTS)
 @QUICK
 def test_mirrored_scenes_with_mirrored_moves_are_mirrored(places, moves):
     swapped = {Move.LEFT: Move.RIGHT, Move.RIGHT: Move.LEFT, Move.FORWARD: Move.FORWARD}
@@ -332,57 +278,6 @@ def test_mirrored_scenes_with_mirrored_moves_are_mirrored(places, moves):
         turned = torch.where(one.side < 0, -1, 2 - one.side)
         assert torch.equal(two.side, turned)
         torch.testing.assert_close(two.drone, one.drone * torch.tensor([1.0, -1.0, 1.0]).double())
-
-
-@given(st.lists(PLACES.filter(lambda p: len(p) == 3), min_size=2, max_size=4), MOVES)
-@QUICK
-def test_environments_are_independent(worlds, moves):
-    alone = [flight(places, moves)[0][-1] for places in worlds]
-    cubes = torch.cat([at(*places, settings=NEAR).cubes for places in worlds])
-    state = CollectCubes(NEAR).start(cubes)
-    for action in moves:
-        state, _ = move(NEAR, state, action)
-    for i, one in enumerate(alone):
-        found, expected = vars(state[torch.tensor([i])]), vars(one)
-        for record in (found, expected):
-            record |= vars(record.pop("body"))
-        for name, value in expected.items():
-            torch.testing.assert_close(found[name], value, equal_nan=True, rtol=0, atol=0)
-
-
-def test_always_left_ends_after_27_steps():
-    state, steps = at(0.0, 0.0, 0.0), 0
-    while state.end_reason.item() == EndReason.RUNNING:
-        state, _ = move(SETTINGS, state, Move.LEFT)
-        steps += 1
-    assert (steps, state.end_reason.item()) == (27, EndReason.SIDE_BOUNDARY)
-
-
-def test_judge_does_not_modify_its_input():
-    state = at(1.0, 0.0, 0.0)
-    fly(state, 14.0, 0.0)
-    assert not state.collected.any()
-    assert state.steps.tolist() == [0]
-    assert state.drone[0, 0] == 0.0
-
-
-def test_states_support_indexing_and_assignment():
-    states = CollectCubes(SETTINGS).start(torch.zeros(3, 3, 3).double())
-    part = states[torch.tensor([2])]
-    part.steps += 7
-    assert states.steps.tolist() == [0, 0, 0]
-    states[torch.tensor([2])] = part
-    assert states.steps.tolist() == [0, 0, 7]
-
-
-def test_episode_beyond_the_step_limit_ends():
-    """The state was saved with a longer limit."""
-    short = TaskSettings(step_limit=40)
-    state = at(5.0, 5.0, 5.0, settings=short)
-    for steps, reason in ((38, 0), (39, EndReason.STEP_LIMIT), (60, EndReason.STEP_LIMIT)):
-        state.steps[:] = steps
-        after, _ = fly(state, 1.0, 0.0, short)
-        assert after.end_reason == reason
 
 
 TALL = TaskSettings(vertical_bound=6.0, altitude=10.0)  # out of bounds beyond 7.65 m up or down
@@ -424,3 +319,190 @@ def test_the_oracle_climbs_once_it_is_lined_up(offset, action):
     assert task.oracle.actions is MOVES_3D
     assert int(task.line_up(drone, cubes, torch.tensor([[0]]))) == action
     assert int(task.line_up(drone, cubes, torch.tensor([[1]]))) == Move.FORWARD
+
+
+TWO_CUBES = CollectCubes(TaskSettings(num_cubes=2, step_length=0.5, altitude=3.0))
+
+
+def start_of_two():
+    drawn = torch.tensor([[[15.0, 1.0, 3.0], [24.0, -2.0, 3.0]]], dtype=torch.float64)
+    origin = torch.tensor([TWO_CUBES.origin], dtype=torch.float64)
+    return TWO_CUBES.start(drawn, TWO_CUBES.make_dynamics().start(origin))
+
+
+def test_info_matches_hand_computed_values():
+    state = start_of_two()
+    info = TWO_CUBES.info(state)
+    assert info["cubes"].tolist() == [[0]] and info["next_cube"].tolist() == [[0]]
+    assert info["side"].tolist() == [[1, -1]] and info["lateral"][0, 0] == 1.0
+    state.collected[0, 0] = True
+    info = TWO_CUBES.info(state)
+    assert info["cubes"].tolist() == [[1]] and info["next_cube"].tolist() == [[1]]
+
+
+def test_distance_classes_follow_from_the_settings():
+    assert CollectCubes(TaskSettings()).sideways_edges() == [1.65, 4.0, 6.0, 9.0]
+    assert CollectCubes(TaskSettings(lateral_bound=3.0)).sideways_edges() == [1.65, 2.5, 3.0, 4.5]
+    assert CollectCubes(TaskSettings(lateral_bound=0.5)).sideways_edges() == [1.65]
+
+
+def test_goals_use_the_last_info():
+    info = {
+        "collected": torch.tensor([[True, False]]),
+        "side": torch.tensor([[2, -1]]),
+        "lateral": torch.tensor([[-3.0, torch.nan]]).double(),
+        "cube_positions": torch.tensor([[[15.0, -3.0, 2.0], [24.0, 1.0, 3.0]]]),
+        "drone": torch.tensor([[30.0, 0.0, 9.0]]),  # it has climbed from 2.5 m
+    }
+    task = CollectCubes(TaskSettings(num_cubes=2))
+    goals = task.score(info)
+    assert goals.reached.tolist() == [[True, False]] and goals.stratum.tolist() == [[2, -1]]
+    assert goals.height.tolist() == [[-0.5, 0.5]] and goals.lateral[0, 0] == -3.0
+    assert goals.world.tolist() == [[15.0, -3.0, 2.0, 24.0, 1.0, 3.0]]
+    found = {(by, value): of.tolist() for by, value, of in task.classes(goals)}
+    assert found["cube", "second"] == [[False, True]]
+    assert found["side", "right"] == [[True, False]] and found["side", "left"] == [[False, False]]
+    assert found["sideways", "1.65 to 4 m"] == [[True, False]]
+    assert not any(by == "height" for by, _ in found)  # all cubes are level
+
+
+F, L, R = Move.FORWARD, Move.LEFT, Move.RIGHT
+
+
+def test_oracle_turns_towards_cubes_beyond_its_tolerance():
+    lateral = torch.tensor([3.0, 0.5, 0.0, -0.5, -3.0, 0.6, torch.nan])
+    assert turn_towards(lateral, 0.5).tolist() == [L, F, F, F, R, L, F]
+
+
+def test_oracle_aligns_with_the_next_cube():
+    """The tolerance is half the contact distance of 1.65 m."""
+    drone = torch.tensor([[0.0, 1.0, 2.5]] * 4)
+    cubes = torch.tensor([[[9.0, 1.8, 2.5], [18.0, 1.9, 2.5]]] * 4)
+    cubes[3, 1, 1] = 0.1
+    following = torch.tensor([[0], [1], [2], [1]])
+    assert CollectCubes().line_up(drone, cubes, following).tolist() == [F, L, F, R]
+
+
+def test_oracle_tolerance_is_at_least_half_a_step():
+    settings = TaskSettings(cube_size=0.3, drone_size=1.7, step_length=1.0, altitude=2.5)
+    drone, near = torch.zeros(1, 3), torch.tensor([[[9.0, 0.49, 0.0]]])
+    first = torch.tensor([[0]])
+    assert CollectCubes(settings).line_up(drone, near, first).tolist() == [F]
+    assert CollectCubes(settings).line_up(drone, near + 0.03, first).tolist() == [L]
+
+
+def test_height_classes_need_varying_heights():
+    none = torch.zeros(1, 1)
+    cube = CubeGoals(none > 0, none.long(), none, none.double(), none.double())
+    level = {by for by, *_ in CollectCubes(TaskSettings(num_cubes=1)).classes(cube)}
+    tall = CollectCubes(TaskSettings(num_cubes=1, vertical_bound=0.6)).classes(cube)
+    assert level == {"cube", "side", "sideways"}
+    assert {by for by, *_ in tall} == level | {"height"}
+
+
+REPLAYED = TaskSettings(num_cubes=2)
+
+
+BOXES = np.array([[[1.0, 2.0], [-6.0, -4.0]], [[3.0, 3.0], [0.0, 0.5]]])
+
+
+class FixedSamples:
+    """A random stream with fixed samples."""
+
+    def __init__(self, *draws):
+        self.draws = list(draws)
+
+    def uniform(self, low=0.0, high=1.0, size=None):
+        drawn = np.array([self.draws.pop(0) for _ in range(int(np.prod(size)))])
+        return low + drawn.reshape(size) * (high - low)
+
+
+ANYWHERE = (0.5, 0.5, 0.75, 0.5)
+"""Samples of y and z of two cubes: y is 0 and 3 m."""
+
+
+def test_placements_match_hand_computed_ones():
+    task = FailureReplayTask(REPLAYED, BOXES, 0.5)
+    left = [
+        task.sample(FixedSamples(*ANYWHERE, chance, which, 0.25, 0.5)).tolist()
+        for chance, which in ((0.6, 0.0), (0.4, 0.49), (0.4, 0.5))
+    ]
+    assert left == [
+        [[15.0, 0.0, 2.5], [24.0, 3.0, 2.5]],
+        [[15.0, 1.25, 2.5], [24.0, -5.0, 2.5]],
+        [[15.0, 3.0, 2.5], [24.0, 0.25, 2.5]],
+    ]
+
+
+def test_extreme_fractions_replay_none_or_all():
+    world = world_random_state(3, 0)
+    never = FailureReplayTask(REPLAYED, BOXES, 0.0).sample(world_random_state(3, 0))
+    assert torch.equal(never, CollectCubes(REPLAYED).sample(world))
+    always = FailureReplayTask(REPLAYED, BOXES, 1.0)
+    y = np.stack([always.sample(world)[:, 1].numpy() for _ in range(200)])
+    is_inside = ((y[:, None] >= BOXES[..., 0]) & (y[:, None] <= BOXES[..., 1])).all(-1)
+    assert is_inside.any(-1).all()
+    assert 60 < is_inside[:, 0].sum() < 140  # boxes are equally frequent, regardless of size
+
+
+def test_inflated_boxes_stay_within_the_placements():
+    reached = inflated(BOXES, 0.5, 6.0)
+    assert reached.tolist() == [[[0.5, 2.5], [-6.0, -3.5]], [[2.5, 3.5], [-0.5, 1.0]]]
+
+
+def test_elsewhere_places_cubes_at_valid_positions():
+    """Positions are in view, from the camera to the distance of the first cube."""
+    task, camera = TaskSettings(vertical_bound=1.0, altitude=4.0), CameraSettings()
+    state = CollectCubes(task).start(torch.zeros(400, 3, 3, dtype=torch.float64))
+    state.drone[:] = torch.tensor([5.0, -2.0, 4.0])
+    state.collected[:, 0] = True
+    moved = CollectCubes(task).elsewhere(state, camera, torch.Generator().manual_seed(0))
+    assert moved.present.all() and state.collected[:, 0].all()
+    assert (moved.cubes[..., 0].diff(dim=1) >= 0).all()  # as in every state, the nearest first
+    ahead, aside, up = (moved.cubes - state.drone[:, None]).flatten(0, 1).unbind(-1)
+    nearest, edge = 1.65 + 2.5, math.tan(math.radians(camera.horizontal_fov / 2))
+    assert nearest <= ahead.min() < nearest + 0.5 and 14.5 < ahead.max() <= 15.0
+    slope = aside / ahead
+    assert -edge <= slope.min() < -0.95 * edge and 0.95 * edge < slope.max() <= edge
+    drawn = torch.stack([ahead, slope, up])[:, slope.abs() < 0.5 * edge]
+    assert (torch.corrcoef(drawn) - torch.eye(3)).abs().max() < 0.2  # independent samples
+    assert abs(slope.mean()) < 0.2 * edge and 11.5 < aside.abs().max() <= 12.0 + 1e-9
+    assert -1.0 <= up.min() < -0.9 and 0.9 < up.max() <= 1.0 and abs(up.mean()) < 0.15
+
+
+THREE_CUBES = CollectCubes()
+
+
+def test_passed_and_collected_cubes_are_absent():
+    """The first is collected and the second passed, so the third is next."""
+    info = {
+        "next_cube": torch.tensor([[2], [0]]),
+        "collected": torch.tensor([[True, False, False], [False] * 3]),
+        "cube_positions": torch.arange(18.0).view(2, 3, 3),
+    }
+    kept = THREE_CUBES.remember(info)
+    assert kept["present"].tolist() == [[False, False, True], [True] * 3]
+    assert kept["next_target"].tolist() == [2, 0]
+    body = BodyState.at_rest(torch.zeros(2, 3, dtype=torch.float64))
+    state = THREE_CUBES.recall({**kept, "step": torch.tensor([7, 0])}, body)
+    assert state.passed.tolist() == [[False, True, False], [False] * 3]
+    assert state.next_cube.tolist() == [2, 0] and state.steps.tolist() == [7, 0]
+    assert state.cubes.dtype == torch.float64 and not state.end_reason.any()
+
+
+def test_needed_action_and_stratum_follow_from_the_offset():
+    """Flying straight ahead touches cubes within 1.65 m."""
+    aside = torch.tensor([3.0, 1.6, -1.6, -3.0])
+    offset = torch.stack([torch.full((4,), 9.0), aside, torch.zeros(4)], -1)
+    assert THREE_CUBES.needed(offset).tolist() == [
+        Move.LEFT,
+        Move.FORWARD,
+        Move.FORWARD,
+        Move.RIGHT,
+    ]
+    assert THREE_CUBES.stratum_at(offset).tolist() == [
+        Side.LEFT,
+        Side.AHEAD,
+        Side.AHEAD,
+        Side.RIGHT,
+    ]

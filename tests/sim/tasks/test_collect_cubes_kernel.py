@@ -8,25 +8,25 @@ from numpy.random import RandomState
 from drone_rl.config import ActionSettings, DynamicsSettings, TaskSettings
 from drone_rl.sim.dynamics import ComputerVision, Obstacles, Quadrotor
 from drone_rl.sim.rendering.devices import start_warp
-from drone_rl.sim.rendering.raytrace.structs_kernel import Poses
+from drone_rl.sim.rendering.raytrace.structs_kernel import PoseArrays
 from drone_rl.sim.tasks import CollectCubes, Pillars
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason, Side
 from drone_rl.sim.tasks.collect_cubes_kernel import (
     EnvArrays,
-    FusedCubes,
     move,
     place,
 )
 from drone_rl.sim.worlds import Worlds
-from tests.sim.tasks.reference_rules import step as reference_step
 
 start_warp("cpu")
+
+
 WORLDS = 60
 
 
 @wp.kernel(enable_backward=False)
 def step(
-    envs: EnvArrays, poses: Poses, actions: wp.array(dtype=int), rewards: wp.array(dtype=float)
+    envs: EnvArrays, poses: PoseArrays, actions: wp.array(dtype=int), rewards: wp.array(dtype=float)
 ) -> None:
     env = wp.tid()
     if envs.end_reasons[env] == 0:
@@ -79,50 +79,71 @@ def test_random_episodes_follow_the_reference_rules(settings, ends):
     assert ends <= seen
 
 
-def test_kernel_state_starts_from_a_copy_of_the_environments():
-    settings = TaskSettings(num_cubes=2, altitude=3.0, vertical_bound=0.5)
-    worlds = Worlds(2, settings)
-    cubes = torch.tensor([[[15.0, 1.0, 3.0], [24.0, -2.0, 3.5]], [[15.0, 0.0, 3.0]] * 2])
-    worlds.state = worlds.start(cubes.double())
-    fused = FusedCubes(settings, worlds.dynamics, 3)
-    for values in (fused.steps, fused.end_reasons, fused.state.collected):
-        values.fill_(1)  # left by a previous batch
-    fused.begin(worlds.state)
-    assert wp.to_torch(fused.arrays.drones)[:2].tolist() == [[0.0, 0.0, 3.0]] * 2
-    assert torch.equal(fused.state.cubes[:2], cubes.double())
-    assert not fused.state.collected[:2].any() and fused.state.collected[2].all()
-    assert fused.steps.tolist() == fused.end_reasons.tolist() == [0, 0, 1]
-    wp.to_torch(fused.arrays.drones).fill_(7.0)
-    assert worlds.state.drone[0].tolist() == [0.0, 0.0, 3.0]
-    assert wp.to_torch(fused.poses.attitudes)[0].tolist() == [1.0, 0.0, 0.0, 0.0]
+def reference_step(settings, state, body):
+    """Return the fields of the state after a step, and the reward."""
+    drone = body.position
+    away = (drone[:, None] - state.cubes).abs().amax(-1)  # (N, C)
+    touched = state.present & (away <= settings.touch_distance)
+    collected = state.collected | touched
+    passed = state.passed | (~collected & (drone[:, None, 0] > state.cubes[..., 0]))
+    side, lateral = sightings(settings, state, drone, ~(collected | passed))
+    x, y, _ = drone.unbind(-1)
+    reason = (
+        torch.zeros_like(state.steps)
+        .masked_fill(state.steps + 1 >= settings.step_limit, EndReason.STEP_LIMIT)
+        .masked_fill(y.abs() > settings.side_bound, EndReason.SIDE_BOUNDARY)
+        .masked_fill(x > settings.front_bound, EndReason.FRONT_BOUNDARY)
+        .masked_fill(collected.all(-1), EndReason.ALL_CUBES)
+        .masked_fill(body.is_lost, EndReason.LOST_CONTROL)
+    )
+    new = {"collected": collected, "passed": passed, "side": side, "lateral": lateral}
+    return {**new, "end_reason": reason}, touched.sum(-1, dtype=torch.float64)
 
 
-def test_other_rules_and_moves_are_unsupported():
-    class Windy(ComputerVision):
-        pass
-
-    class Strict(CollectCubes):
-        def step(self, state, body):
-            return super().step(state, body)
-
-    assert CollectCubes().fused_rules(ComputerVision(), 1) is not None
-    assert CollectCubes().fused_rules(Windy(), 1) is None
-    flight, velocities = DynamicsSettings(mode="simple_flight"), ActionSettings(kind="velocity")
-    assert CollectCubes().fused_rules(Quadrotor(flight), 1) is not None
-    assert CollectCubes().fused_rules(Quadrotor(flight, velocities), 1) is None
-    assert Strict().fused_rules(ComputerVision(), 1) is None
-    assert Pillars().fused_rules(ComputerVision(), 1) is None
+def sightings(settings, state, drone, present):
+    """Return side and lateral offset recorded for each cube up to the next one."""
+    offset = state.cubes[..., 1] - drone[:, None, 1]
+    right = torch.where(offset < -settings.touch_distance, Side.RIGHT.value, Side.AHEAD.value)
+    side = torch.where(offset > settings.touch_distance, Side.LEFT.value, right)
+    next_cube = (~present).long().cumprod(-1).sum(-1)
+    is_new = (state.side < 0) & (torch.arange(side.shape[-1]) <= next_cube[:, None])
+    return torch.where(is_new, side, state.side), torch.where(is_new, offset, state.lateral)
 
 
-def test_tasks_with_other_positions_or_obstacles_are_unsupported():
-    class Raised(CollectCubes):
-        def places(self, state):
-            return super().places(state) + 1.0
+class Windy(ComputerVision):
+    """Other dynamics."""
 
-    class Solid(CollectCubes):
-        def obstacles(self, state):
-            return Obstacles(self.places(state), (1.0, 1.0, 1.0))
 
-    flight = DynamicsSettings(mode="simple_flight")
-    assert Raised().fused_rules(ComputerVision(), 1) is None
-    assert Solid().fused_rules(Quadrotor(flight), 1) is None
+class Strict(CollectCubes):
+    def step(self, state, body):
+        return super().step(state, body)
+
+
+class Raised(CollectCubes):
+    def places(self, state):
+        return super().places(state) + 1.0
+
+
+class Solid(CollectCubes):
+    def obstacles(self, state):
+        return Obstacles(self.places(state), (1.0, 1.0, 1.0))
+
+
+FLIGHT, VELOCITIES = DynamicsSettings(mode="simple_flight"), ActionSettings(kind="velocity")
+
+
+@pytest.mark.parametrize(
+    ("task", "dynamics", "is_supported"),
+    [
+        (CollectCubes, ComputerVision(), True),
+        (CollectCubes, Quadrotor(FLIGHT), True),
+        (CollectCubes, Windy(), False),
+        (CollectCubes, Quadrotor(FLIGHT, VELOCITIES), False),
+        (Strict, ComputerVision(), False),
+        (Raised, ComputerVision(), False),
+        (Solid, Quadrotor(FLIGHT), False),
+        (Pillars, ComputerVision(), False),
+    ],
+)
+def test_only_unchanged_rules_and_moves_are_fused(task, dynamics, is_supported):
+    assert (task().fused_rules(dynamics, 1) is not None) == is_supported

@@ -1,44 +1,19 @@
-"""Functions shared by tasks: hidden props, sides, classes of goals, positions in view."""
+"""Functions shared by tasks: sides, classes of goals, positions in view."""
 
 import math
 
 import pytest
 import torch
 
-from drone_rl.config import CameraSettings, TaskSettings
-from drone_rl.sim.tasks import CollectCubes, Goals
+from drone_rl.config import CameraSettings
+from drone_rl.sim.tasks import Goals
 from drone_rl.sim.tasks.common import (
-    HIDDEN_DEPTH,
     Side,
     interval_classes,
     number_classes,
     place_in_view,
     side_of,
 )
-
-
-def cubes_at(places):
-    task = CollectCubes(TaskSettings(num_cubes=places.shape[1]))
-    return task, task.start(places)
-
-
-def test_absent_props_are_under_the_floor():
-    places = torch.tensor([[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]], dtype=torch.float64)
-    task, state = cubes_at(places)
-    state.collected[0, 1] = True
-    expected = [[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0 - HIDDEN_DEPTH]]]
-    assert task.places(state).tolist() == expected
-
-
-def test_only_the_next_prop_moves_left():
-    places = torch.tensor([[[9.0, 0.0, 0.0], [10.0, 0.0, 0.0]]] * 2, dtype=torch.float64)
-    task, state = cubes_at(places)
-    state.passed[1, 0] = True
-    moved = task.next_moved(state, torch.tensor([1.0, -2.0])).cubes
-    assert moved[..., 1].tolist() == [[1.0, 0.0], [0.0, -2.0]]
-    assert torch.equal(moved[..., [0, 2]], places[..., [0, 2]])
-    assert not places[..., 1].any(), "the input is unchanged"
-    assert task.next_moved(state, 3.0).cubes[..., 1].tolist() == [[3.0, 0.0], [0.0, 3.0]]
 
 
 def test_sides_have_a_tolerance():

@@ -1,6 +1,6 @@
-"""Hand-made fields with rows at x = 9, 16, ...; contact up to 1 m on each axis."""
+"""Rules, lanes, oracle and goals of the pillars: hand-made fields with rows at x = 9, 16, ..."""
 
-import math
+import itertools
 
 import numpy as np
 import pytest
@@ -9,13 +9,11 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from drone_rl.config import CameraSettings, DynamicsSettings, PillarsSettings
+from drone_rl.config import DynamicsSettings, PillarsSettings
 from drone_rl.sim.actions import Move
-from drone_rl.sim.dynamics import BodyState, Quadrotor
-from drone_rl.sim.rendering.scene import SemanticClass
-from drone_rl.sim.tasks import Pillars, as_task
-from drone_rl.sim.tasks.common import Side, side_of
-from drone_rl.sim.tasks.pillars import EndReason, RowGoals
+from drone_rl.sim.dynamics import BodyState, ComputerVision, Quadrotor
+from drone_rl.sim.tasks.common import Side
+from drone_rl.sim.tasks.pillars import EndReason, Pillars, RowGoals
 from drone_rl.sim.tasks.pillars_lanes import Lanes, meets
 from tests.fake_flight import FLIGHT, Floating
 
@@ -42,6 +40,8 @@ def body(x, y):
 
 
 L, A, R = Side.LEFT, Side.AHEAD, Side.RIGHT
+
+
 FAR = (6.0, -6.0)
 """Positions of pillars that leave the center free."""
 
@@ -53,15 +53,6 @@ def fly(settings, state, *places):
         state, reward = Pillars(settings).step(state, body(x, y))
         total += float(reward)
     return state, total
-
-
-def test_enumeration_values_are_those_of_files():
-    ends = (
-        *("RUNNING", "FINISH_LINE", "PILLAR_TOUCHED", "SIDE_BOUNDARY", "STEP_LIMIT"),
-        "LOST_CONTROL",
-    )
-    assert [(e.name, e.value) for e in EndReason] == [(n, i) for i, n in enumerate(ends)]
-    assert [(s.name, s.value) for s in Side] == [("LEFT", 0), ("AHEAD", 1), ("RIGHT", 2)]
 
 
 def test_pillars_are_in_rows(field):
@@ -183,38 +174,6 @@ def test_nearest_lane_has_a_side_and_a_gap(field):
     assert field((7.5, 5.4), FAR, y=7.0).side[0, 0] == R
 
 
-def test_lanes_are_relative_to_the_drone(settings):
-    turns, is_open = Lanes(settings).lanes_from(
-        torch.tensor([[[0.0, 20.0]]]).double(), torch.tensor([0.5]).double()
-    )
-    lanes = (turns + 0.5)[0][is_open[0, 0]]
-    assert lanes.min() == -7.5 and lanes.max() == 7.5
-    assert not ((lanes.abs() <= 1).any())
-
-
-def test_environments_are_independent(settings, field):
-    one, two = field((0.0, 5.0), FAR, x=7.0), field(FAR, FAR, x=7.0)
-    both = Pillars(settings).start(
-        torch.tensor([[(0.0, 5.0), FAR], [FAR, FAR]]).double(), _pair(7.0)
-    )
-    new, reward = Pillars(settings).step(both, _pair(8.0))
-    for i, alone in enumerate((one, two)):
-        expected, earned = Pillars(settings).step(alone, body(8.0, 0.0))
-        assert new.end_reason[i] == expected.end_reason[0] and reward[i] == earned[0]
-        assert torch.equal(new.side[i], expected.side[0])
-
-
-def _pair(x):
-    at = body(x, 0.0)
-    return type(at)(*(torch.cat([v, v]) for v in vars(at).values()))
-
-
-def test_lane_within_half_a_step_is_ahead(settings):
-    for step in (1.0, 0.5):
-        turns = step * torch.tensor([0.75, 0.51, 0.5, 0.0, -0.5, -0.51, -0.75])
-        assert side_of(turns, 0.5 * step).tolist() == [L, L, A, A, A, R, R]
-
-
 TASK = Pillars()
 
 
@@ -236,47 +195,10 @@ def test_absent_pillars_are_ignored(field):
     assert TASK.next_target(TASK.without_next(state)) == 4
 
 
-def test_one_target_places_a_single_pillar(settings):
-    state = Pillars(settings).one_target(body(3.0, 1.0), torch.tensor([[5.0, -2.0, 0.0]]))
-    assert state.pillars[0, 0].tolist() == [8.0, -1.0, 3.0] and state.present.sum() == 1
-
-
-def test_elsewhere_moves_all_pillars_away_from_the_drone(field, settings):
-    state = field((5.0, -2.0), FAR)
-    generator = torch.Generator().manual_seed(0)
-    other = Pillars(settings).elsewhere(state, CameraSettings(), generator)
-    away = other.pillars[..., :2] - state.drone[:, None, :2]
-    assert (away[..., 0] >= settings.touch_distance + settings.width).all()
-    assert (other.pillars[..., 2] == 3.0).all() and other.present.all()
-    assert not torch.isclose(other.pillars, state.pillars)[..., :2].all(-1).any()
-
-
 def test_grid_covers_the_field(settings):
     grid = Pillars(settings).grid(3, 5)
     assert grid.forward.tolist() == [1.5, 5.25, 9.0]
     assert grid.lateral.tolist() == [8.0, 4.0, 0.0, -4.0, -8.0]
-
-
-def test_elsewhere_covers_the_field_of_view(field, settings):
-    """Positions reach from 2.2 m ahead to the second row at 16 m, and 16 m to each side."""
-    state = field((5.0, -2.0), FAR)[torch.zeros(800, dtype=torch.int64)]
-    camera = CameraSettings()
-    found = Pillars(settings).elsewhere(state, camera, torch.Generator().manual_seed(0))
-    away = (found.pillars[..., :2] - state.drone[:, None, :2]).flatten(0, 1)
-    ahead, aside = away.unbind(-1)
-    edge = math.tan(math.radians(camera.horizontal_fov / 2))
-    assert 2.2 <= ahead.min() < 2.3 and 15.9 < ahead.max() <= 16.0
-    slope = aside / ahead
-    assert -edge <= slope.min() < -0.98 * edge and 0.98 * edge < slope.max() <= edge
-    assert 15.5 < aside.abs().max() <= 16.0 + 1e-9 and abs(slope.mean()) < 0.1 * edge
-    near = slope.abs() < 0.4 * edge  # all up to 16 m
-    assert torch.corrcoef(torch.stack([ahead, slope])[:, near])[0, 1].abs() < 0.1
-    assert abs(ahead[near].mean() - (2.2 + 16.0) / 2) < 0.4
-
-
-def test_grid_starts_half_a_step_before_contact(settings):
-    short = settings.replace(step_length=0.5)
-    assert Pillars(short).grid(2, 2).forward.tolist() == [1.25, 9.0]
 
 
 def test_needed_action_turns_away_from_a_pillar_ahead(settings):
@@ -297,19 +219,6 @@ def test_pillar_is_reached_when_passed_untouched(settings, field):
     assert task.is_behind(state, target) and task.is_reached(state, target)
     state.touched[:, 1] = True
     assert task.is_behind(state, target) and not task.is_reached(state, target)
-
-
-def test_tally_counts_rows(settings):
-    passed = torch.tensor([[True, False], [True, True]])
-    reached, missed = Pillars(settings).tally({"passed": passed})
-    assert reached.tolist() == [1, 2] and missed.tolist() == [0, 0]
-
-
-def test_next_target_without_present_pillars_is_their_number(settings, field):
-    task = Pillars(settings)
-    state = task.without_targets(field((5.0, -5.0), (5.0, -5.0)))
-    info = {**task.info(state), "drone": state.drone.float()}
-    assert task.remember(info)["next_target"] == 4
 
 
 def test_classes_of_rows(settings):
@@ -344,70 +253,6 @@ def test_goals_use_the_last_info(settings):
     assert goals.world.tolist() == [[1, 2, 3, 4]] and goals.gap[0, 0] == 1.5
 
 
-def test_baselines_and_scored_entries_exist():
-    task = Pillars()
-    assert (task.name, task.vocabulary.goal, task.vocabulary.target) == ("pillars", "row", "pillar")
-    assert task.success_end == EndReason.FINISH_LINE
-    assert task.expected_end == EndReason.PILLAR_TOUCHED
-    assert task.strata == ("left", "ahead", "right")
-    assert task.oracle.reads == ("drone", "rows", "next_row")
-    assert set(task.blind_baselines) - {"random"} == set(task.make_dynamics().actions.names)
-    assert set(task.scored) <= set(task.entries)
-
-
-def test_there_is_a_prop_for_each_pillar(settings):
-    task = Pillars(settings)
-    props = task.make_props()
-    assert len(props) == 4 and {prop.semantic_class for prop in props} == {SemanticClass.OBSTACLE}
-    assert len({prop.mjcf_model.model for prop in props}) == 4
-
-
-def test_absent_pillars_are_below_the_floor(settings, field):
-    state = field((5.0, -5.0), (5.0, -5.0))
-    state.present[0, 2] = False
-    z = Pillars(settings).places(state)[0, :, 2]
-    assert z.tolist() == [3.0, 3.0, -97.0, 3.0]
-
-
-def test_info_matches_the_entries(settings, field):
-    task = Pillars(settings)
-    info = task.info(field((5.0, -5.0), (1.5, -5.0)))
-    assert set(info) == set(task.entries)
-    for name, entry in task.entries.items():
-        assert (info[name].shape[1:], info[name].dtype) == (entry.shape, entry.dtype), name
-    assert info["rows"].tolist() == [[[5.0, -5.0], [1.5, -5.0]]]
-
-
-def test_fields_are_sampled_from_the_given_stream(settings):
-    task = Pillars(settings)
-    one, two = (task.sample(np.random.RandomState(3)) for _ in range(2))
-    assert one.shape == (2, 2) and torch.equal(one, two) and one.dtype == torch.float64
-
-
-def test_entries_have_bounds(settings):
-    entries = Pillars(settings).entries
-    bounds = {name: (entry.low, entry.high) for name, entry in entries.items()}
-    assert bounds["side"] == (-1, 2)  # unknown, or one of three
-    assert bounds["next_row"] == (0, 2)
-    assert bounds["end_reason"] == (0, 5)
-
-
-def test_vocabulary_covers_sides_and_ends():
-    said = Pillars().vocabulary
-    assert set(said.sides) == set(said.places) == {side.name.lower() for side in Side}
-    assert set(said.ends) == {end.name.lower() for end in EndReason if end}
-    assert not said.follows and said.tested.startswith("4 rows of pillars 1 m wide, 0.25 per")
-    assert said.reaches == "passes" and said.handles == "gets past the pillar"
-    assert said.failing("row", "third") == "at the third row"
-    assert said.failing("gap", "0.8 to 1.8 m") == "at gaps of 0.8 to 1.8 m"
-
-
-def test_settings_create_the_task():
-    task = as_task(PillarsSettings(num_rows=2))
-    assert isinstance(task, Pillars) and task.settings.num_rows == 2
-    assert Pillars().settings == PillarsSettings()
-
-
 def test_a_pillar_that_a_drone_bounces_off_within_a_step_is_touched():
     """It hits at x = 8.2 (0.5 m + 0.3 m from the middle) and is before x = 8.1 at both ends."""
     task, quadrotor = Pillars(), Quadrotor(DynamicsSettings(mode="simple_flight"))
@@ -420,3 +265,109 @@ def test_a_pillar_that_a_drone_bounces_off_within_a_step_is_touched():
     state, reward = task.step(state, after)
     assert state.end_reason == EndReason.PILLAR_TOUCHED
     assert state.touched[0].nonzero().tolist() == [[0]] and float(reward) < -0.49
+
+
+SETTINGS = PillarsSettings(num_rows=3, spread=4.0, density=0.4, width=1.2)
+"""Three pillars per row and nine lanes; contact up to 1 m."""
+LANES = Lanes(SETTINGS)
+
+
+def fewest_turns(rows, y, next_row):
+    """Return, by enumeration, the least lateral distance and the best lanes of the next row."""
+    lanes = LANES.within_field()
+    opened = [lanes[o] for o in LANES.is_open(rows[next_row:])]
+    paths = [np.diff([y, *path]) for path in itertools.product(*opened)]
+    total = [np.abs(path).sum() for path in paths]
+    return min(total), {path[0] for path, t in zip(paths, total, strict=True) if t == min(total)}
+
+
+def test_plan_has_the_fewest_turns():
+    random_state = np.random.RandomState(0)
+    for _ in range(60):
+        rows = LANES.sample_field(random_state)
+        y, row = float(random_state.randint(-4, 5)), random_state.randint(3)
+        turn = LANES.first_sidestep(
+            torch.from_numpy(rows)[None], torch.tensor([y]).double(), torch.tensor([row])
+        )
+        assert float(turn) in fewest_turns(rows, y, row)[1]
+
+
+def test_plan_looks_beyond_the_next_row():
+    # the nearest lanes are right, then far to the left
+    rows = np.array([[0.2, 0.2, 0.2], [-2.0, -1.0, 1.2], [-2.0, -1.0, 1.2]])
+    turn = LANES.first_sidestep(
+        torch.from_numpy(rows)[None], torch.zeros(1).double(), torch.tensor([0])
+    )
+    total, best = fewest_turns(rows, 0.0, 0)
+    assert (total, best) == (3.0, {2.0, 3.0}) and float(turn) in best
+
+
+def test_plan_flies_straight_within_a_row():
+    rows = torch.tensor([[[3.0, 3.0, 3.0], [0.0, 0.0, 0.0], [3.0, 3.0, 3.0]]]).double()
+    drone = torch.tensor([[9.0, 0.0, 2.5], [11.0, 0.0, 2.5]])
+    moves = LANES.fly_through(drone, rows.repeat(2, 1, 1), torch.tensor([[0], [1]]))
+    assert moves[0] == Move.FORWARD and moves[1] in (Move.LEFT, Move.RIGHT)
+
+
+def test_plan_crosses_every_field():
+    random_state = np.random.RandomState(7)
+    drawn = np.stack([LANES.sample_field(random_state) for _ in range(300)])
+    dynamics = ComputerVision(SETTINGS.step_length)
+    body = dynamics.start(torch.tensor([[0.0, 0.0, 2.5]]).double().repeat(300, 1))
+    state = Pillars(SETTINGS).start(torch.from_numpy(drawn), body)
+    for _ in range(SETTINGS.step_limit):
+        on = (state.end_reason == 0).nonzero()[:, 0]
+        if not len(on):
+            break
+        now = state[on]
+        move = LANES.fly_through(now.drone, now.rows, now.next_row[:, None])
+        state[on] = Pillars(SETTINGS).step(now, dynamics.step(now.body, move))[0]
+    assert (state.end_reason == EndReason.FINISH_LINE).all()
+
+
+NARROW = PillarsSettings(spread=3.0, density=0.34, width=1.2)
+"""Two pillars per row and seven lanes; contact up to 1 m."""
+NARROW_LANES = Lanes(NARROW)
+
+
+def test_lanes_are_one_step_apart_within_the_field():
+    assert NARROW_LANES.within_field().tolist() == [-3, -2, -1, 0, 1, 2, 3]
+    assert Lanes(NARROW.replace(step_length=0.7)).within_field().tolist() == pytest.approx(
+        [-2.8, -2.1, -1.4, -0.7, 0, 0.7, 1.4, 2.1, 2.8]
+    )
+
+
+def test_lane_is_open_without_contact():
+    rows = np.array([[0.5, 0.5], [-1.0, 2.0], [-3.0, 3.0]])
+    opened = [NARROW_LANES.within_field()[row].tolist() for row in NARROW_LANES.is_open(rows)]
+    # a pillar at -1 blocks -2, -1 and 0, as 1 m is a contact
+    assert opened == [[-3, -2, -1, 2, 3], [-3], [-1, 0, 1]]
+
+
+def test_sampled_fields_are_crossable():
+    dense = PillarsSettings(spread=3.0, density=1.2, width=1.2)  # seven pillars in 6 m
+    drawn = np.random.RandomState(0).uniform(-3.0, 3.0, (500, dense.row_size))
+    closed = ~Lanes(dense).is_open(drawn).any(-1)
+    assert 50 < closed.sum() < 480  # many sampled rows are closed
+    random_state = np.random.RandomState(1)
+    made = np.concatenate([Lanes(dense).sample_field(random_state) for _ in range(200)])
+    assert Lanes(dense).is_open(made).any(-1).all() and made.shape == (800, dense.row_size)
+
+
+def test_open_rows_are_kept_and_fields_are_seeded():
+    first, again = (NARROW_LANES.sample_field(np.random.RandomState(3)) for _ in range(2))
+    np.testing.assert_array_equal(first, again)
+    drawn = np.random.RandomState(3).uniform(
+        -NARROW.spread, NARROW.spread, (NARROW.num_rows, NARROW.row_size)
+    )
+    is_open = NARROW_LANES.is_open(drawn).any(-1)
+    assert is_open.any()
+    np.testing.assert_array_equal(first[is_open], drawn[is_open])
+    assert np.abs(first).max() <= NARROW.spread
+
+
+def test_the_nearest_lane_of_a_drone_between_lanes_is_one_of_the_field():
+    """No lane a whole number of steps from y = 0.5 m is open; that at 0 m is."""
+    rows, y = torch.tensor([[-1.5, 1.5]]).double(), torch.tensor([0.5]).double()
+    offset, _ = NARROW_LANES.nearest(rows, y)
+    assert offset.tolist() == [-0.5]

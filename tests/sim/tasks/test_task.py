@@ -1,52 +1,24 @@
-"""User-defined tasks work in both simulators and in TorchRL."""
+"""Tasks of a user: defaults, both simulators, TorchRL, and the registry."""
 
 import dataclasses
+from typing import ClassVar
+from unittest.mock import patch
 
 import pytest
 import torch
 from tensordict import TensorDict
 from torchrl.envs.utils import check_env_specs
 
-from drone_rl.config import TaskSettings
+from drone_rl.config import TASKS, BaseTaskSettings, PillarsSettings, TaskSettings, read_task
 from drone_rl.envs import DroneEnv
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.rendering.scene import SemanticClass
-from drone_rl.sim.tasks import CollectCubes, EndReason, Task, as_task
+from drone_rl.sim.tasks import CollectCubes, EndReason, Pillars, Task
+from drone_rl.sim.tasks.task import MAKERS, as_settings, as_task, register_task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.seeding import world_random_state
 from tests.composer_env import ComposerEnv
-from tests.second_task import End, Posts
-
-
-def test_default_settings_select_cube_collection():
-    assert isinstance(as_task(None), CollectCubes)
-    assert as_task(TaskSettings(num_cubes=2)).settings.num_cubes == 2
-    task = Posts()
-    assert as_task(task) is task
-
-
-def test_both_simulators_give_the_same_episodes():
-    env = make_environment(Posts(), pixels=False, random_state=world_random_state(3, 0))
-    worlds = Worlds(1, Posts())
-    stream, ends = world_random_state(3, 0), set()
-    for actions in ([0] * 9, [1, 0, 0, 0, 0, 0], [2, 0, 0, 0, 0, 0], [1, 2] * 6):
-        timestep = env.reset()
-        worlds.reset(torch.arange(1), [stream])
-        for action in actions:
-            timestep = env.step(action)
-            reward = worlds.step(torch.arange(1), torch.tensor([action]))
-            assert timestep.reward == reward.item()
-            assert torch.equal(env.task.state.posts, worlds.state.posts)
-            assert timestep.observation["passed"].tolist() == worlds.state.passed[0].tolist()
-            if timestep.last():
-                break
-        end = End(worlds.state.end_reason.item())
-        assert timestep.last() == (end != End.RUNNING)
-        assert timestep.discount == (0.0 if end in (End.THROUGH, End.TOUCHED) else 1.0)
-        ends.add(end)
-    assert ends == {End.THROUGH, End.TOUCHED, End.TIME}
-    worlds.close()
+from tests.second_task import Posts
 
 
 def test_props_are_rendered_with_their_semantic_classes():
@@ -127,3 +99,95 @@ def test_base_class_has_defaults():
     with pytest.raises(InputError, match="task=minimal cannot be explained; define next_target in"):
         task.next_target(env.worlds.state)
     env.close()
+
+
+class PostsSettings(BaseTaskSettings):
+    name: ClassVar[str] = "posts"
+    tall: bool = True
+
+
+def test_invalid_settings_raise():
+    assert isinstance(as_task(None), CollectCubes)
+    assert as_task(TaskSettings(num_cubes=2)).settings.num_cubes == 2
+    assert isinstance(as_task(PillarsSettings()), Pillars)
+    task = Posts()
+    assert as_task(task) is task
+    assert isinstance(as_task("pillars"), Pillars)
+    assert as_task("collect_cubes").settings == TaskSettings()
+    with pytest.raises(InputError, match="task='pillar' is unknown; valid names: collect_cubes, p"):
+        as_task("pillar")
+    with pytest.raises(InputError, match=r"task=\(dict\) is no task; give one of collect_cubes"):
+        as_task({"num_cubes": 1})
+    with pytest.raises(InputError, match="PostsSettings is the settings of no task; call"):
+        as_task(PostsSettings())
+
+
+def test_user_tasks_can_be_registered(monkeypatch):
+    monkeypatch.setitem(MAKERS, PostsSettings, None)  # removed after the test
+    monkeypatch.setitem(TASKS, "posts", PostsSettings)
+    register_task(PostsSettings, lambda _: Posts())
+    register_task(PostsSettings, lambda _: Posts())  # a module may be imported twice
+    assert isinstance(as_task(PostsSettings()), Posts)
+    assert read_task({"name": "posts", "tall": False}, "task") == PostsSettings(tall=False)
+
+    class Other(PostsSettings):
+        pass
+
+    with pytest.raises(InputError, match="there is a task called posts; give another name"):
+        register_task(Other, lambda _: Posts())
+
+
+class WithText(BaseTaskSettings):
+    name: ClassVar[str] = "mine"
+    cost: float = "0.005"
+
+
+class WithUnion(BaseTaskSettings):
+    name: ClassVar[str] = "mine"
+    cost: int | str = 3
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (WithText, r"^WithText\.cost='0\.005' is a text; give a finite number$"),
+        (WithUnion, r"^WithUnion\.cost is of type int \| str; annotate it with a kind"),
+    ],
+)
+def test_mistakes_in_settings_are_named_when_their_task_is_registered(settings, message):
+    with pytest.raises(InputError, match=message):
+        register_task(settings, lambda _: Posts())
+    assert "mine" not in TASKS
+
+
+def test_tasks_without_settings_are_registered_as_objects():
+    with patch.dict(TASKS), patch.dict(MAKERS):
+        settings, again = as_settings(Posts()), Posts()
+        assert read_task({"name": "posts"}, "task") == settings == as_settings(settings)
+        assert isinstance(as_task(settings), Posts)
+        register_task(again)  # a cell of a notebook ran twice
+        assert as_task(settings) is again
+        two_cubes = TaskSettings(num_cubes=2)
+        assert as_settings(CollectCubes(two_cubes)) == two_cubes
+
+        class Variant(CollectCubes):
+            pass
+
+        with pytest.raises(InputError, match="there is a task called collect_cubes; give another"):
+            as_settings(Variant())
+        for wrong in ((PostsSettings,), (Posts, PostsSettings), (PostsSettings, 5)):
+            with pytest.raises(InputError, match="make no task; give a task, or the class of its"):
+                register_task(*wrong)
+    assert "posts" not in TASKS
+
+
+def test_tasks_and_settings_need_a_name():
+    class Unnamed(BaseTaskSettings):
+        pass
+
+    with pytest.raises(InputError, match='Unnamed has no name; add name = "my_task" to the class'):
+        register_task(Unnamed, lambda _: Posts())
+    nameless = type("Nameless", (Posts,), {})()
+    with patch.object(Posts, "name", create=True), pytest.raises(InputError, match="Nameless has"):
+        del Posts.name
+        register_task(nameless)

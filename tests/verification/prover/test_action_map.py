@@ -18,7 +18,7 @@ from drone_rl.verification.prover.action_map import (
     map_actions,
 )
 from drone_rl.verification.prover.arrangement import Pieces, Window, arrange
-from drone_rl.verification.prover.cube_images import FRONT, LEFT_SIDE, NOTHING, UNIT, CameraModel
+from drone_rl.verification.prover.cube_images import NOTHING, UNIT, CameraModel
 
 
 def camera(left, up):
@@ -28,36 +28,9 @@ def camera(left, up):
     )
 
 
-def cells(camera, window):
-    """Area of what the only pixel shows, and how many cells there are."""
-    found = arrange(find_borders(camera, window), window, 10_000)
-    faces = camera.faces(*found.inner_points().T)[:, 0, 0]
-    areas = np.bincount(faces, found.areas(), 4)
-    return {int(face): round(areas[face], 9) for face in np.unique(faces)}, found.num_cells
-
-
-def test_a_column_straight_ahead():
-    """A ray that rises 0.5 m each metre passes above fronts beyond 2 m, of cubes beyond 3 m."""
-    found, count = cells(camera([0.0], [0.5]), Window(1.5, 5.0, 2.0))
-    assert found == {FRONT: 2 * 1.5, NOTHING: 14 - 3}
-    assert count == 2
-
-
-def test_a_level_ray_to_the_left():
-    """Front: D - 2 to D; side: to D + 2."""
-    found, count = cells(camera([1.0], [0.0]), Window(2.0, 3.0, 6.0))
-    assert found == {NOTHING: 8.0, FRONT: 2.0, LEFT_SIDE: 2.0}
-    assert count == 4
-
-
-def test_a_ray_that_leaves_by_the_upper_edge():
-    """It is above the cube from 2 m on: the side ends at Y = 3 for cubes at 1 to 3 m."""
-    found, count = cells(camera([1.0], [0.5]), Window(1.5, 4.0, 4.0))
-    assert found == {FRONT: 3.0, LEFT_SIDE: 1.125, NOTHING: 20 - 4.125}
-    assert count == 3
-
-
 WIDE = Window(1.4, 40.0, 9.0)
+
+
 CAMERAS = [(7, 5, 100.0), (8, 2, 40.0), (9, 6, 90.0), (16, 7, 135.0), (12, 5, 60.0)]
 
 

@@ -7,8 +7,6 @@ from drone_rl.verification.prover import boxes as module
 from drone_rl.verification.prover.boxes import (
     carve,
     complement,
-    cut,
-    intersect,
     merge,
     resolve_forks,
     union,
@@ -31,12 +29,6 @@ def random_boxes(random, count, n=3):
     ends = np.sort(random.integers(0, 6, (count, n, 2)), -1)
     ends[..., 1] += ends[..., 0] == ends[..., 1]
     return ends.astype(float)
-
-
-def test_cut():
-    below, above = cut(boxes([[0, 2], [0, 1]], [[3, 4], [0, 1]]), 0, 1.0)
-    assert below.tolist() == [[[0, 1], [0, 1]]]
-    assert above.tolist() == [[[1, 2], [0, 1]], [[3, 4], [0, 1]]]
 
 
 def test_merge_keeps_the_set():
@@ -77,17 +69,6 @@ def test_complement_of_too_many_grids(monkeypatch):
     some, space = random_boxes(np.random.default_rng(3), 10), boxes([[0, 7], [0, 7], [0, 7]])
     assert complement(some, space, most=2) is None
     assert complement(some[:0], space).tolist() == space.tolist()
-
-
-def test_union_by_hand():
-    united = union(boxes([[0, 2], [0, 2]], [[1, 3], [1, 3]], [[0, 2], [0, 2]]))
-    assert volumes(united).sum() == 7.0
-    assert union(np.empty((0, 2, 2))).shape == (0, 2, 2)
-
-
-def test_intersect():
-    found = intersect(boxes([[0, 2], [0, 2]]), boxes([[1, 3], [1, 3]], [[2, 3], [0, 1]]))
-    assert found.tolist() == [[[1, 2], [1, 2]]]
 
 
 def test_carve():

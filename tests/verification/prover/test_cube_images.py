@@ -11,9 +11,7 @@ from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.cube_images import (
     FRONT,
-    LEFT_SIDE,
     NOTHING,
-    RIGHT_SIDE,
     UNIT,
     CameraModel,
     CubeImages,
@@ -33,28 +31,6 @@ def tiny():
         widest=20.0,
         bound=6.0,
     )
-
-
-def test_faces_by_hand(tiny):
-    """4 m ahead the front is 3 m away: a ray of slope 1 is 3 m out there, and 5 m at the back."""
-    left = np.array([1.9, 2.1, 3.9, 4.1, 5.9, 6.1])
-    middle = tiny.faces(4.0, left)[:, 1, 0]
-    assert middle.tolist() == [NOTHING, FRONT, FRONT, LEFT_SIDE, LEFT_SIDE, NOTHING]
-    mirrored = tiny.faces(4.0, -left)[:, 1, 1]
-    assert mirrored.tolist() == [NOTHING, FRONT, FRONT, RIGHT_SIDE, RIGHT_SIDE, NOTHING]
-    assert not tiny.faces(4.0, left)[:, [0, 2]].any()  # these rays are 1 m up 2 m ahead
-
-
-def test_rows_that_leave_through_the_top(tiny):
-    """2.5 m ahead the front is 1.5 m away; rays of slope 0.5 leave the cube 2 m away."""
-    left = np.array([2.4, 2.6, 2.9, 3.1, 4.4, 4.6])
-    assert tiny.faces(2.5, left)[:, 1, 0].tolist() == [1, 2, 2, 2, 2, 0]
-    assert tiny.faces(2.5, left)[:, 0, 0].tolist() == [1, 2, 2, 0, 0, 0]
-
-
-def test_sides_next_to_the_camera(tiny):
-    assert FRONT not in tiny.faces(0.5, np.linspace(-5, 5, 101))
-    assert tiny.faces(0.5, np.array([1.1]))[0, 1].tolist() == [LEFT_SIDE, NOTHING]
 
 
 @pytest.mark.parametrize("ahead", [0.6, 1.6, 2.6, 5.6, 14.6, 32.6])

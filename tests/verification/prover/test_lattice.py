@@ -12,7 +12,7 @@ from drone_rl.sim.dynamics import ComputerVision
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.prover.boxes import all_placements, volumes
+from drone_rl.verification.prover.boxes import all_placements
 from drone_rl.verification.prover.lattice import (
     AHEAD,
     LEFT,
@@ -32,19 +32,6 @@ def moves(place, action, boxes, lattice=None):
     for moved, part in (lattice or Lattice(TASK)).move(place, action, boxes):
         found[moved] = np.concatenate([found.get(moved, part[:0]), part])
     return found
-
-
-def test_touched_part_of_the_placements():
-    """At x=14 the first cube is 1 m ahead: touched where |y - 2| <= 1.65."""
-    found = moves(LatticeState(13, 2), AHEAD, all_placements(6, 2))
-    sizes = {place.collected: volumes(part).sum() / 12 for place, part in found.items()}
-    assert sizes == pytest.approx({0: 12 - 3.3, 1: 3.3})
-
-
-def test_passed_cubes_are_not_touched():
-    """At x=16 the first cube, at 15, has been passed, near as it is."""
-    (moved,) = moves(LatticeState(16, -3), LEFT, all_placements(6, 2))
-    assert moved.collected == 0
 
 
 def test_collecting_resets_the_last_sideways_move():
@@ -82,14 +69,6 @@ def test_touch_borders_are_exact():
 def test_order_of_endings(place, reason):
     ending = Lattice(TASK).ending(place)
     assert ending == (None if reason is None else Ending(reason, place.collected))
-
-
-def test_standing_cubes():
-    lattice = Lattice(TASK)
-    assert lattice.standing(LatticeState(15, 0)) == [0, 1]
-    assert lattice.standing(LatticeState(16, 0)) == [1]
-    assert lattice.standing(LatticeState(3, 0, 0b10)) == [0]
-    assert lattice.standing(LatticeState(25, 0)) == []
 
 
 def test_random_walks_on_the_lattice():

@@ -38,18 +38,6 @@ def constant(settings, cubes, *probs):
     return propagate(graph, lambda nodes: probs.expand(len(nodes), 3))
 
 
-def test_always_forward(place):
-    settings = TaskSettings()
-    done = constant(settings, place(settings, [0.0, 0.0, 0.0], [0.0, 1.7, 0.0]), 1.0, 0.0, 0.0)
-    assert done.success.tolist() == [1.0, 0.0]
-    assert done.failure.tolist() == [0.0, 1.0]
-    assert done.collected.tolist() == [[1.0, 1.0, 1.0], [1.0, 0.0, 1.0]]
-    assert done.cubes.tolist() == [3.0, 2.0]
-    assert done.ends[1, EndReason.FRONT_BOUNDARY, 0b101] == 1.0
-    assert done.steps.tolist() == [32.0, 45.0]  # 33 - 32 < 1.65 metres; 45 > 44
-    assert done.undecided.tolist() == [0.0, 0.0]
-
-
 def test_random_walk_by_hand(small, place):
     """s0 = 1/3 + 2/3 s1 and s1 = 1/3 + 1/3 s0; e0 = 1 + 2/3 e1 and e1 = 1 + 1/3 e0."""
     done = constant(small, place(small, [0.0]), 1 / 3, 1 / 3, 1 / 3)

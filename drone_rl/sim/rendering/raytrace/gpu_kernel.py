@@ -20,7 +20,10 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 @wp.kernel
 def view_geoms(
-    view: structs.View, geoms: structs.Geoms, poses: structs.Poses, scratch: structs.Scratch
+    view: structs.ViewArrays,
+    geoms: structs.Geoms,
+    poses: structs.PoseArrays,
+    scratch: structs.Scratch,
 ) -> None:
     """Compute all geoms relative to all cameras. Launch it with (num_images, num_geoms)."""
     row, geom = wp.tid()
@@ -30,8 +33,8 @@ def view_geoms(
 
 @wp.kernel
 def render_pixels(
-    view: structs.View,
-    poses: structs.Poses,
+    view: structs.ViewArrays,
+    poses: structs.PoseArrays,
     materials: structs.Materials,
     scratch: structs.Scratch,
     images: structs.Images,
@@ -47,8 +50,8 @@ def render_pixels(
 
 @wp.kernel
 def render_pixels_with_effects(
-    view: structs.View,
-    poses: structs.Poses,
+    view: structs.ViewArrays,
+    poses: structs.PoseArrays,
     materials: structs.Materials,
     scratch: structs.Scratch,
     images: structs.Images,
@@ -73,7 +76,7 @@ def render_pixels_with_effects(
 
 @wp.func
 def _start(
-    view: structs.View, poses: structs.Poses, scratch: structs.Scratch, row: int
+    view: structs.ViewArrays, poses: structs.PoseArrays, scratch: structs.Scratch, row: int
 ) -> structs.Job:
     return start_job(view, poses, scratch, row, row % view.cameras.shape[0], row // view.count, row)
 

@@ -94,8 +94,8 @@ class MaterialsEncoder:
         for semantic_class, cover in appearance.textures.items():
             geoms = self._scene.geoms(semantic_class)
             number = torch.tensor([names.index(name) for name in cover.images] + [-1])
-            chosen = expand_scalar(cover.choice, count).long().cpu()
-            texture[:, geoms] = number[chosen][:, None].int()
+            choice = expand_scalar(cover.choice, count).long().cpu()
+            texture[:, geoms] = number[choice][:, None].int()
             tiles[:, geoms] = (1.0 / expand_scalar(cover.size, count).cpu())[:, None].float()
         visibility = appearance.fog_visibility
         visibility = math.inf if visibility is None else visibility

@@ -35,9 +35,9 @@ def render_images(
     first: int,
     last: int,
     buffer: int,
-    view: structs.View,
+    view: structs.ViewArrays,
     geoms: structs.Geoms,
-    poses: structs.Poses,
+    poses: structs.PoseArrays,
     materials: structs.Materials,
     scratch: structs.Scratch,
     images: structs.Images,
@@ -54,10 +54,10 @@ def render_images(
 
 @wp.func
 def render_image(
-    view: structs.View,
+    view: structs.ViewArrays,
     camera: int,
     geoms: structs.Geoms,
-    poses: structs.Poses,
+    poses: structs.PoseArrays,
     env: int,
     materials: structs.Materials,
     scratch: structs.Scratch,
@@ -77,7 +77,7 @@ def render_image(
 
 
 @wp.func
-def find_visible(job: structs.Job, geoms: structs.Geoms, poses: structs.Poses) -> None:
+def find_visible(job: structs.Job, geoms: structs.Geoms, poses: structs.PoseArrays) -> None:
     """Find the nearest surface of each pixel: write `nearest` and `owner`."""
     count = job.view.height * job.view.width
     fill(job.nearest, 0, count, FAR_AWAY)

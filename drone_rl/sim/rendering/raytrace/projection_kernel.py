@@ -8,9 +8,9 @@ from drone_rl.sim.rendering.raytrace.structs_kernel import (
     Geoms,
     GeomView,
     Job,
-    Poses,
+    PoseArrays,
     Scratch,
-    View,
+    ViewArrays,
 )
 
 NEAR = wp.constant(1e-3)
@@ -19,7 +19,13 @@ NEAR = wp.constant(1e-3)
 
 @wp.func
 def start_job(
-    view: View, poses: Poses, scratch: Scratch, row: int, camera: int, env: int, buffer: int
+    view: ViewArrays,
+    poses: PoseArrays,
+    scratch: Scratch,
+    row: int,
+    camera: int,
+    env: int,
+    buffer: int,
 ) -> Job:
     """Return the job of rendering image `row` with row `buffer` of `Scratch`."""
     job = Job()
@@ -42,7 +48,7 @@ def start_job(
 
 
 @wp.func
-def view_geom(job: Job, geoms: Geoms, geom: int, poses: Poses) -> GeomView:
+def view_geom(job: Job, geoms: Geoms, geom: int, poses: PoseArrays) -> GeomView:
     """Return a geom relative to the camera."""
     frame = geoms.frame[geom]
     turned = _frame_attitude(frame, poses.attitudes[job.env])

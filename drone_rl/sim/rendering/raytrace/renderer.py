@@ -5,7 +5,6 @@ fog, shadows, textures or a sky gradient) and `gpu_kernel` (both, on a GPU).
 """
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import torch
@@ -22,10 +21,8 @@ from drone_rl.sim.rendering.renderer import Poses
 from drone_rl.sim.rendering.scene import Scene
 from drone_rl.sim.rendering.view import MODALITIES, Modality, View
 
-_BITS: Mapping[Modality, int] = MappingProxyType(
-    {modality: getattr(structs, modality.upper()) for modality in MODALITIES}
-)
-_VECTORS = MappingProxyType({"rgb": wp.vec3ub, "normals": wp.vec3})
+_BITS: dict[Modality, int] = {name: getattr(structs, name.upper()) for name in MODALITIES}
+_VECTORS = {"rgb": wp.vec3ub, "normals": wp.vec3}
 """Warp types of modalities with several numbers per pixel."""
 
 
@@ -34,9 +31,9 @@ class Launch(NamedTuple):
 
     num_images: int
     """Environments times cameras."""
-    view: structs.View
+    view: structs.ViewArrays
     geoms: structs.Geoms
-    poses: structs.Poses
+    poses: structs.PoseArrays
     materials: structs.Materials
     images: structs.Images
     effects: "structs.Effects | None" = None
@@ -81,11 +78,11 @@ class Raytracer:
         self.prepare(view)
         cameras, geoms = self._views[view]
         images = view.new_images(len(poses), self.device)
-        shown = appearance or Appearance()
+        look = appearance or Appearance()
         with on_torch_stream(self.device):
             materials, effects = self._materials.encode(appearance, len(poses))
-            encoded = cameras.encode(shown.camera, len(poses))
-            frames = self._poses.write(poses, shown.distractors)
+            encoded = cameras.encode(look.camera, len(poses))
+            frames = self._poses.write(poses, look.distractors)
             count, out = len(poses) * len(view.cameras), _images(images)
             launch = Launch(count, encoded, geoms, frames, materials, out, effects)
             self._launcher.launch(launch)
@@ -93,7 +90,7 @@ class Raytracer:
 
     def kernel_inputs(
         self, view: View, num_workers: int
-    ) -> tuple[structs.View, structs.Geoms, structs.Materials, structs.Scratch]:
+    ) -> tuple[structs.ViewArrays, structs.Geoms, structs.Materials, structs.Scratch]:
         """Return the arguments with which another kernel calls `plain_kernel.render_image`.
 
         The appearance is the model's own; `num_workers` images are rendered at the same time.
@@ -106,7 +103,7 @@ class Raytracer:
         """Stop the threads."""
         self._launcher.close()
 
-    def _encode(self, view: View) -> tuple[structs.View, structs.Geoms]:
+    def _encode(self, view: View) -> tuple[structs.ViewArrays, structs.Geoms]:
         view.check_modalities(self, _BITS)
         device = str(self.device)
         with on_torch_stream(self.device):

@@ -1,7 +1,6 @@
 """Encode a scene for the kernels, in reference frames: 0 world, 1 drone, props from 2."""
 
-from collections.abc import Callable, Mapping
-from types import MappingProxyType
+from collections.abc import Callable
 from typing import Any
 
 import mujoco as _mujoco
@@ -22,14 +21,12 @@ from drone_rl.utils.errors import InputError
 mujoco: Any = _mujoco
 """MuJoCo's bindings, which are untyped."""
 
-HALF_EXTENTS: Mapping[int, Callable[[NDArray], NDArray]] = MappingProxyType(
-    {
-        **dict.fromkeys((solids.PLANE, solids.ELLIPSOID, solids.BOX), lambda size: size),
-        solids.SPHERE: lambda size: size[[0, 0, 0]],
-        solids.CAPSULE: lambda size: size[[0, 0, 1]] + [0.0, 0.0, size[0]],
-        solids.CYLINDER: lambda size: size[[0, 0, 1]],
-    }
-)
+HALF_EXTENTS: dict[int, Callable[[NDArray], NDArray]] = {
+    **dict.fromkeys((solids.PLANE, solids.ELLIPSOID, solids.BOX), lambda size: size),
+    solids.SPHERE: lambda size: size[[0, 0, 0]],
+    solids.CAPSULE: lambda size: size[[0, 0, 1]] + [0.0, 0.0, size[0]],
+    solids.CYLINDER: lambda size: size[[0, 0, 1]],
+}
 """Half extents of the bounding box of each supported kind of geom, from MuJoCo's size; for a plane
 the size itself."""
 
@@ -99,10 +96,10 @@ class Frames:
         return frame, there, relative
 
 
-def make_view(scene: Scene, frames: Frames, view: View, device: str) -> structs.View:
+def make_view(scene: Scene, frames: Frames, view: View, device: str) -> structs.ViewArrays:
     """Return a view for the kernels; the caller sets its modalities, `what`."""
     model: Any = scene.model
-    made: Any = structs.View()
+    made: Any = structs.ViewArrays()
     cameras = [make_camera(scene, frames, name, view.width / view.height) for name in view.cameras]
     rays = np.stack([make_rays(camera, view.height, view.width) for camera in cameras])
     rays = rays.reshape(len(cameras), -1, 3)
@@ -165,14 +162,14 @@ def make_geoms(scene: Scene, frames: Frames, show_drone: bool, device: str) -> s
 class Cameras:
     """Cameras of a view, with the model's mounting or another one per environment."""
 
-    def __init__(self, view: View, encoded: structs.View, device: torch.device) -> None:
+    def __init__(self, view: View, encoded: structs.ViewArrays, device: torch.device) -> None:
         self._view, self._encoded, self._device = view, encoded, device
         arrays: Any = encoded
         self._cameras = arrays.cameras.numpy()
         self._rays, self._cosines = wp.to_torch(arrays.rays), wp.to_torch(arrays.cosines)
-        self._last: tuple[Mounting | None, int, structs.View] = (None, 0, encoded)
+        self._last: tuple[Mounting | None, int, structs.ViewArrays] = (None, 0, encoded)
 
-    def encode(self, mounting: Mounting | None, num_envs: int) -> structs.View:
+    def encode(self, mounting: Mounting | None, num_envs: int) -> structs.ViewArrays:
         """Return the view for the kernels; the last mounting is cached by identity."""
         if mounting is None or mounting.camera not in self._view.cameras:
             return self._encoded
@@ -180,7 +177,7 @@ class Cameras:
             self._last = (mounting, num_envs, self._mount(mounting, num_envs))
         return self._last[2]
 
-    def _mount(self, mounting: Mounting, num_envs: int) -> structs.View:
+    def _mount(self, mounting: Mounting, num_envs: int) -> structs.ViewArrays:
         which = self._view.cameras.index(mounting.camera)
         cameras: Any = np.tile(self._cameras, (num_envs, 1))
         one = cameras[:, which]
@@ -198,7 +195,7 @@ class Cameras:
             rays = rays.clone()
             rays[which :: len(self._view.cameras)] = self._zoomed_rays(which, mounting.zoom)
             cosines = -rays[..., 2].contiguous()
-        encoded: Any = structs.View()
+        encoded: Any = structs.ViewArrays()
         for name in ("count", "width", "height", "far", "what"):
             setattr(encoded, name, getattr(self._encoded, name))
         device = str(self._device)
@@ -224,7 +221,7 @@ class PoseBuffers:
         self._device = device
         self._allocate(0, 0)
 
-    def write(self, poses: Poses, distractors: Distractors | None = None) -> structs.Poses:
+    def write(self, poses: Poses, distractors: Distractors | None = None) -> structs.PoseArrays:
         """Return poses for the kernels; the next call overwrites them.
 
         Distractors are the last of the props, and are scaled by their sizes.
@@ -248,7 +245,7 @@ class PoseBuffers:
         self._attitudes = torch.zeros(count, 4, device=self._device)
         self._scales = torch.ones(count, frames, device=self._device)
         self._encoded_scales: Any = wp.from_torch(self._scales)
-        self._encoded: Any = structs.Poses()
+        self._encoded: Any = structs.PoseArrays()
         self._encoded.positions = wp.from_torch(self._positions, dtype=wp.vec3)
         self._encoded.attitudes = wp.from_torch(self._attitudes, dtype=wp.vec4)
         self._is_scaled = False

@@ -12,7 +12,7 @@ DEPTH = wp.constant(4)
 DISTANCE = wp.constant(8)
 SEGMENTATION = wp.constant(16)
 NORMALS = wp.constant(32)
-"""Modalities, one bit each: their sum, `View.what`, is rendered in one pass."""
+"""Modalities, one bit each: their sum, `ViewArrays.what`, is rendered in one pass."""
 DISTANCES = wp.constant(4 | 8)
 """Modalities that are read from `Scratch.nearest`."""
 
@@ -44,7 +44,7 @@ class Camera:
 
 
 @struct
-class View:
+class ViewArrays:
     """All cameras of a view, which share one image size."""
 
     count: int
@@ -78,7 +78,7 @@ class Geoms:
 
 
 @struct
-class Poses:
+class PoseArrays:
     """Poses of the frames. Metres, quaternions (w, x, y, z). Shape: (num_envs, num_frames)."""
 
     positions: wp.array2d[wp.vec3]
@@ -214,7 +214,7 @@ class Job:
 
     row: int
     env: int
-    view: View
+    view: ViewArrays
     camera: Camera
     eye: wp.vec3
     """The camera's position, world frame."""

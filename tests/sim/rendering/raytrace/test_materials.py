@@ -1,59 +1,43 @@
-"""Colors and lights as encoded for the kernel."""
+"""Colors, lights, fog, shadows and textures as encoded for the kernels."""
 
 import mujoco
 import numpy as np
 import pytest
 import torch
 
-from drone_rl.sim.rendering import Appearance, Scene
+from drone_rl.sim.rendering import Appearance, Scene, Texture
 from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.rendering.raytrace.materials import MaterialsEncoder
 from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.rendering.textures import load
 
-XML = """<mujoco><worldbody><light directional="true" dir="0 0 -1" ambient=".1 .1 .1"
-diffuse=".5 .5 .5"/><geom name="a" type="plane" size="1 1 1" rgba=".2 .4 .6 1"/>
-<geom name="b" size="1" rgba=".1 .1 .1 1"/></worldbody></mujoco>"""
+TEXTURED = """<mujoco><worldbody><light/><geom type="plane" size="1 1 1"/><geom size="1"/>
+<geom size="2"/></worldbody></mujoco>"""
+
+
+MEANINGS = (SemanticClass.GROUND, SemanticClass.TARGET, SemanticClass.OBSTACLE)
+
+
+ZENITH = torch.tensor([[0.2, 0.5, 1.0], [0.0, 0.0, 0.0]])
 
 
 @pytest.fixture
-def materials():
+def textured():
     start_warp("cpu")
-    model = mujoco.MjModel.from_xml_string(XML)
-    meanings = (SemanticClass.GROUND, SemanticClass.TARGET)
-    return MaterialsEncoder(Scene(model, meanings, (-1, 0), (0.2, 0.5, 1.0)), "cpu")
+    scene = Scene(mujoco.MjModel.from_xml_string(TEXTURED), MEANINGS, (-1, 0, 1), (0.0, 0.0, 0.0))
+    return MaterialsEncoder(scene, "cpu")
 
 
-def test_environments_share_the_scenes_materials(materials):
-    plain, _ = materials.encode(None, 7)
-    np.testing.assert_allclose(plain.colors.numpy(), [[[0.2, 0.4, 0.6], [0.1, 0.1, 0.1]]])
-    np.testing.assert_allclose(plain.diffuse.numpy(), [[[0.5, 0.5, 0.5]]])
-    assert plain.sky.numpy().tolist() == [[51, 127, 255]]  # integers
-
-
-def test_environments_can_differ_for_one_call(materials):
-    ground = torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    appearance = Appearance(
-        colors={SemanticClass.GROUND: ground, SemanticClass.SKY: (0.0, 0.0, 1.0)},
-        sun=(0.3, 0.2, 0.1),
-        sun_direction=(0.0, 3.0, -4.0),
-    )
-    encoded, effects = materials.encode(appearance, 2)
-    assert effects is None
-    assert encoded.colors.numpy()[:, 0].tolist() == ground.tolist()
-    np.testing.assert_allclose(encoded.colors.numpy()[:, 1], [[0.1, 0.1, 0.1]] * 2)
-    np.testing.assert_allclose(encoded.diffuse.numpy(), [[[0.3, 0.2, 0.1]]] * 2)
-    np.testing.assert_allclose(encoded.direction.numpy(), [[[0.0, 0.6, -0.8]]] * 2, atol=1e-7)
-    np.testing.assert_allclose(encoded.ambient.numpy(), [[[0.1, 0.1, 0.1]]] * 2)
-    assert encoded.sky.numpy().tolist() == [[0, 0, 255]] * 2
-    np.testing.assert_allclose(materials.encode(None, 2)[0].colors.numpy()[0, 0], [0.2, 0.4, 0.6])
-
-
-def test_last_appearance_is_cached(materials):
-    red, blue = (
-        Appearance(colors={SemanticClass.SKY: c}) for c in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    )
-    encoded, _ = materials.encode(red, 2)
-    assert materials.encode(red, 2)[0] is encoded
-    assert materials.encode(red, 3)[0].sky.numpy().tolist() == [[255, 0, 0]] * 3
-    assert materials.encode(blue, 2)[0].sky.numpy().tolist() == [[0, 0, 255]] * 2
-    assert materials.encode(None, 2)[0].sky.numpy().tolist() == [[51, 127, 255]]
+def test_textures_are_stored_once(textured):
+    ground = Texture(images=("grid", "bricks"), size=4.0, choice=torch.tensor([1, -1]))
+    target = Texture(images=("bricks",), size=torch.tensor([0.5, 2.0]))
+    appearance = Appearance(textures={SemanticClass.GROUND: ground, SemanticClass.TARGET: target})
+    encoded = textured.encode_effects(appearance, ZENITH)
+    assert encoded.texture.numpy().tolist() == [[1, 1, -1], [-1, 1, -1]]
+    assert encoded.tiles.numpy().tolist() == [[0.25, 2.0, 0.0], [0.25, 0.5, 0.0]]
+    assert encoded.sides.numpy().tolist() == [256, 256]
+    count = (4**9 - 1) // 3  # of a texture of 256x256 texels with all mip levels
+    assert encoded.starts.numpy().tolist() == [0, count]
+    first = encoded.texels.numpy()[count : count + 256]
+    red, green, blue = (load("bricks")[0, :, i] for i in range(3))
+    assert np.array_equal(first, red + 256 * green.astype(int) + 65536 * blue.astype(int))

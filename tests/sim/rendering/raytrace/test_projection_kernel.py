@@ -17,9 +17,9 @@ from tests.box_ahead import SIZE, geoms, poses, scratch, view
 
 @wp.kernel(enable_backward=False)
 def find_visible(
-    seen: structs_kernel.View,
+    seen: structs_kernel.ViewArrays,
     scene: structs_kernel.Geoms,
-    placed: structs_kernel.Poses,
+    placed: structs_kernel.PoseArrays,
     buffers: structs_kernel.Scratch,
     part: wp.array[wp.vec4i],
 ):
@@ -70,21 +70,3 @@ def test_box_beside_the_camera_covers_a_part():
     first, last, top, bottom = found((1.5, 0.0, 0.0))
     assert (last, top, bottom) == (SIZE, 0, SIZE)
     assert first == 20 + 10 - 2  # a slope of 0.5 is halfway to the edge
-
-
-def test_frames_move_attached_cameras():
-    """The camera is on the drone, which looks along x; the box is in the world frame."""
-    turned = poses()
-    half = np.sqrt(0.5)
-    turned.positions = wp.array([[[0, 0, 0], [1.0, 2.0, 3.0]]], dtype=wp.vec3, device="cpu")
-    turned.attitudes = wp.array([[half, 0.0, -half, 0.0]], dtype=wp.vec4, device="cpu")
-    seen = view(int(structs_kernel.DEPTH))
-    camera = structs_kernel.Camera()
-    camera.frame, camera.attitude = 1, wp.vec4(1.0, 0.0, 0.0, 0.0)
-    camera.half_width = camera.half_height = 1.0
-    seen.cameras = wp.array([camera], dtype=structs_kernel.Camera, device="cpu")
-    scene = geoms(-6.0)
-    scene.position = wp.array([[7.0, 2.0, 3.0]], dtype=wp.vec3, device="cpu")
-    part = wp.zeros(1, dtype=wp.vec4i, device="cpu")
-    wp.launch(find_visible, 1, inputs=[seen, scene, turned, scratch(), part], device="cpu")
-    assert part.numpy()[0].tolist() == [14, 25, 14, 25]

@@ -1,18 +1,24 @@
-"""Comparison with MuJoCo Warp's ray tracer on scenes with all geom types."""
+"""Comparison with MuJoCo Warp on scenes with all geom types, and hand-computed images."""
+
+import dataclasses
 
 import mujoco
 import numpy as np
 import pytest
 import torch
+import warp as wp
 
-from drone_rl.sim.rendering import Appearance, Poses, Raytracer, Scene, View
+from drone_rl.sim.rendering import Appearance, Poses, Raytracer, Scene, Texture, View
 from drone_rl.sim.rendering.mujoco_warp import WarpRenderer
-from drone_rl.sim.rendering.raytrace.renderer import GpuLauncher
+from drone_rl.sim.rendering.raytrace import structs_kernel
+from drone_rl.sim.rendering.raytrace.renderer import CpuLauncher, GpuLauncher
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.rendering.view import MODALITIES
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state
+from tests.box_ahead import SIZE, geoms
+from tests.box_ahead import render as render_box
 
 XML = """<mujoco>
 <statistic extent="1"/>
@@ -40,6 +46,8 @@ XML = """<mujoco>
 <body mocap="true"><geom name="e" type="cylinder" size=".6 .5" pos=".3 .2 0" euler="70 10 0"
   rgba=".5 .9 .9 1"/></body>
 </worldbody></mujoco>"""
+
+
 MEANINGS = (
     SemanticClass.GROUND,
     SemanticClass.GROUND,
@@ -47,6 +55,8 @@ MEANINGS = (
     SemanticClass.DRONE,
     *[SemanticClass.TARGET] * 5,
 )
+
+
 PROPS = (-1, -1, -1, -1, 0, 1, 2, 3, 4)
 
 
@@ -268,32 +278,99 @@ def test_unsupported_geoms_raise_with_their_name(old, new, message):
         Raytracer(scene(xml), num_envs=1).prepare(view())
 
 
-@pytest.mark.parametrize(
-    ("geom", "message"),
-    [
-        (
-            '<geom name="rock" type="mesh" mesh="m"/>',
-            "geom 'rock' is a mesh, which Raytracer can't",
-        ),
-        (
-            '<flexcomp name="f" type="grid" count="2 2 2" spacing="1 1 1" dim="3"/>',
-            "the scene has soft bodies, which Raytracer can't render; give renderer=mujoco_warp",
-        ),
-    ],
-)
-def test_unsupported_models_raise_and_recommend_mujoco_warp(geom, message):
-    xml = f"""<mujoco><asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset><worldbody>
-    <light directional="true" castshadow="false"/>{geom}</worldbody></mujoco>"""
-    model = mujoco.MjModel.from_xml_string(xml)
-    count = model.ngeom
-    strange = Scene(model, (SemanticClass.OBSTACLE,) * count, (-1,) * count, (0.0, 0.0, 0.0))
-    with pytest.raises(InputError, match=message) as refused:
-        Raytracer(strange, num_envs=1)
-    assert str(refused.value).endswith("give renderer=mujoco_warp")
-    assert "\n" not in str(refused.value)
-
-
 def test_scene_without_light_raises():
     xml = "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>"
     with pytest.raises(InputError, match="no light"):
         Raytracer(scene(xml, (SemanticClass.TARGET,), (-1,)), num_envs=1)
+
+
+@pytest.fixture(params=["cores", "gpu"])
+def launcher(request):
+    """Return each launcher; the GPU launcher runs on a CPU as well."""
+    made = CpuLauncher(1, 1) if request.param == "cores" else GpuLauncher("cpu")
+    yield made
+    made.close()
+
+
+def test_depth_of_the_front_face(launcher):
+    depth = render_box(launcher, "depth", structs_kernel.DEPTH, float)[..., 0]
+    # 1 m at 5 m with a half width of 1: a fifth of the 40 pixels
+    rows, columns = np.nonzero(depth)
+    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (16, 23, 16, 23)
+    assert depth[20, 20] == pytest.approx(5.0)
+    assert (depth > 0).sum() == 64
+
+
+def test_distance_is_measured_along_the_ray(launcher):
+    distance = render_box(launcher, "distance", structs_kernel.DISTANCE, float)[..., 0]
+    slope = 3.5 / 20  # of the fourth pixel from the center
+    assert distance[16, 23] == pytest.approx(5.0 * np.sqrt(1 + 2 * slope**2))
+    assert (distance > 0).sum() == 64
+
+
+def test_segmentation_is_the_geom_number(launcher):
+    numbers = render_box(launcher, "segmentation", structs_kernel.SEGMENTATION, int)[..., 0]
+    assert numbers[20, 20] == 3 and (numbers == 3).sum() == 64
+    assert (numbers == -1).sum() == SIZE**2 - 64
+
+
+def test_normal_of_the_front_face_points_to_the_camera(launcher):
+    normals = render_box(launcher, "normals", structs_kernel.NORMALS, wp.vec3)
+    assert normals[20, 20].tolist() == [0.0, 0.0, 1.0]
+    assert (normals != 0).sum() == 64
+
+
+def test_color_follows_lamberts_law(launcher):
+    rgb = render_box(launcher, "rgb", structs_kernel.RGB, wp.vec3ub)
+    # the front faces +z, the cosine of the light is 0.8: 0.2 + 0.6 * 0.8 = 0.68
+    assert rgb[20, 20].tolist() == [173, 86, 0]
+    assert rgb[0, 0].tolist() == [10, 20, 30]  # the sky
+
+
+def test_geoms_behind_the_camera_or_too_far_are_invisible(launcher):
+    for depth in (6.0, -60.0):
+        box = geoms(depth)
+        numbers = render_box(launcher, "segmentation", structs_kernel.SEGMENTATION, int, box)
+        assert not (numbers == 3).any()
+
+
+@pytest.mark.parametrize(
+    ("depths", "shown"), [((-6.0, -9.0), 1), ((-9.0, -6.0), 2), ((-6.0, -6.0), 2)]
+)
+def test_nearer_or_later_geom_is_in_front(launcher, depths, shown):
+    box = geoms(*depths, numbers=(1, 2))
+    numbers = render_box(launcher, "segmentation", structs_kernel.SEGMENTATION, int, box)
+    assert numbers[20, 20, 0] == shown
+
+
+EFFECTS = Appearance(
+    zenith=(0.1, 0.2, 0.6),
+    fog_visibility=60.0,
+    shadows=1,
+    textures={
+        SemanticClass.GROUND: Texture(images=("grid",), size=3.0),
+        SemanticClass.TARGET: Texture(images=("noise",), size=1.0),
+    },
+)
+LOW_SUNS = torch.stack([torch.arange(64.0).cos(), torch.arange(64.0).sin()], -1)
+"""Directions in which the light travels sideways, from all around. Shape: (64, 2)."""
+
+
+@pytest.mark.parametrize(
+    ("modality", "down"),
+    [("rgb", -1.0), ("rgb", -0.15), ("rgb", 0.1), ("depth", -1.0), ("segmentation", -1.0)],
+)
+def test_the_gpu_kernel_renders_the_effects_of_the_cpu_kernel(modality, down, both):
+    """On a GPU, each pixel looks for its shadow; on a CPU, each shadow for its pixels."""
+    alike, poses = Raytracer(scene(), num_envs=64), scattered(64, 0.4)
+    alike._launcher.close()
+    alike._launcher = GpuLauncher("cpu")
+    sun = torch.nn.functional.pad(LOW_SUNS, (0, 1), value=down)
+    effects = dataclasses.replace(EFFECTS, sun_direction=sun)
+    ours, theirs = (render(r, view(modality), poses, effects).double() for r in (both[0], alike))
+    assert ((ours - theirs).abs() > 1e-3).double().mean() < 1e-4
+    plain = render(both[0], view(modality), poses).double()
+    assert (plain != ours).double().mean() > 0.5 if modality == "rgb" else torch.equal(plain, ours)
+    unshaded = dataclasses.replace(effects, shadows=0)
+    if modality == "rgb" and down < 0:
+        assert (render(both[0], view(), poses, unshaded) != ours).double().mean() > 0.01

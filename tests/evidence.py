@@ -1,0 +1,342 @@
+"""Small hand-written evidence in the form of the program's files, for tests of sentences.
+
+It contains every entry that a sentence reads. Nothing was measured.
+"""
+
+import copy
+from collections.abc import Mapping
+from typing import Any
+
+from drone_rl.sim.vocabulary import CUBES
+
+Plain = dict[str, Any]
+
+
+def changed(evidence: Mapping[str, Any], changes: Mapping[str, Any]) -> Plain:
+    """Return a copy of evidence with some entries replaced.
+
+    Args:
+        evidence: The original, which is not changed.
+        changes: New values by path, such as "greedy.shares.left.mean" or "rows.0.share".
+    """
+    result: Plain = copy.deepcopy(dict(evidence))
+    for path, value in changes.items():
+        *parents, last = path.split(".")
+        node: Any = result
+        for key in parents:
+            node = node[int(key) if isinstance(node, list) else key]
+        node[int(last) if isinstance(node, list) else last] = value
+    return result
+
+
+def _mean(mean: float, lower: float, upper: float) -> Plain:
+    return {"mean": mean, "lower95": lower, "upper95": upper}
+
+
+def _share(successes: int, trials: int, lower: float, upper: float) -> Plain:
+    counts = {"successes": successes, "trials": trials}
+    return {"share": successes / trials, "lower95": lower, "upper95": upper, **counts}
+
+
+def _episodes(success: float, left: float, ahead: float, right: float) -> Plain:
+    every = (left + ahead + right) / 3
+    shares = {"all": every, "left": left, "ahead": ahead, "right": right}
+    return {
+        "episodes": 400,
+        "success": {"share": success, "lower95": success - 0.02, "upper95": success + 0.02},
+        "shares": {name: {"mean": mean, "count": 300} for name, mean in shares.items()},
+    }
+
+
+def _row(by: str, value: str, failed: int, episodes: int) -> Plain:
+    share = failed / episodes
+    of = {"episodes": episodes, "failed": failed, "share": share}
+    return {"by": by, "value": value, **of, "lower95": share - 0.02, "upper95": share + 0.02}
+
+
+FIXED_SEED: Plain = {"seed": 0, "seed_is_fixed": True}
+"""Entries of a result with a fixed seed."""
+
+VERDICT: Plain = {
+    "kind": "none of these",
+    **FIXED_SEED,
+    "certain": True,
+    "exit_code": 12,
+    "error_rate": 0.05,
+    "good_share": 0.9,
+    "enough": 400,
+    "num_cubes": 3,
+    "proof": None,
+    "rounding": {
+        "arithmetic": "float32 on cpu, fused kernel",
+        "bound": True,
+        "frames": 16000,
+        "fragile": 8,
+        "fragile_rate": 0.0005,
+        "episodes": 400,
+        "fragile_episodes": 7,
+        "compared": "PyTorch",
+        "compared_episodes": 400,
+        "unexplained": 0,
+        "decides": False,
+    },
+    "greedy": _episodes(0.6, 0.5, 1.0, 0.9),
+    "sampled": _episodes(0.4, 0.4, 0.9, 0.8),
+    "drawing": _mean(-0.2, -0.3, -0.1),
+    "baselines": {
+        "random": _episodes(0.03, 0.2, 0.4, 0.2),
+        "forward": _episodes(0.02, 0.0, 1.0, 0.0),
+        "left": _episodes(0.0, 0.0, 0.0, 0.0),
+        "right": _episodes(0.0, 0.0, 0.0, 0.0),
+        "oracle": _episodes(1.0, 1.0, 1.0, 1.0),
+    },
+    "failures": {
+        "rows": [_row("side", "left", 150, 300), _row("end", "step_limit", 40, 400)],
+        "largest": _row("side", "left", 150, 300),
+        "bound": _share(160, 400, 0.35, 0.45),
+    },
+}
+"""Content of `verdict.json` of a policy that collects half of the cubes on its left."""
+
+
+PROOF: Plain = {
+    "refused": None,
+    "every": True,
+    "share": 1.0,
+    "lost": 0.0,
+    "undecided": 0.0,
+    "finished": True,
+    "checked": 1000,
+    "wrong_at_most": 0.0031,
+    "seed": 17,
+    "seed_is_fixed": False,
+    "agreeing": 400,
+}
+"""Entries of a verdict about a certificate of success from every placement."""
+
+
+def _method(trusted: bool, failed: list[str], score: float) -> Plain:
+    return {
+        "trusted": trusted,
+        "failed": failed,
+        "score": _mean(score, score - 0.1, score + 0.1),
+        "placebos": {
+            "ones": {"median": score, "lower": score - 0.1, "upper": score + 0.1},
+            "horizon": {"median": score - 0.2, "lower": score - 0.3, "upper": score},
+        },
+        "pointing": {"median": 0.3, "lower": 0.1, "upper": 0.5, "hit": 0.6, "chance": 0.1},
+    }
+
+
+def _objective(probabilities: list[float], highest: list[float]) -> Plain:
+    counts = {"starts": 8, "num_settings": 6}
+    return {"probabilities": probabilities, "highest": highest, **counts}
+
+
+def _places(side: str, height: float, blind: float, collected: int) -> Plain:
+    of = {"blind": blind, "collected": collected, "places": 72}
+    return {"side": side, "height": height, **of}
+
+
+_LEVEL = [
+    _places("left", 0.0, 0.6, 64), _places("ahead", 0.0, 0.0, 72), _places("right", 0.0, 0.5, 60),
+]  # fmt: skip
+HIGHER = [
+    _places("left", 1.2, 0.6, 50), _places("ahead", 1.2, 0.0, 72), _places("right", 1.2, 0.5, 40),
+]  # fmt: skip
+"""Rows of a response map for cubes above the drone."""
+
+
+def _side(share: float, actions: list[float], unseen: float, blind: float) -> Plain:
+    return {"share": share, "actions": actions, "unseen": unseen, "blind": blind}
+
+
+EXPLANATION: Plain = {
+    "source": "a/explanation.json",
+    "date": "2026-01-31T12:00:00+00:00",
+    "provenance": {"git_revision": "0123abc"},
+    "verdict": VERDICT,
+    **FIXED_SEED,
+    "dataset": {
+        "frames": 600,
+        "episodes": 30,
+        "steps": 1300,
+        "action_shares": [0.8, 0.1, 0.1],
+        "entropy": _mean(0.1, 0.06, 0.2),
+        "goals_reached": 60,
+    },
+    "tsne": {
+        name: {
+            "layer": "fc1",
+            "neighbours": 10,
+            "neighbours_kept": 0.8,
+            "neighbours_chance": 0.02,
+            "trustworthiness": 0.99,
+        }
+        for name in ("features", "pixels")
+    },
+    "contradictions": {
+        "frames": 600,
+        "pairs": 5,
+        "contradictions": 2,
+        "justified": 2,
+        "unknown": 1,
+        "worst_opposition": 0.7,
+    },
+    "loops": {
+        "loops": 4,
+        "longest": 9,
+        "frames_share": 0.02,
+        "episodes": _share(3, 30, 0.02, 0.27),
+    },
+    "class_model": {
+        "probability": _objective([0.9, 0.3, 0.9], [0.9, 0.3, 0.9]),
+        "logit": _objective([0.99, 0.4, 0.98], [0.99, 0.4, 0.98]),
+    },
+    "attribution": {
+        "layer": "relu2",
+        "shown": "grad_cam",
+        "film": {"heat_by": ["grad_cam", "grad_cam_logit", None, "grad_cam"]},
+    },
+    "truth": {
+        "trusted": "saliency",
+        "methods": {
+            "saliency": _method(True, [], 0.5),
+            "occlusion": _method(False, ["placebos", "pointing"], 0.1),
+        },
+        "placebos": {"ones": _mean(0.0, 0.0, 0.0), "horizon": _mean(0.3, 0.2, 0.4)},
+        "frames": 280,
+        "frames_unmoved": 20,
+        "outcomes": {
+            "flights": 60,
+            "follows": _mean(0.8, 0.6, 0.95),
+            "ground_changed": _mean(0.02, 0.0, 0.1),
+        },
+        "interventions": {
+            "target taken away": _mean(0.4, 0.3, 0.5),
+            "ground patch changed": _mean(0.05, 0.02, 0.2),
+        },
+    },
+    "response": {"rows": _LEVEL, "blind_below": 0.1},
+    "places": {
+        "window": {"nearest": 2.5, "farthest": 20.0, "sideways": 8.0},
+        "sides": {
+            "left": _side(0.4, [0.75, 0.25, 0.0], 0.2, 0.75),
+            "ahead": _side(0.2, [1.0, 0.0, 0.0], 0.0, 0.0),
+            "right": _side(0.4, [0.5, 0.0, 0.5], 0.0, 0.5),
+        },
+        "actions": [0.7, 0.1, 0.2],
+        "alone": 0,
+        "unseen": 0.08,
+        "blind": 0.5,
+        "least_gap": 0.000012,
+        "least_gap_ahead": 7.25,
+        "least_gap_left": -1.5,
+        "logit_gap": 0.0001,
+        "close": 0.0003,
+        "in_doubt": 0.0002,
+    },
+    "left_out": {"embedding": "It has no layers."},
+    "asymmetry": {
+        "dataset": {"signed": _mean(-0.2, -0.3, -0.1), "absolute": _mean(0.3, 0.2, 0.4)},
+        "grid": {"absolute": 0.25},
+    },
+}
+"""Content of `explanation.json` of the same policy."""
+
+_OF_SIX = {"certain": 4, **_share(6, 6, 0.5, 1.0)}
+GROUP: Plain = {
+    "ended": 6,
+    "failed": 0,
+    "damaged": 0,
+    "unfinished": 1,
+    "judged": 5,
+    "solved": _share(5, 6, 0.4, 1.0),
+    "frames_to_solve": {"more_than": None},
+    "verdicts": {"good": {**_OF_SIX, "successes": 5}},
+}
+"""Results of one setting of a sweep."""
+_RUN = {"state": "finished", "verdict": "good", "certain": True, "entropy": 0.5}
+SWEEP: Plain = {
+    "finished": 6,
+    "failed": 1,
+    "damaged": 1,
+    "unfinished": 1,
+    "judged": 5,
+    "certain": 4,
+    "judged_by_older_rule": 1,
+    "never_judged": 1,
+    "judge_command": "drone-rl sweep-report",
+    "error_rates": [0.05],
+    "episodes": [200],
+    "sides_not_offered": 1,
+    "best": {
+        "run": 3, "verdict": "good", "certain": True, "share": 0.99, "episodes": 200,
+        "report_command": "drone-rl verdict",
+    },
+    "groups": [
+        GROUP,
+        {**GROUP, "ended": 3, "solved": {"successes": 0}, "frames_to_solve": {"more_than": 9e4}},
+    ],
+    "runs": [
+        {**_RUN, "verdict": "one-sided (left)"}, {**_RUN, "verdict": "one-sided (right)"},
+        {**_RUN, "entropy": 0.001}, _RUN, _RUN, _RUN, {**_RUN, "state": "failed", "certain": None},
+        {**_RUN, "state": "damaged", "certain": None}, {**_RUN, "state": "unfinished"},
+    ],
+}  # fmt: skip
+"""Content of `summary.json` of a small sweep with runs in every state."""
+
+
+def _level(number: int, value: float, position: float, successes: int, oracle: int) -> Plain:
+    success = _share(successes, 200, successes / 200 - 0.05, successes / 200 + 0.05)
+    return {
+        "number": number,
+        "value": value,
+        "position": position,
+        "refused": None,
+        "oracle": _share(oracle, 200, oracle / 200 - 0.05, oracle / 200 + 0.05),
+        "impossible": oracle < 150,
+        "modes": {"constant": {"success": success, "unchanged": False}},
+    }
+
+
+def _along(group: str, unit: str, neutral: float, *levels: Plain) -> Plain:
+    along = {"group": group, "unit": unit, "neutral": neutral}
+    return {**along, "areas": {"constant": 0.75}, "levels": [*levels]}
+
+
+def _found(low: float, high: float, positions: list[float], **more: Any) -> Plain:
+    ends = {"low_open": None, "high_open": None, "failed": [], "flown": []}
+    return {"low": low, "high": high, "positions": positions, **ends, **more}
+
+
+_DARK = {
+    "good": False, "bad": True, "refused": None, "success": 0.4, "fragile": 0, "value": 0.8,
+    "worst": {"side": "right", "share": 0.47}, "end": "low", "impossible": False,
+    "oracle": _share(400, 400, 0.99, 1.0),
+}  # fmt: skip
+SHIFTS: Plain = {
+    "terms": CUBES.as_dict(),
+    **FIXED_SEED,
+    "settings": {"domain_episodes": 400, "episodes": 200, "seed": 0, "good_share": 0.9},
+    "file": {"path": "shifts.json", "dated": "2026-01-31 12:00"},
+    "plain": {"success": _share(200, 200, 0.98, 1.0), "oracle": _share(200, 200, 0.98, 1.0)},
+    "axes": {
+        "sun": _along(
+            "light", "degrees", 55.0, _level(1, 60, 5, 199, 200), _level(5, 0, -55, 20, 90)
+        ),
+        "blur": _along(
+            "sensor", "pixels", 0.0, _level(1, 0.5, 0.5, 200, 200), _level(5, 2, 2, 190, 200)
+        ),
+        "brightness": _along("light", "times", 1.0, _level(1, 0.8, -0.2, 80, 200)),
+    },
+    "together": _level(3, 0.0, 0.0, 3, 180),
+    "domain": {
+        "plain": {"good": True},
+        "ranges": {
+            "sun": _found(21.07, 60.0, [-33.93, 5.0], low_open=False, high_open=True),
+            "blur": _found(0.0, 1.5, [0.0, 1.5], high_open=False),
+            "brightness": _found(1.0, 1.0, [0.0, 0.0], low_open=False, failed=[_DARK]),
+        },
+    },
+}
