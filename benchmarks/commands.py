@@ -14,7 +14,6 @@ from drone_rl.utils.files import read_json
 def call(
     *args: str,
     statuses: tuple[int, ...] = (0,),
-    program: tuple[str, ...] = PROGRAM,
     environment: Mapping[str, str] | None = None,
     tree: Path | None = None,
 ) -> None:
@@ -23,7 +22,6 @@ def call(
     Args:
         args: Arguments of the command.
         statuses: Exit statuses that count as success.
-        program: Another program that takes the same arguments.
         environment: Additional environment variables.
         tree: Checkout whose code runs, in its folder; by default that of this program, here.
 
@@ -32,7 +30,7 @@ def call(
     """
     own = {} if tree is None else {"PYTHONPATH": str(tree)}
     done = subprocess.run(
-        [*program, *args],
+        [*PROGRAM, *args],
         capture_output=True,
         text=True,
         check=False,

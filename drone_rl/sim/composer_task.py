@@ -6,8 +6,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from dm_control import composer, mjcf
-from dm_control.composer.observation import observable
 from dm_env import specs
 
 from drone_rl.config import (
@@ -20,6 +18,7 @@ from drone_rl.config import (
 from drone_rl.sim import entities
 from drone_rl.sim.dynamics import BodyState, Dynamics, draw_seeds, make_dynamics
 from drone_rl.sim.dynamics.state import twist_about_z
+from drone_rl.sim.quiet_dm_control import composer, mjcf, observable
 from drone_rl.sim.rendering import Appearance, Poses, Raytracer, View
 from drone_rl.sim.rendering.scene import Scene, SemanticClass, compiled
 from drone_rl.sim.tasks import State, Task, as_task

@@ -35,12 +35,6 @@ def test_random_policy_matches_the_original_study():
     assert 125 < summary["mean_length"] < 142  # 133 there
 
 
-def test_number_of_episodes():
-    env = DroneEnv(8, pixels=False)
-    episodes = run_episodes(env, oracle_policy(env.worlds.task.settings), 11)
-    assert len(episodes.length) == 11
-
-
 def test_episodes_do_not_depend_on_the_batch_size():
     """Of 4 worlds, 10 episodes: three rounds, of which the last gives two worlds'."""
     policy = oracle_policy(TaskSettings())

@@ -28,7 +28,6 @@ MIN_BORDER = 2.0**-100  # metres. Smallest nonzero |border|; bounds the bits of 
 MAX_BORDER = 2.0**20  # metres. Largest |border|
 _NO_ENDS = (EndReason.RUNNING, EndReason.LOST_CONTROL)  # no control is lost in computer-vision mode
 _ENDS = tuple(end.name.lower() for end in EndReason if end not in _NO_ENDS)
-_DIGITS = len(str(10**5))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -175,7 +174,7 @@ def _read_steps(value: Any, where: str) -> dict[int, float]:
     """Parse fractions above 0 by number of steps; the numbers have no leading zeros."""
     steps = {}
     for name, share in schema.Plain().read(schema.as_mapping(value, where), where).items():
-        if not (name.isascii() and name.isdigit() and len(name) <= _DIGITS and name[0] != "0"):
+        if not (name.isascii() and name.isdecimal() and len(name) < 7 and name[0] != "0"):
             raise InputError(
                 f"{where}.{schema.shown(name)} is not a number of steps; give one above 0"
             )

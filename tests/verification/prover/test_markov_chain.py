@@ -129,8 +129,8 @@ def flying(name, num_envs, factor, num_cubes=3):
 
 
 def test_sampled_episodes_agree(place, monkeypatch):
-    env, network = flying("good", 500, factor=0.1, num_cubes=2)
-    task, flights = env.base_env.worlds.task, 2000
+    env, network = flying("good", 400, factor=0.1, num_cubes=2)
+    task, flights = env.base_env.worlds.task, 800
     cubes = place(task.settings, [4.0, -3.0])
     graph = explore(task.settings, cubes)
     done = propagate(graph, NodeEvaluator(env, network).on(graph))
@@ -163,7 +163,7 @@ def test_greedy_episodes_agree():
     assert torch.equal(done.steps, flown.length.double())
 
 
-def make_placements(box, points=6):
+def make_placements(box, points=3):
     """Sample random placements in a box."""
     low, high = np.array(box).T
     return low + np.random.RandomState(0).rand(points, len(box)) * (high - low)
