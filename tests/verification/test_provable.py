@@ -13,11 +13,15 @@ from drone_rl.config.commands import ProvableSettings
 from drone_rl.config.configuration import as_config
 from drone_rl.config.learning import Episodes
 from drone_rl.config.training import TrainerSettings, TrainSettings
+from drone_rl.envs import DroneEnv
+from drone_rl.policies.baselines import constant_policy
+from drone_rl.sim.actions import Move
 from drone_rl.training import Callback
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
+from drone_rl.utils.seeding import world_random_state
 from drone_rl.verification import provable
-from drone_rl.verification.provable import Journal, Round
+from drone_rl.verification.provable import Journal, Round, find_failures
 from drone_rl.verification.prove import Proof
 from tests.fake_flight import FLIGHT
 
@@ -308,3 +312,29 @@ def test_unsupported_settings_are_refused_before_training(change, message, tmp_p
     with pytest.raises(InputError, match=message):
         begin(tmp_path / "new", **change)
     assert not (tmp_path / "new").exists()
+
+
+TASK = TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60)
+
+
+def flown(num_episodes, enough):
+    env = DroneEnv(8, TASK, seed=4, pixels=False)
+    try:
+        return find_failures(env, constant_policy(Move.FORWARD), num_episodes, enough)
+    finally:
+        env.close()
+
+
+def test_find_failures_of_flying_straight():
+    places, episodes = flown(20, 1000)
+    assert episodes == 24  # whole batches
+    worlds = [world_random_state(4, i) for i in range(8)]
+    drawn = [w.uniform(-1.0, 1.0, size=(1, 2))[0, 0] * 6.0 for _ in range(3) for w in worlds]
+    aside = [y for y in drawn if abs(y) > TASK.touch_distance]
+    assert 0 < len(aside) < 24
+    np.testing.assert_allclose(places[:, 0], aside, rtol=1e-6)
+
+
+def test_find_failures_stops_at_enough():
+    places, episodes = flown(1000, 1)
+    assert episodes == 8 and 0 < len(places) <= 8

@@ -9,6 +9,9 @@ import torch
 import drone_rl
 from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import silent
+from drone_rl.verification.check import check
 from drone_rl.verification.checker.certificate import Outcome, parse_certificate
 from drone_rl.verification.checker.checker import (
     EpisodeEnds,
@@ -16,6 +19,7 @@ from drone_rl.verification.checker.checker import (
     check_certificate,
     ends_as_stated,
 )
+from tests.verification.checker.tampering import BYTES, CHANGES, tampered
 
 
 def findings(data, **settings):
@@ -169,3 +173,19 @@ def test_episodes_are_simulated_in_batches(make):
     assert simulator.fly(np.array([[-5.9], [0.0], [5.9], [0.1], [2.0]])).steps.tolist() == [
         *(19, 14, 19, 14, 15)
     ]
+
+
+def is_accepted(path):
+    try:
+        return check(path, flights=400, seed=0, progress=silent).accepted
+    except InputError:
+        return False
+
+
+@pytest.mark.parametrize("name", [*BYTES, *CHANGES])
+def test_a_tampered_certificate_is_rejected(one_sided, write, name):
+    assert not is_accepted(write(tampered(one_sided)[name]))
+
+
+def test_the_certificate_itself_is_accepted(one_sided, write):
+    assert is_accepted(write(one_sided))
