@@ -127,12 +127,11 @@ def check(
             f"the certificate is of policy {stated.name!r}, which is none of "
             f"{', '.join(policy_names())}; give policy= its file"
         )
-    policy = stated.name if policy is None else policy
-    loaded = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
-    weights = loaded.state["policy"]
-    required = loaded.in_task(**as_changes(task, "task")).task if task else None
-    check_same_policy(stated, loaded.description, weights, required)
-    policy = dataclasses.replace(loaded, description=stated.description)
+    policy = load_policy(stated.name if policy is None else policy, outputs=outputs)
+    weights = policy.state["policy"]
+    required = policy.in_task(**as_changes(task, "task")).task if task else None
+    check_same_policy(stated, policy.description, weights, required)
+    policy = dataclasses.replace(policy, description=stated.description)
     findings = check_certificate(
         stated,
         weights,

@@ -28,6 +28,7 @@ from drone_rl.utils.text import say
 from drone_rl.utils.threads import torch_threads
 from drone_rl.verification.prover.action_map import ActionMap, map_actions
 from drone_rl.verification.prover.arrangement import Window
+from drone_rl.verification.prover.bounds import masks_of
 from drone_rl.verification.prover.policy_spec import make_policy_spec
 
 
@@ -111,16 +112,15 @@ def places(
     """
     settings = from_arguments(PlacesSettings, settings, changes, places)
     progress = as_progress(progress)
-    policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
-    policy = policy.in_task(**as_changes(task, "task"))
+    policy = load_policy(policy, outputs=outputs).in_task(**as_changes(task, "task"))
     begin = time.perf_counter()
     network, gap = policy.make_network(), settings.logit_gap
     spec = make_policy_spec(policy.description, network, gap, settings.renderer)
-    whole = (slice(None), slice(None))
 
     def render(faces: NDArray[np.uint8]) -> torch.Tensor:
-        shown = [(whole, torch.from_numpy(faces))]
-        return spec.compositor.see(spec.compositor.paint_one(shown, len(faces)))
+        whole, masks = (slice(None), slice(None)), masks_of(torch.from_numpy(faces))
+        images, _ = spec.compositor.paint([(whole, masks, torch.arange(len(faces)))], len(faces))
+        return spec.compositor.see(images)
 
     with torch_threads(1), closing(spec):
         progress("comparing the renderer's images")
