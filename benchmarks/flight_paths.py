@@ -129,10 +129,10 @@ def fly_command(
     """
     ticks = period_ticks(quadrotor.settings)
     states = [body]
-    done = torch.full((len(body),), -1)
+    completed = torch.full((len(body),), -1)
     most = int(min(seconds, command.limit) / (ticks * quadrotor.settings.tick))
-    while len(states) <= most and bool((done < 0).any()):
+    while len(states) <= most and bool((completed < 0).any()):
         body = quadrotor.fly(body, command.goals(body), ticks, obstacles)
-        done = torch.where((done < 0) & command.is_complete(body), len(states), done)
+        completed = torch.where((completed < 0) & command.is_complete(body), len(states), completed)
         states.append(body)
-    return states, torch.where(done < 0, len(states), done)
+    return states, torch.where(completed < 0, len(states), completed)

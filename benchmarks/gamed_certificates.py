@@ -193,8 +193,8 @@ def _rehashed(policy: Policy) -> dict[str, Any]:
 def _is_proved(folder: Path, name: str, forge: Forge, **options: Any) -> bool:
     policy = _copy_shipped(name, folder)
     certificate_path(policy.path).write_text(json.dumps(forge(policy)))
-    done = judge(policy, episodes=20, sampled=False, progress=silent, **options)
-    return done.verdict.is_proved or done.status("proved") == 0
+    judged = judge(policy, episodes=20, sampled=False, progress=silent, **options)
+    return judged.verdict.is_proved or judged.status("proved") == 0
 
 
 def _is_covered(folder: Path, name: str) -> bool:
@@ -203,12 +203,12 @@ def _is_covered(folder: Path, name: str) -> bool:
     required = folder / "required_domain.json"
     required.write_text(json.dumps({_AXIS: {"high": _VALUE, "unit": "rows"}}))
     try:
-        done = judge(policy, require_domain=required, progress=silent)
+        judged = judge(policy, require_domain=required, progress=silent)
     except InputError:
         return False
-    return done.status() == 0
+    return judged.status() == 0
 
 
 def _is_good(name: str) -> bool:
-    done = judge(name, task=_TRIVIAL, progress=silent)
-    return done.status("good") == 0 or done.status() == 0
+    judged = judge(name, task=_TRIVIAL, progress=silent)
+    return judged.status("good") == 0 or judged.status() == 0

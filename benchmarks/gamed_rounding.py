@@ -78,8 +78,8 @@ def proved(path: Path) -> bool:
 def in_domain(path: Path) -> bool:
     """Return whether `shifts` finds a policy good without perturbation."""
     few: dict[str, Any] = {"axes": ["noise"], "strengths": [1], "modes": ["constant"]}
-    done = shifts(path, episodes=1, domain_episodes=200, progress=silent, **few)
-    return bool(done.numbers["domain"]["plain"]["good"])
+    result = shifts(path, episodes=1, domain_episodes=200, progress=silent, **few)
+    return bool(result.numbers["domain"]["plain"]["good"])
 
 
 def widened() -> tuple[dict[str, Any], dict[str, Tensor]]:

@@ -142,7 +142,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "peers": _benchmark(bench_peers, "libraries", *_COMMANDS, *_parts("peers")),
     "gymnasium": _benchmark(bench_gymnasium, "libraries", *_RENDERING),
     "flight_speed": _benchmark(bench_flight_speed, "flight", *_COLLECTING),
-    "flight_parity": _benchmark(bench_flight_parity, "flight", "sim"),
+    "flight_parity": _benchmark(bench_flight_parity, "flight", "sim", *_parts("forces_kernel")),
     "flight_paths": _benchmark(bench_flight_paths, "flight", "sim", "flight/commands"),
     "flight_moves": _benchmark(
         bench_experiment, "flight", *_SOLVING, experiment="flight", num_seeds=5

@@ -84,7 +84,7 @@ def test_policies_are_on_both_sides_of_every_threshold():
     kinds = {name: policy.kind for name, policy in policies().items()}
     for name in {name.rsplit(" ", 1)[0] for name in kinds}:
         assert len({kinds[f"{name} {shift}"] for shift in ("-0.03", "+0.03")}) == 2, name
-    assert set(kinds.values()) >= {*Kind} - {VerdictKind.ONE_SIDED_LEFT}
+    assert set(kinds.values()) >= {*VerdictKind} - {VerdictKind.ONE_SIDED_LEFT}
     assert kinds["all or nothing, success +0.00"] is VerdictKind.NONE  # exactly 0.9 is not more
 
 
