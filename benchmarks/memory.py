@@ -1,5 +1,6 @@
 """Memory of a whole training: its peak and its growth."""
 
+import gc
 import json
 import os
 import subprocess
@@ -11,8 +12,7 @@ import numpy as np
 
 from benchmarks.benchmark import Setup
 from benchmarks.commands import memory_status
-from drone_rl.utils.imports import leave_compiler_unloaded
-from drone_rl.utils.memory import look_for_garbage_rarely
+from drone_rl.utils.unloaded_compiler import leave_compiler_unloaded
 
 SETTLING_FRAMES = 100_000
 """Frames after which a training has met all batch lengths and numbers of active environments."""
@@ -31,10 +31,12 @@ def bench_memory(setup: Setup) -> dict[str, Any]:
     settling, frames = 1_000 if setup.quick else SETTLING_FRAMES, setup.memory_frames
     arguments = [str(folder / "memory"), str(settling + frames), setup.device]
     command = [sys.executable, "-m", __name__, *arguments]
-    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-    if done.returncode != 0:
-        raise RuntimeError(f"the training of the memory benchmark failed: status {done.returncode}")
-    measured = json.loads(done.stdout)
+    process = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    if process.returncode != 0:
+        raise RuntimeError(
+            f"the training of the memory benchmark failed: status {process.returncode}"
+        )
+    measured = json.loads(process.stdout)
     return {
         "peak_memory_mib": measured["peak"],
         "memory_growth_mib_per_million_frames": growth(measured["samples"], settling),
@@ -60,7 +62,7 @@ def growth(samples: Sequence[tuple[int, float]], settling: int) -> float | None:
 
 def main(folder: str, frames: str, device: str) -> None:
     """Train as `drone-rl train` does and print the resident memory after each update."""
-    look_for_garbage_rarely()
+    gc.set_threshold(50_000, 50, 100)
     leave_compiler_unloaded()
     import drone_rl
     from drone_rl.config.training import TrainerSettings

@@ -14,11 +14,11 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from drone_rl.collectors.complete_episodes import Episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.sim.tasks import CollectCubes, Goals
 from drone_rl.sim.tasks.collect_cubes import EndReason, Side
 from drone_rl.trust.baselines import BASELINES
-from drone_rl.trust.rule import Kind, Quantity, Rule, decide, kinds_within
+from drone_rl.trust.rule import Quantity, Rule, VerdictKind, decide, kinds_within
 from drone_rl.trust.verdict import estimate, observe
 
 L, A, R = Side
@@ -51,7 +51,7 @@ class SimulatedPolicy:
         return np.array(list(self.types.values()))
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> VerdictKind:
         """The true kind."""
         return decide([self._truth(i).level for i in range(len(_RULE.quantities))])
 
@@ -133,7 +133,7 @@ def bench_false_certain(quick: bool) -> dict[str, Any]:
     return {"false_certain_rate": worst["wrong"], "false_certain_worst": worst, "certain": rows}
 
 
-def judge_samples(policy: SimulatedPolicy, counts: NDArray) -> list[Kind | None]:
+def judge_samples(policy: SimulatedPolicy, counts: NDArray) -> list[VerdictKind | None]:
     """Return the kind of each sample if the verdict is certain, else None.
 
     Args:
@@ -214,9 +214,9 @@ def _observe(kind: Type, forward_share: float) -> list[float]:
     return observed
 
 
-def _episode(sides: tuple[Side, ...], hits: Any) -> Episodes:
+def _episode(sides: tuple[Side, ...], hits: Any) -> CompleteEpisodes:
     side = torch.tensor([[int(s) for s in sides]])
-    return Episodes(
+    return CompleteEpisodes(
         task=_TASK,
         goals=Goals(
             reached=torch.tensor([list(hits)], dtype=torch.bool),

@@ -16,11 +16,11 @@ import torch
 from benchmarks.benchmark import Setup
 from benchmarks.commands import call
 from benchmarks.scripted_policies import SCRIPTS, Script, ScriptedPolicy
-from drone_rl.collectors.complete_episodes import Episodes, run_episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes, run_episodes
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.trust.baselines import BASELINES, run_baselines
-from drone_rl.trust.rule import Kind
+from drone_rl.trust.rule import VerdictKind
 from drone_rl.trust.verdict import apply_rule
 from drone_rl.utils.exit_codes import NOT_CERTAIN
 from drone_rl.utils.seeding import Stream
@@ -33,7 +33,7 @@ SEEDS = (1, 2, 3)
 EPISODES, OTHERS = 400, 5000
 """Episodes of a verdict, and of the true kind."""
 _NUM_ENVS = 500
-_STATUSES = (NOT_CERTAIN, *(kind.exit_code for kind in Kind))
+_STATUSES = (NOT_CERTAIN, *(kind.exit_code for kind in VerdictKind))
 
 
 def bench_verdicts(setup: Setup) -> dict[str, Any]:
@@ -86,7 +86,7 @@ def _verdict(script: Script, episodes: int, seed: int) -> dict[str, Any]:
 
 
 @functools.cache
-def _baselines(task: TaskSettings, episodes: int, seed: int) -> dict[str, Episodes]:
+def _baselines(task: TaskSettings, episodes: int, seed: int) -> dict[str, CompleteEpisodes]:
     """Return the episodes of a task's baselines; they run once for all scripts."""
     return run_baselines(_NUM_ENVS, task, _make_env(task, seed).state_dict(), episodes)
 

@@ -7,13 +7,7 @@ import functools
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from drone_rl.utils.imports import (
-    import_quietly,
-    import_with_fallback,
-    register,
-    when_imported,
-)
-from drone_rl.utils.memory import collecting_no_garbage, with_one_stack_block
+from drone_rl.utils.gymnasium_names import register
 
 if TYPE_CHECKING:
     from drone_rl.config import ActionSettings as ActionSettings
@@ -114,17 +108,7 @@ _HOMES = {name: module for _, module, _, name, *_ in _FOUND}
 
 __all__ = [*_HOMES]  # pyright: ignore[reportUnsupportedDunderAll] (aliases above are public)
 
-when_imported("gymnasium", register)
-# both choose an OpenGL library when they are imported, which only images of OpenGL need
-import_with_fallback("dm_control._render", "MUJOCO_GL", "disabled")
-import_with_fallback("mujoco.rendering.classic.gl_context", "MUJOCO_GL", "disabled")
-# programs that a notebook starts inherit its backend, which may not be installed for them
-import_with_fallback("matplotlib", "MPLBACKEND", "agg")
-# dm_control searches for a display; TorchRL derives classes from one that it deprecates
-import_quietly("dm_control._render.glfw_renderer", "GLFWError", "DISPLAY")
-import_quietly("torchrl.collectors.weight_update", "DeprecationWarning", "WeightUpdaterBase")
-import_quietly("torchrl.collectors.distributed.generic", "DeprecationWarning", "WeightUpdaterBase")
-import_quietly("torchrl.collectors.distributed.rpc", "DeprecationWarning", "WeightUpdaterBase")
+register()
 
 
 def __getattr__(name: str) -> Any:
@@ -133,8 +117,7 @@ def __getattr__(name: str) -> Any:
         of_command = {"verdict": "judge", "chain": "chances"}.get(name)
         hint = f"; drone-rl {name} is drone_rl.{of_command}" if of_command else ""
         raise AttributeError(f"module 'drone_rl' has no attribute {name!r}{hint}")
-    with collecting_no_garbage():
-        module = with_one_stack_block(lambda: importlib.import_module(_HOMES[name]))
+    module = importlib.import_module(_HOMES[name])
     value = globals()[name] = _with_defaults(getattr(module, name), **_defaults_of(name))
     return value
 

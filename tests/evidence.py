@@ -196,10 +196,7 @@ EXPLANATION: Plain = {
     "attribution": {
         "layer": "relu2",
         "shown": "grad_cam",
-        "film": {
-            "heat_by": ["grad_cam", "grad_cam_logit", None, "grad_cam"],
-            "heat_of": ["grad_cam", "saliency"],
-        },
+        "film": {"heat_by": ["grad_cam", "grad_cam_logit", None, "grad_cam"]},
     },
     "truth": {
         "trusted": "saliency",
@@ -219,7 +216,6 @@ EXPLANATION: Plain = {
             "target taken away": _mean(0.4, 0.3, 0.5),
             "ground patch changed": _mean(0.05, 0.02, 0.2),
         },
-        "integration_error": {"mean": 0.001, "max": 0.007, "pictures": 30},
     },
     "response": {"rows": _LEVEL, "blind_below": 0.1},
     "places": {
@@ -265,7 +261,6 @@ SWEEP: Plain = {
     "finished": 6,
     "failed": 1,
     "damaged": 1,
-    "copies": 1,
     "unfinished": 1,
     "judged": 5,
     "certain": 4,
@@ -276,7 +271,7 @@ SWEEP: Plain = {
     "episodes": [200],
     "sides_not_offered": 1,
     "best": {
-        "run": 3, "verdict": "good", "certain": True, "share": 0.99, "episodes": 200, "equals": 1,
+        "run": 3, "verdict": "good", "certain": True, "share": 0.99, "episodes": 200,
         "report_command": "drone-rl verdict",
     },
     "groups": [

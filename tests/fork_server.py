@@ -12,11 +12,11 @@ import socket
 import sys
 
 from drone_rl.cli.main import COMMANDS
-from drone_rl.utils.imports import leave_compiler_unloaded
+from drone_rl.utils.unloaded_compiler import leave_compiler_unloaded
 
 _MORE = (
     *("cli.hydra.messages", "cli.hydra.help", "training.train", "trust.export"),
-    *("evaluation.evaluate", "evaluation.video"),
+    *("trust.evaluate", "trust.video"),
 )
 
 

@@ -13,7 +13,7 @@ from drone_rl.utils.batch import Batch
 from tools.readme.settings import list_commands, list_groups, list_parts
 
 MUTABLE = {
-    "collectors.complete_episodes:Episodes",
+    "collectors.complete_episodes:CompleteEpisodes",
     "collectors.complete_episodes:StepLog",
     "explanations.class_models:Attempts",
     "explanations.class_models:ClassModel",
@@ -27,7 +27,7 @@ MUTABLE = {
     "sweeps.figures:Layout",
     "sweeps.manifest:Sweep",
     "sweeps.rows:Row",
-    "sweeps.summary:Group",
+    "sweeps.summary:RunGroup",
     "training.callbacks:Progress",
     "training.learners:ActorCriticLearner",
     "training.learners:GradientLearner",

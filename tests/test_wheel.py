@@ -17,7 +17,7 @@ def test_wheel_contains_the_configuration_and_runs_without_the_checkout(tmp_path
         archive.extractall(tmp_path / "site")
     configs = {p.relative_to(ROOT / "conf") for p in (ROOT / "conf").rglob("*.yaml")}
     assert {f"drone_rl/conf/{path.as_posix()}" for path in configs} <= names
-    assert "drone_rl/py.typed" in names
+    assert {"drone_rl/py.typed", "hydra_plugins/drone_rl.py"} <= names
     assert "drone_rl/explanations/report/templates/report.html" in names
     page = {f"drone_rl/flight/fly_page/{n}" for n in ("index.html", "fly.js", "fly.css")}
     assert page <= names
@@ -26,8 +26,13 @@ def test_wheel_contains_the_configuration_and_runs_without_the_checkout(tmp_path
     assert "drone_rl/policies/zoo/proved.certificate.json" in names
     code = "import sys; sys.path.insert(0, 'site'); from drone_rl.cli.main import main; "
     code += "from drone_rl.utils.settings import conf_dir; "
+    code += "import hydra_plugins.drone_rl as plugins; assert 'site/' in plugins.__file__; "
     code += "assert str(conf_dir()).endswith('site/drone_rl/conf'), conf_dir(); main()"
-    command = [sys.executable, "-c", code, "train", "--help", "all"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "num_cubes: 3" in done.stdout
+    for words, status, text in (
+        (["train", "--help", "all"], 0, "task.num_cubes=3"),
+        (["train", "-m", "seed=range(0)"], 2, "a sweep of no runs"),  # by a sweeper of the wheel
+    ):
+        command = [sys.executable, "-c", code, *words]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == status, done.stderr
+        assert text in done.stdout + done.stderr

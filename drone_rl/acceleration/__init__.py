@@ -1,12 +1,11 @@
-"""Faster implementations of collecting, learning and inference. The package is optional.
+"""Faster implementations of collecting, learning and inference.
 
-Without it everything works, only slower. `drone_rl.collectors.speedups` is the one module that
-imports it. Each `try_create` returns an implementation, or the reasons why there is none.
+`drone_rl.collectors.speedups` is the one module that imports it. Each `try_create` returns an
+implementation, or the reasons why there is none.
 """
 
 from drone_rl.acceleration.direct_collector import DirectCollector as DirectCollector
 from drone_rl.acceleration.direct_collector import DirectStepper as DirectStepper
 from drone_rl.acceleration.fused_collector import FusedCollector as FusedCollector
-from drone_rl.acceleration.fused_network import ActivationCache as ActivationCache
 from drone_rl.acceleration.fused_network import FusedNetwork as FusedNetwork
 from drone_rl.acceleration.inference_kernel import BatchedInference as BatchedInference

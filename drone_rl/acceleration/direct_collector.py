@@ -9,7 +9,6 @@ from tensordict.nn import TensorDictModuleBase
 from tensordict.utils import NestedKey
 from torch import Tensor
 
-from drone_rl.acceleration.fused_network import ActivationCache
 from drone_rl.envs.direct_renderer import DirectRenderer, Entries, Reasons
 
 
@@ -41,10 +40,6 @@ class DirectCollector:
     def name(self) -> str:
         """Name in the log."""
         return f"direct collector: {self.reasons}" if self.reasons else "direct collector"
-
-    def cache_activations(self) -> ActivationCache | None:
-        """Return None: PyTorch discards the activations of the forward pass."""
-        return None
 
     def collect(self, num_envs: int) -> TensorDictBase:
         """Run an episode in each of the first environments; trajectories count from 0."""

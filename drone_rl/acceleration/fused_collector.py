@@ -4,7 +4,6 @@ Stepping in Python takes most of the time: a small network is evaluated on a fra
 microseconds, and a frame is rendered in as many.
 """
 
-import sys
 from collections.abc import Iterable, Mapping
 from typing import Any, Self
 
@@ -16,7 +15,6 @@ from torchrl.envs.utils import ExplorationType
 
 from drone_rl.acceleration import rollout_kernel
 from drone_rl.acceleration.direct_collector import DirectCollector
-from drone_rl.acceleration.fused_network import ACTIVATIONS, ActivationCache
 from drone_rl.acceleration.packed_layers import PackedNetwork, unsupported
 from drone_rl.envs.direct_renderer import DirectRenderer, Entries, Reasons
 from drone_rl.envs.transforms import CropRows, StandardizePixels
@@ -30,8 +28,6 @@ _MAX_STEPS = 64
 """Steps of one launch of the kernel; most episodes end within them."""
 _MAX_PIXELS = 2**23
 """Maximum number of pixels of all frames of one launch."""
-_MAX_ACTIVATIONS = 2**24
-"""Maximum number of cached activations: 64 MiB."""
 
 
 class FusedCollector:
@@ -81,7 +77,6 @@ class FusedCollector:
                 "end_reason": torch.empty(rows, dtype=torch.int32),
             }
         )
-        self._cache: ActivationCache | None = None
         self._logits = torch.empty(0, num_actions)
         self._owner = getattr(self._actor.network, "owner", "the policy")
         self._kernel = rollout_kernel.make_kernel(*rules.functions)
@@ -103,16 +98,6 @@ class FusedCollector:
         network = PackedNetwork(actor.network, int(rollout_kernel.TOGETHER), first_pixel)
         return cls(direct, network, rules, num_threads)
 
-    def cache_activations(self) -> ActivationCache | None:
-        """Keep the activations of all layers from now on, unless they are too many.
-
-        Batches get an entry "activations", which a `FusedNetwork` with this cache reads.
-        """
-        parts = _MAX_ACTIVATIONS // (self._num_rows * self._network.num_activations)
-        if self._cache is None and parts:
-            self._cache = ActivationCache(parts * self._num_rows, self._network.num_activations)
-        return self._cache
-
     def collect(self, num_envs: int) -> TensorDictBase:
         """Run an episode in each of the first environments; traj_ids are 0 to `num_envs` - 1."""
         if self._actor.exploration not in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC):
@@ -121,8 +106,6 @@ class FusedCollector:
         self._renderer.env.start()
         state: Any = self._renderer.worlds.state
         self._rules.begin(state)
-        if self._cache is not None:
-            self._cache.clear()
         self._network.update()
         env_of_step, logged = self._run(num_envs)
         for name in ("action", "end_reason"):
@@ -132,7 +115,7 @@ class FusedCollector:
         else:
             entries = self._renderer.flags(logged["reward"], logged["end_reason"])
         batch = TensorDict({}, [len(env_of_step)])
-        for key in ("pixels", "logits", "action", ACTIVATIONS):
+        for key in ("pixels", "logits", "action"):
             if key in logged:
                 batch.set(key, logged[key])
         for key, value in entries.items():
@@ -161,8 +144,6 @@ class FusedCollector:
         logged = self._buffer.read(rows, names)
         if is_observed and self._rows != slice(0, self._renderer.view.height):
             logged["pixels"] = logged["pixels"][..., self._rows, :].contiguous()
-        if self._cache is not None and is_observed:
-            logged[ACTIVATIONS] = self._cache.add(rows, self._network.weights, logged["pixels"])
         return envs, logged
 
     def _launch(self, num_envs: int, part: int, kept: tuple[str, ...]) -> None:
@@ -182,10 +163,6 @@ class FusedCollector:
         rollout.actions = wp.from_torch(opened["action"])
         rollout.rewards = wp.from_torch(opened["reward"])
         rollout.end_reasons = wp.from_torch(opened["end_reason"])
-        if self._cache is not None:
-            first, last = part * self._num_rows, (part + 1) * self._num_rows
-            # an empty slice if the cache has too little memory
-            rollout.outputs = wp.from_torch(self._cache.outputs[first:last])
 
         def run_span(member: int, first: int, last: int) -> None:
             inputs = [first, last, member, rollout, self._rules.arrays]
@@ -272,17 +249,11 @@ def _not_fused_policy(direct: DirectCollector) -> list[str]:
 
 
 class RolloutBuffer:
-    """Memory for the steps of episodes, in as many parts as the longest episode needs.
-
-    Memory is reused, also that of the last two results once nothing refers to them: allocating
-    memory for as many frames takes longer than filling it. Two, as a loop over a collector still
-    refers to a batch while the next one is collected.
-    """
+    """Memory for the steps of episodes, in as many parts as the longest episode needs."""
 
     def __init__(self, part: Mapping[str, Tensor]) -> None:
         self._arrays = dict(part)
         self._num_rows = len(next(iter(self._arrays.values())))
-        self._results: dict[str, list[Tensor]] = {}
 
     def open(self, part: int, kept: Iterable[str]) -> dict[str, Tensor]:
         """Return memory of a part, to be written. Shapes: (num_rows, *).
@@ -301,28 +272,4 @@ class RolloutBuffer:
 
     def read(self, rows: Tensor, names: Iterable[str]) -> dict[str, Tensor]:
         """Return copies of rows (k,), counted from the first part's, of the named entries."""
-        read = {name: self._to_read(name, len(rows)) for name in names}
-        for name, values in read.items():
-            torch.index_select(self._arrays[name], 0, rows, out=values)
-        return read
-
-    def _to_read(self, name: str, count: int) -> Tensor:
-        """Return memory for rows: that of an earlier result if it is large enough and free."""
-        results = self._results.setdefault(name, [])
-        for result in results:
-            if len(result) >= count and is_free(result):
-                return result[:count]
-        array = self._arrays[name]
-        made = array.new_empty(count + count // 4, *array.shape[1:])
-        results[:] = [*[result for result in results if not is_free(result)][-1:], made]
-        return made[:count]
-
-
-def is_free(tensor: Tensor) -> bool:
-    """Return whether nothing else refers to the memory of a tensor: no view and no array."""
-    return _holders(tensor) == _holders(torch.empty(1))
-
-
-def _holders(tensor: Tensor) -> tuple[int, int]:
-    storage = tensor.untyped_storage()
-    return torch._C._storage_Use_Count(storage._cdata), sys.getrefcount(storage)
+        return {name: self._arrays[name].index_select(0, rows) for name in names}

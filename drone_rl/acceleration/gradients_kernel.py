@@ -177,15 +177,13 @@ class PackedParams:
 
 
 @wp.struct
-class Batch:
+class FrameBatch:
     """Frames with outputs and gradients."""
 
     frames: wp.array2d[float]
     """Gray. Shape: (num_frames, pixels)."""
     outputs: wp.array[float]
     """Outputs of all layers, row after row, as `forward` writes them."""
-    rows: wp.array[int]
-    """Row in `outputs` of each frame."""
     grad_output: wp.array2d[float]
     """Gradient with respect to the logits. Shape: (num_frames, num_actions)."""
     grad_frames: wp.array2d[float]
@@ -207,7 +205,7 @@ class Workspace:
 
 
 @wp.kernel
-def forward(first: int, last: int, params: PackedParams, batch: Batch) -> None:
+def forward(first: int, last: int, params: PackedParams, batch: FrameBatch) -> None:
     """Compute the outputs of all layers of frames `first` to `last` - 1; launch dimension 1."""
     size = _size(params)
     for block in range(first, last, BLOCK):
@@ -247,9 +245,9 @@ def _stride(params: PackedParams, layer: int) -> int:
 
 @wp.kernel
 def backward(
-    first: int, last: int, params: PackedParams, batch: Batch, workspace: Workspace
+    first: int, last: int, params: PackedParams, batch: FrameBatch, workspace: Workspace
 ) -> None:
-    """Run the backward pass of frames `first` to `last` - 1, see `Batch`; launch dimension 1."""
+    """Run the backward pass of frames `first` to `last` - 1; launch dimension 1."""
     for block in range(first, last, BLOCK):
         end = wp.min(block + BLOCK, last)
         for frame in range(block, end):
@@ -265,13 +263,13 @@ def backward(
 
 @wp.func
 def _begin(
-    params: PackedParams, frame: int, block: int, batch: Batch, workspace: Workspace
+    params: PackedParams, frame: int, block: int, batch: FrameBatch, workspace: Workspace
 ) -> None:
     """Write the inputs of a frame's linear layers, and the logits' gradient padded with zeros."""
     inputs_offset = params.kept_offsets[params.num_convolutions - 1]
     top = params.geometries.shape[0] - 1
     row = frame - block
-    source = batch.rows[frame] * _size(params) + inputs_offset
+    source = frame * _size(params) + inputs_offset
     size = params.output_offsets[top] - inputs_offset
     copy(batch.outputs, source, workspace.inputs, row * params.inputs_stride, size)
     at = BLOCK * params.output_offsets[top] + row * _stride(params, top)
@@ -312,11 +310,16 @@ def _linear(params: PackedParams, layer: int, count: int, workspace: Workspace) 
 
 @wp.func
 def _convolution(
-    params: PackedParams, layer: int, frame: int, block: int, batch: Batch, workspace: Workspace
+    params: PackedParams,
+    layer: int,
+    frame: int,
+    block: int,
+    batch: FrameBatch,
+    workspace: Workspace,
 ) -> None:
     """Compute the gradients with respect to a convolution's weights and input, for one frame."""
     row = frame - block
-    frame_at = batch.rows[frame] * _size(params)
+    frame_at = frame * _size(params)
     input_offset = int(0)
     if layer > 0:
         input_offset = frame_at + params.kept_offsets[layer - 1]

@@ -48,9 +48,9 @@ class EvaluateCommand(AppearanceCommandSettings, EvaluateSettings):
     def run(self, folder: Path) -> tuple[int, float]:
         """Evaluate one policy; return the exit status and the success rate."""
         policy = self.load_policy()
-        done = drone_rl.evaluate(policy, self, progress=log)
-        (folder / "evaluation.json").write_text(json.dumps(done.as_dict(), indent=2))
-        print(done)
+        result = drone_rl.evaluate(policy, self, progress=log)
+        (folder / "evaluation.json").write_text(json.dumps(result.as_dict(), indent=2))
+        print(result)
         _log.info("policy: %s", policy.path)
         _log.info("written: %s", folder / "evaluation.json")
         if self.videos:
@@ -61,11 +61,11 @@ class EvaluateCommand(AppearanceCommandSettings, EvaluateSettings):
                 folder / "videos",
                 self.videos,
                 greedy=self.greedy,
-                seed=done.seed.value,
+                seed=result.seed.value,
                 device=self.device,
                 renderer=self.renderer,
             )
-        return 0, done.success
+        return 0, result.success
 
 
 class PlayCommand(AppearanceCommandSettings, DeviceSettings):
@@ -98,17 +98,17 @@ class PlayCommand(AppearanceCommandSettings, DeviceSettings):
     def run(self, folder: Path) -> tuple[int, None]:
         """Record a policy's episodes, or open the viewer; return the exit status."""
         policy = self.load_policy()
-        chosen = {k: getattr(self, k) for k in ("greedy", "seed", "device", "renderer")}
+        options = {k: getattr(self, k) for k in ("greedy", "seed", "device", "renderer")}
         from drone_rl.trust.video import film, view  # slow to import
 
         if self.viewer:
-            view(policy, **chosen)
+            view(policy, **options)
         elif self.format == "rerun":
             from drone_rl.explanations.rerun_export import record
 
-            record(policy, folder, self.episodes, **chosen)
+            record(policy, folder, self.episodes, **options)
         else:
-            film(policy, folder, self.episodes, **chosen)
+            film(policy, folder, self.episodes, **options)
         return 0, None
 
 
@@ -132,14 +132,14 @@ class VerdictCommand(AppearanceCommandSettings, JudgeSettings):
     def run(self, folder: Path) -> tuple[int, str]:
         """Judge one policy; return the exit status and the kind's name."""
         names = ("dynamics", "appearance", "certificate", "shifts", "require_domain")
-        given = {name: getattr(self, name) for name in names}
-        done = drone_rl.judge(self.policy, self, **given, **self.shared(), progress=silent)
-        finish(done, folder / "verdict.json")
-        if self.require == "proved" and done.verdict.evidence["proof"] is None:
+        options = {name: getattr(self, name) for name in names}
+        result = drone_rl.judge(self.policy, self, **options, **self.shared(), progress=silent)
+        finish(result, folder / "verdict.json")
+        if self.require == "proved" and result.verdict.evidence["proof"] is None:
             _log.info(
                 "the policy has no certificate; make one with drone-rl prove, or give certificate="
             )
-        return done.status(self.require), done.verdict.kind.value
+        return result.status(self.require), result.verdict.kind.value
 
 
 class ShiftsCommand(RolloutCommandSettings, ShiftSettings):
@@ -147,11 +147,13 @@ class ShiftsCommand(RolloutCommandSettings, ShiftSettings):
 
     def run(self, folder: Path) -> tuple[int, float]:
         """Measure robustness; return the exit status and the mean area under the success curves."""
-        chosen, given = self.as_base(ShiftSettings), self.shared()
-        done = drone_rl.shifts(self.policy, chosen, dynamics=self.dynamics, **given, progress=log)
-        ranges = "" if done.numbers["domain"] is None else "domain.yaml, "
-        finish(done, folder, f"shifts.json, {ranges}shifts.png and strips.png")
-        return 0, done.area
+        settings = self.as_base(ShiftSettings)
+        result = drone_rl.shifts(
+            self.policy, settings, dynamics=self.dynamics, **self.shared(), progress=log
+        )
+        ranges = "" if result.numbers["domain"] is None else "domain.yaml, "
+        finish(result, folder, f"shifts.json, {ranges}shifts.png and strips.png")
+        return 0, result.area
 
 
 class BodiesCommand(CommandSettings, BodiesSettings):
@@ -159,10 +161,10 @@ class BodiesCommand(CommandSettings, BodiesSettings):
 
     def run(self, folder: Path) -> tuple[int, int]:
         """Judge policies under several dynamics; return the exit status and number of verdicts."""
-        chosen = self.as_base(BodiesSettings)
-        done = drone_rl.bodies(settings=chosen, outputs=self.paths.outputs, progress=silent)
-        finish(done, folder, "bodies.json, bodies.png and bodies.svg")
-        return 0, sum(map(len, done.numbers["policies"].values()))
+        settings = self.as_base(BodiesSettings)
+        result = drone_rl.bodies(settings=settings, outputs=self.paths.outputs, progress=silent)
+        finish(result, folder, "bodies.json, bodies.png and bodies.svg")
+        return 0, sum(map(len, result.numbers["policies"].values()))
 
 
 class ExportCommand(CommandSettings, HeldOutSettings):
@@ -210,13 +212,13 @@ class ExportCommand(CommandSettings, HeldOutSettings):
 
         policy = drone_rl.load_policy(self.policy, outputs=self.paths.outputs)
         target = folder / f"{self.name}.{self.format}"
-        noted, chosen = choice_in_sweep(policy.path) or (None, None)
-        command = self.command or noted
+        recorded_command, choice = choice_in_sweep(policy.path) or (None, None)
+        command = self.command or recorded_command
         if self.format == "onnx":
             seed = root_seed(self.seed)
             _log.info("compares the model with PyTorch in the policy's episodes")
-            found = export_onnx(policy, target, command=command, seed=seed.value)
-            difference = f"{found.difference:.1e} in {found.frames:,} images"
+            exported = export_onnx(policy, target, command=command, seed=seed.value)
+            difference = f"{exported.difference:.1e} in {exported.frames:,} images"
             _log.info("written: %s, which differs from PyTorch by at most %s", target, difference)
             recorded = recorded_verdict(policy, read_verdicts(self.paths.outputs))
             kind, success = ("not judged", "") if recorded is None else describe(recorded)
@@ -229,7 +231,7 @@ class ExportCommand(CommandSettings, HeldOutSettings):
                 target,
                 self,
                 command=command,
-                chosen=chosen,
+                chosen=choice,
                 certificate=self.certificate,
                 shifts=self.shifts,
                 outputs=self.paths.outputs,

@@ -9,7 +9,7 @@ from drone_rl.cli.settings import CommandSettings, PolicyCommandSettings, finish
 from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.explanations.chapter_figures import FigureSettings
 from drone_rl.explanations.settings import ClassModelsSettings, ExplainSettings
-from drone_rl.trust.rule import Kind
+from drone_rl.trust.rule import VerdictKind
 from drone_rl.utils.progress import log
 from drone_rl.utils.schema import Listed, OneOf, Whole
 
@@ -24,7 +24,7 @@ class ExplainCommand(CommandSettings, ExplainSettings):
     folders of runs, latest, or names of shipped policies."""
     num_envs: Annotated[int, Whole(1, unit="environments")] = 128
     """Environments in a batch; bounds memory."""
-    require: Annotated[str, OneOf(tuple(Kind))] | None = None
+    require: Annotated[str, OneOf(tuple(VerdictKind))] | None = None
     """Kind of verdict to require, such as good; other kinds and uncertain verdicts end with exit
     status 10 to 13 or 18. null accepts all kinds."""
     task: TaskChanges = no_changes()
@@ -35,7 +35,7 @@ class ExplainCommand(CommandSettings, ExplainSettings):
     def run(self, folder: Path) -> tuple[int, str]:
         """Explain policies in a report; return the exit status and the report's path."""
         loaded = [drone_rl.load_policy(p, outputs=self.paths.outputs) for p in self.policy]
-        done = drone_rl.explain(
+        result = drone_rl.explain(
             [p.in_task(**self.task).in_dynamics(**self.dynamics) for p in loaded],
             self.as_base(ExplainSettings),
             folder=folder,
@@ -43,11 +43,11 @@ class ExplainCommand(CommandSettings, ExplainSettings):
             outputs=self.paths.outputs,
             progress=log,
         )
-        print(done)
-        verdicts = [numbers["verdict"] for numbers in done.numbers.values()]
-        refused = [v for v in verdicts if not (v["certain"] and v["kind"] == self.require)]
-        statuses = [verdict["exit_code"] or Kind.NONE.exit_code for verdict in refused]
-        return max(statuses if self.require else (), default=0), str(done.report)
+        print(result)
+        verdicts = [numbers["verdict"] for numbers in result.numbers.values()]
+        unmet = [v for v in verdicts if not (v["certain"] and v["kind"] == self.require)]
+        statuses = [verdict["exit_code"] or VerdictKind.NONE.exit_code for verdict in unmet]
+        return max(statuses if self.require else (), default=0), str(result.report)
 
 
 class ReportCommand(CommandSettings):
@@ -71,10 +71,10 @@ class ClassModelsCommand(PolicyCommandSettings, ClassModelsSettings):
 
     def run(self, folder: Path) -> tuple[int, str]:
         """Optimize observations for each action; return the exit status and the image's path."""
-        done = drone_rl.class_models(
+        result = drone_rl.class_models(
             self.policy, self.as_base(ClassModelsSettings), **self.shared()
         )
-        finish(done, folder, "class_models.png, class_models.json and class_models.npz")
+        finish(result, folder, "class_models.png, class_models.json and class_models.npz")
         return 0, str(folder / "class_models.png")
 
 
@@ -84,6 +84,6 @@ class ReproduceCommand(CommandSettings, FigureSettings):
     def run(self, folder: Path) -> tuple[int, str]:
         """Make a figure of the chapter again; return the exit status and the image's path."""
         settings = self.as_base(FigureSettings)
-        done = drone_rl.reproduce(self.figure, settings, outputs=self.paths.outputs)
-        finish(done, folder, f"figure_{self.figure}.png and figure_{self.figure}.json")
+        result = drone_rl.reproduce(self.figure, settings, outputs=self.paths.outputs)
+        finish(result, folder, f"figure_{self.figure}.png and figure_{self.figure}.json")
         return 0, str(folder / f"figure_{self.figure}.png")

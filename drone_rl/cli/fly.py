@@ -31,10 +31,10 @@ class FlyCommand(AppearanceCommandSettings, FlySettings):
         from drone_rl.trust.video import has_display  # imports torch
 
         policy = self.load_policy()
-        given = self.as_base(FlySettings)
+        settings = self.as_base(FlySettings)
         with (
             contextlib.suppress(KeyboardInterrupt),
-            drone_rl.fly(policy, given, outputs=self.paths.outputs) as page,
+            drone_rl.fly(policy, settings, outputs=self.paths.outputs) as page,
         ):
             print(f"open {page.url}", flush=True)
             _log.info("policy %s; end with Ctrl-C", policy.name)

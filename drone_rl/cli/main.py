@@ -1,5 +1,6 @@
 """`drone-rl <command> [setting=value ...]`: find the command and run it."""
 
+import gc
 import importlib
 import os
 import sys
@@ -8,8 +9,7 @@ from typing import Any
 import drone_rl
 from drone_rl.cli.commands import COMMANDS, TABLE
 from drone_rl.utils.exit_codes import INTERRUPTED, OUTPUT_CLOSED, USER_ERROR
-from drone_rl.utils.imports import leave_compiler_unloaded
-from drone_rl.utils.memory import look_for_garbage_rarely, with_one_stack_block
+from drone_rl.utils.unloaded_compiler import leave_compiler_unloaded
 
 USAGE = """\
 drone-rl: train, evaluate and audit vision policies of a drone.
@@ -95,20 +95,28 @@ def _main(args: list[str]) -> int:
         return 0
     name, overrides = args[0], args[1:]
     if name not in ("demo", *COMMANDS):
-        from drone_rl.cli.hydra.words import no_command  # slow: imports Hydra
+        from drone_rl.cli.hydra.mistakes import no_command  # slow: imports Hydra
 
         print(f"error: {no_command(name, overrides, ['demo', *COMMANDS])}", file=sys.stderr)
         return USER_ERROR
     if name == "demo" and {"-h", "--help"} & set(overrides):
         print(DEMO_USAGE)
         return 0
-    look_for_garbage_rarely()
+    _configure_process()
     from drone_rl.cli.hydra.messages import guarded  # slow: imports Hydra
 
     leave_compiler_unloaded()
     steps = [("train", overrides), *((step, _same_policy(overrides)) for step in _DEMO)]
     steps = steps if name == "demo" else [(name, overrides)]
-    return with_one_stack_block(lambda: guarded(lambda: _run_all(steps)))
+    return guarded(lambda: _run_all(steps))
+
+
+def _configure_process() -> None:
+    """Set what libraries read when they are imported."""
+    gc.set_threshold(50_000, 50, 100)  # imports create half a million objects and no garbage
+    os.environ["MPLBACKEND"] = "agg"  # a notebook's backend may be missing here
+    if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
+        os.environ["MUJOCO_GL"] = "disabled"  # only the viewer's window needs OpenGL
 
 
 def _same_policy(overrides: list[str]) -> list[str]:
@@ -131,7 +139,8 @@ def _run_all(steps: list[tuple[str, list[str]]]) -> int:
 
 def find_command(name: str) -> Any:
     """Return the settings class of a command, such as `SweepReportCommand`."""
-    return getattr(importlib.import_module(f"drone_rl.cli.{COMMANDS[name]}"), TABLE[name]["class"])
+    module = importlib.import_module(f"drone_rl.cli.{COMMANDS[name]}")
+    return getattr(module, f"{name.title().replace('-', '')}Command")
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import drone_rl
 from drone_rl.config.commands import PathsSettings
@@ -40,6 +40,14 @@ class CommandSettings(Settings):
         which = which if isinstance(which, str) else which[0]
         trained = trained_policies(self.paths.outputs) if which == "latest" else []
         return str(trained[0].parents[1]) if trained else which
+
+    def with_policy_of_now(self, folder: Path) -> Self:
+        """Replace policy=latest by the run that it selects now: another may be the newest soon."""
+        which, used = getattr(self, "policy", None), self.used_policy(folder)
+        if which not in ("latest", ("latest",)) or used == "latest":
+            return self
+        _log.info("policy=latest is %s", used)
+        return self.replace(policy=used if which == "latest" else (used,))
 
 
 def with_name(overrides: Sequence[str], setting: str) -> list[str]:

@@ -9,13 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import drone_rl
 from drone_rl.cli.hydra import resuming
-from drone_rl.cli.hydra.launchers import (
-    LocalLauncher,
-    RayLauncher,
-    SlurmLauncher,
-    register_plugins,
-)
-from drone_rl.cli.hydra.searching import OptunaSweeper
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.config.commands import ProvableSettings
 from drone_rl.config.training import Logger, Tensorboard, TrainSettings
@@ -60,8 +53,7 @@ class TrainCommand(CommandSettings, TrainSettings):
 
     @classmethod
     def prepare(cls, overrides: Sequence[str]) -> list[str]:
-        """Register launchers and sweeper with Hydra; return the complete command line."""
-        register_plugins(LocalLauncher, SlurmLauncher, RayLauncher, OptunaSweeper)
+        """Return the complete command line."""
         return resuming.complete(overrides)
 
     def used_policy(self, folder: Path) -> str:
@@ -75,7 +67,7 @@ class TrainCommand(CommandSettings, TrainSettings):
         if self.provable.rounds:
             train = functools.partial(drone_rl.train_until_proved, how=self.provable)
         try:
-            done = train(
+            training = train(
                 self.as_base(TrainSettings),
                 folder=folder,
                 resume=self.resume is not None,
@@ -85,20 +77,20 @@ class TrainCommand(CommandSettings, TrainSettings):
         except (KeyboardInterrupt, SystemExit) as stop:
             if "training" not in vars(stop):  # nothing was saved since the last checkpoint
                 raise
-            done = vars(stop)["training"]
+            training = vars(stop)["training"]
         _log.info("run folder: %s", folder)
-        for row in done.result.get("rounds", ()):
+        for row in training.result.get("rounds", ()):
             _log.info(describe_round(row))
-        if not done.reason.startswith("SIG"):
-            if before is not None and before.get("frames") == done.result["frames"]:
+        if not training.reason.startswith("SIG"):
+            if before is not None and before.get("frames") == training.result["frames"]:
                 _log.info(
                     "the run is already finished (%s, %s frames); %s",
-                    *(done.reason, f"{done.result['frames']:,}"),
-                    _TRAIN_LONGER.get(done.reason, "start a new one"),
+                    *(training.reason, f"{training.result['frames']:,}"),
+                    _TRAIN_LONGER.get(training.reason, "start a new one"),
                 )
-            return 0, done.running_reward
+            return 0, training.running_reward
         _log.info("resume with: %s", resuming.resume_command(folder))
-        return 128 + signal.Signals[done.reason].value, done.running_reward
+        return 128 + signal.Signals[training.reason].value, training.running_reward
 
 
 def _callbacks(settings: TrainCommand, folder: Path) -> list["Callback"]:

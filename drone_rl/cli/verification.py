@@ -20,8 +20,8 @@ class ProveCommand(PolicyCommandSettings, ProveSettings):
 
     def run(self, folder: Path) -> tuple[int, float]:
         """Verify a policy; return the exit status and the fraction of placements with success."""
-        chosen = self.as_base(ProveSettings)
-        proof = drone_rl.prove(self.policy, chosen, folder=folder, **self.shared())
+        settings = self.as_base(ProveSettings)
+        proof = drone_rl.prove(self.policy, settings, folder=folder, **self.shared())
         print(proof)
         _log.info("written: %s", folder / "certificate.json")
         if proof.certificate["found"]["stopped_by"] == "limit_s":
@@ -42,7 +42,7 @@ class CheckCommand(CommandSettings, CheckSettings):
 
     def run(self, folder: Path) -> tuple[int, bool]:
         """Check a certificate; return the exit status and whether it is accepted."""
-        done = drone_rl.check(
+        result = drone_rl.check(
             self.certificate,
             self.policy,
             self.as_base(CheckSettings),
@@ -50,8 +50,8 @@ class CheckCommand(CommandSettings, CheckSettings):
             outputs=self.paths.outputs,
             progress=silent,
         )
-        finish(done, folder / "check.json")
-        return done.exit_code, done.accepted
+        finish(result, folder / "check.json")
+        return result.exit_code, result.accepted
 
 
 class PlacesCommand(PolicyCommandSettings, PlacesSettings):
@@ -59,10 +59,10 @@ class PlacesCommand(PolicyCommandSettings, PlacesSettings):
 
     def run(self, folder: Path) -> tuple[int, float]:
         """Map actions by cube position; return the exit status and the blind fraction of places."""
-        chosen = self.as_base(PlacesSettings)
-        done = drone_rl.places(self.policy, chosen, **self.shared(), progress=silent)
-        finish(done, folder, "places.json, places.png and places.svg")
-        return 0, done.numbers["blind"]
+        settings = self.as_base(PlacesSettings)
+        result = drone_rl.places(self.policy, settings, **self.shared(), progress=silent)
+        finish(result, folder, "places.json, places.png and places.svg")
+        return 0, result.numbers["blind"]
 
 
 class ChainCommand(PolicyCommandSettings, ChanceSettings):
@@ -74,7 +74,7 @@ class ChainCommand(PolicyCommandSettings, ChanceSettings):
 
     def run(self, folder: Path) -> tuple[int, float]:
         """Compute outcome probabilities; return the exit status and the success probability."""
-        chosen, cubes = self.as_base(ChanceSettings), self.cubes or None
-        done = drone_rl.chances(self.policy, cubes, chosen, **self.shared(), progress=silent)
-        finish(done, folder / "chances.json")
-        return 0, done.success
+        settings, cubes = self.as_base(ChanceSettings), self.cubes or None
+        result = drone_rl.chances(self.policy, cubes, settings, **self.shared(), progress=silent)
+        finish(result, folder / "chances.json")
+        return 0, result.success

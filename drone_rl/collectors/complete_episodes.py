@@ -19,7 +19,7 @@ from drone_rl.utils.provenance import num_cores
 
 
 @dataclasses.dataclass
-class Episodes:
+class CompleteEpisodes:
     """`n` finished episodes of a task."""
 
     task: Task[Any]
@@ -30,7 +30,9 @@ class Episodes:
     length: Tensor  # (n,) int64
 
     @classmethod
-    def ended(cls, task: Task[Any], info: Mapping[str, Tensor], length: Tensor) -> "Episodes":
+    def ended(
+        cls, task: Task[Any], info: Mapping[str, Tensor], length: Tensor
+    ) -> "CompleteEpisodes":
         """Build episodes from the last step's info, on the CPU.
 
         `info` has the task's `scored` and "end_reason", as in `Worlds.info`, shapes (n, *), and
@@ -43,12 +45,14 @@ class Episodes:
         """Return the number of episodes."""
         return len(self.length)
 
-    def __getitem__(self, rows: slice | Tensor) -> "Episodes":
+    def __getitem__(self, rows: slice | Tensor) -> "CompleteEpisodes":
         """Return some of the episodes."""
-        return Episodes(self.task, self.goals[rows], self.end_reason[rows], self.length[rows])
+        return CompleteEpisodes(
+            self.task, self.goals[rows], self.end_reason[rows], self.length[rows]
+        )
 
     @classmethod
-    def joined(cls, parts: Sequence["Episodes"]) -> "Episodes":
+    def joined(cls, parts: Sequence["CompleteEpisodes"]) -> "CompleteEpisodes":
         """Concatenate episodes of one task."""
         goals = type(parts[0].goals).joined([part.goals for part in parts])
         ends, lengths = ([getattr(p, name) for p in parts] for name in ("end_reason", "length"))
@@ -93,8 +97,15 @@ class StepLog:
 
 
 def run_episodes(
-    env: EnvBase, actor: TensorDictModuleBase, num_episodes: int, **how: Any
-) -> Episodes:
+    env: EnvBase,
+    actor: TensorDictModuleBase,
+    num_episodes: int,
+    *,
+    greedy: bool = True,
+    is_compiled: bool = False,
+    is_exact: bool = False,
+    log: StepLog | None = None,
+) -> CompleteEpisodes:
     """Run complete episodes, `env.batch_size[0]` at a time; return them, on the CPU.
 
     Environment i samples its episodes from its own random stream, so that the k-th episode has the
@@ -103,9 +114,16 @@ def run_episodes(
     """
     setting = f"episodes={num_episodes}"
     require_memory(num_episodes * EPISODE_BYTES, setting, "give fewer episodes")
-    how.setdefault("is_exact", False)
-    batches = episode_batches(env, actor, num_episodes, **how)
-    return Episodes.joined([final_episodes(env, batch) for batch in batches])[:num_episodes]
+    batches = episode_batches(
+        env,
+        actor,
+        num_episodes,
+        greedy=greedy,
+        is_compiled=is_compiled,
+        is_exact=is_exact,
+        log=log,
+    )
+    return CompleteEpisodes.joined([final_episodes(env, batch) for batch in batches])[:num_episodes]
 
 
 def episode_batches(
@@ -154,13 +172,13 @@ def episode_batches(
         yield batch
 
 
-def final_episodes(env: EnvBase, batch: TensorDictBase) -> Episodes:
+def final_episodes(env: EnvBase, batch: TensorDictBase) -> CompleteEpisodes:
     """Return the outcomes of a batch of complete episodes, on the CPU."""
     task = worlds_of(env).task
     done = cast(Tensor, batch["next", "done"])[:, 0].nonzero()[:, 0]
     names = (*task.scored, "end_reason")
     info = {name: cast(Tensor, batch["next", "info", name])[done] for name in names}
-    return Episodes.ended(task, info, _lengths(batch))
+    return CompleteEpisodes.ended(task, info, _lengths(batch))
 
 
 def _lengths(batch: TensorDictBase) -> Tensor:

@@ -135,9 +135,6 @@ class SteppingCollector:
         """Name in the log."""
         return f"stepping collector: {self.reasons}"
 
-    def cache_activations(self) -> None:
-        """Return None: PyTorch discards the activations of the forward pass."""
-
     def collect(self, num_envs: int) -> TensorDictBase:
         """Run an episode in each of the first environments; traj_ids are 0 to num_envs - 1."""
         self._env.num_envs = num_envs

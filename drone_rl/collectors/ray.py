@@ -124,9 +124,6 @@ class RayEpisodeCollector:
         """Handles of the remote `RemoteEpisodes`."""
         return self._pool.remote_collectors
 
-    def cache_activations(self) -> None:
-        """Return None: workers do not send activations."""
-
     def __iter__(self) -> Iterator[TensorDictBase]:
         """Yield batches without end."""
         while True:

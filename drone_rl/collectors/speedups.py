@@ -1,11 +1,10 @@
-"""Use `drone_rl.acceleration` if it is installed and supports a configuration.
+"""Use `drone_rl.acceleration` if it supports a configuration.
 
 This is the only module that imports that package. TorchRL and PyTorch do what it does not support.
 """
 
-import importlib
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Literal
 
 import torch
 from tensordict.nn import TensorDictModuleBase
@@ -13,30 +12,18 @@ from tensordict.utils import NestedKey
 from torch import Tensor, nn
 from torchrl.envs import EnvBase
 
+from drone_rl.acceleration import (
+    BatchedInference,
+    DirectCollector,
+    DirectStepper,
+    FusedCollector,
+    FusedNetwork,
+)
 from drone_rl.envs.direct_renderer import DirectRenderer, Reasons
-
-if TYPE_CHECKING:
-    from drone_rl.acceleration import (
-        ActivationCache,
-        DirectCollector,
-        DirectStepper,
-        FusedCollector,
-    )
 
 Acceleration = Literal["none", "direct", "fused"]
 """Implementation. "none": step with TorchRL. "direct": step without it, bit-identical. "fused": one
 kernel per batch of episodes; sampling and sums are in another order."""
-MISSING = Reasons(["drone_rl.acceleration is not installed"])
-
-
-def _package() -> Any:
-    """Return `drone_rl.acceleration`, or None if it is missing; errors within it are raised."""
-    try:
-        return importlib.import_module("drone_rl.acceleration")
-    except ModuleNotFoundError as error:
-        if error.name != "drone_rl.acceleration":
-            raise
-        return None
 
 
 def accelerated_collector(
@@ -48,7 +35,7 @@ def accelerated_collector(
     actor_keys: Iterable[NestedKey] = (),
     keep_actor_entries: bool = True,
     num_threads: int = 1,
-) -> "FusedCollector | DirectCollector | Reasons":
+) -> FusedCollector | DirectCollector | Reasons:
     """Return an accelerated collector of complete episodes, or the reasons why there is none.
 
     Args:
@@ -62,18 +49,13 @@ def accelerated_collector(
     """
     if acceleration == "none":
         return Reasons(["acceleration is off"])
-    package = _package()
-    if package is None:
-        return MISSING
     renderer = DirectRenderer.try_create(env, actor.in_keys, next_keys)
     if isinstance(renderer, Reasons):
         return renderer
-    direct = package.DirectCollector(
-        renderer, actor, env.action_key, actor_keys, keep_actor_entries
-    )
+    direct = DirectCollector(renderer, actor, env.action_key, actor_keys, keep_actor_entries)
     if acceleration == "direct":
         return direct
-    found = package.FusedCollector.try_create(direct, num_threads)
+    found = FusedCollector.try_create(direct, num_threads)
     if isinstance(found, Reasons):
         direct.reasons = found
         return direct
@@ -82,18 +64,15 @@ def accelerated_collector(
 
 def accelerated_stepper(
     env: EnvBase, observed: Sequence[NestedKey], next_keys: Iterable[NestedKey]
-) -> "DirectStepper | Reasons":
+) -> DirectStepper | Reasons:
     """Return an object that steps environments without TorchRL, or the reasons why there is none.
 
     `observed` are the entries that the actor reads, `next_keys` the ("next", ...) entries to keep.
     """
-    package = _package()
-    if package is None:
-        return MISSING
     if tuple(observed) != ("pixels",):
         return Reasons([f"the policy reads {', '.join(map(str, observed))} instead of pixels"])
     renderer = DirectRenderer.try_create(env, observed, next_keys)
-    return renderer if isinstance(renderer, Reasons) else package.DirectStepper(renderer)
+    return renderer if isinstance(renderer, Reasons) else DirectStepper(renderer)
 
 
 def accelerated_gradients(
@@ -101,24 +80,17 @@ def accelerated_gradients(
     num_threads: int = 1,
     *,
     wrt: Literal["weights", "pixels"] = "weights",
-    cache: "Callable[[], ActivationCache | None]" = lambda: None,
 ) -> nn.Module:
     """Return the network with fused forward and backward pass if that is supported, else itself.
 
     See `FusedNetwork.try_create` for the arguments.
     """
-    package = _package()
-    if package is None:
-        return network
-    found = package.FusedNetwork.try_create(network, num_threads, wrt=wrt, cache=cache)
+    found = FusedNetwork.try_create(network, num_threads, wrt=wrt)
     return network if isinstance(found, Reasons) else found
 
 
 def accelerated_inference(network: nn.Module) -> Callable[[Tensor], Tensor]:
     """Return a function from pixels to logits without gradients, safe to call from any thread."""
     plain = torch.no_grad()(network.forward)
-    package = _package()
-    if package is None:
-        return plain
-    found = package.BatchedInference.try_create(network)
+    found = BatchedInference.try_create(network)
     return plain if isinstance(found, Reasons) else found

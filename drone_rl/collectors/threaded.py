@@ -3,7 +3,7 @@
 import contextvars
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import torch
 from tensordict import TensorDictBase
@@ -11,11 +11,7 @@ from tensordict.nn import TensorDictModuleBase
 from torchrl.collectors import BaseCollector
 
 from drone_rl.collectors.batched_collector import BatchedCollector
-from drone_rl.collectors.episodes import EpisodeCollector
 from drone_rl.utils.threads import set_torch_threads
-
-if TYPE_CHECKING:
-    from drone_rl.acceleration import ActivationCache
 
 
 class ThreadedCollector(BaseCollector):
@@ -47,13 +43,6 @@ class ThreadedCollector(BaseCollector):
     def actor(self) -> TensorDictModuleBase:
         """The policy that learns."""
         return self.collectors[0].actor
-
-    def cache_activations(self) -> "ActivationCache | None":
-        """See `FusedCollector`; None for several collectors, whose batches are joined."""
-        first, *others = self.collectors
-        if others or not isinstance(first, EpisodeCollector):
-            return None
-        return first.source.cache_activations()
 
     def iterator(self) -> Iterator[TensorDictBase]:
         """Yield batches without end; a `for` over the collector calls it."""

@@ -1,6 +1,5 @@
 """Settings of a training."""
 
-import re
 from typing import Annotated, Any, Self
 
 from drone_rl.config import (
@@ -165,30 +164,19 @@ class TrainSettings(Settings):
         return super().replace(**changes)
 
 
-_NEEDS = re.compile(r"([a-z][\w.-]*) (?:could not be imported|is not installed|is required)")
-"""Pattern of the messages of TorchRL's loggers about a missing package."""
-
-
 class Logger(Variant):
     """Settings of a TorchRL logger."""
 
     def make(self, *args: Any, **kwargs: Any) -> Any:
-        """Make the logger; raise an `InputError` if it or the package that it needs is missing."""
+        """Make the logger; raise an `InputError` if that fails."""
         try:
             return super().make(*args, **kwargs)
-        except ImportError as error:  # TorchRL raises it without the name of the package
-            words = _NEEDS.match(str(error).lower())
-            package = (error.name or (words and words[1]) or "").partition(".")[0]
-            remedy = f" (pip install {package})" if package else ""
-            raise InputError(
-                f"logger _target_={self.target} can't be made ({error}); install the package that "
-                f"it needs{remedy}, or choose another logger"
-            ) from error
-        except Exception as error:  # a wrong argument, or any error of the package
+        except Exception as error:  # a missing package, a wrong argument, or a server out of reach
             text = " ".join(f"{error}".split()) or type(error).__name__
             raise InputError(
-                f"logger _target_={self.target} can't be made ({text}); give its arguments as in "
-                "+logger.NAME.exp_name=first, and check that its package works"
+                f"logger _target_={self.target} can't be made ({text}); install the package that "
+                "it needs, give its arguments as in +logger.NAME.exp_name=first, or choose another "
+                "logger"
             ) from error
 
 

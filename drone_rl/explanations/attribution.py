@@ -1,4 +1,4 @@
-"""Section "attribution": heat maps of all frames, and of one episode as a film."""
+"""Section "attribution": heat maps of one episode as a film."""
 
 from collections.abc import Collection, Mapping
 from typing import Any
@@ -21,18 +21,17 @@ COUNT = 6  # key frames of an episode, as in Figs. 13 to 15.
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """Return "attribution".
 
-    Arrays: "map_..." (T, H, W) of each method, each frame's maximum 1; of the film's n steps
-    "film_frames" (n, H, W, 3), "film_heat" (n, H, W), "film_heat_..." of each method,
-    "film_probabilities" and "film_actions".
+    Arrays of the film's n steps: "film_frames" (n, H, W, 3), "film_heat" (n, H, W) and
+    "film_heat_..." of each method, the maximum of each 1, "film_probabilities", "film_actions".
     """
-    arrays = {f"map_{name}": _normalized(maps) for name, maps in context.frame_maps.items()}
     flights, explainer, film = context.flights, context.explainer, context.film
+    to_frame = context.scenes.to_frame
     first = int(np.flatnonzero(flights.episode == FILMED)[0])
-    methods = shown_methods(context.maps)
     inputs = film.tensor("observations"), film.tensor("actions")
-    every = {n: context.scenes.to_frame(of(*inputs)) for n, of in explainer.methods().items()}
-    heat, by = first_heat({name: every[name] for name in methods})
-    arrays |= {f"film_heat_{name}": _normalized(maps) for name, maps in every.items()}
+    heats = {n: to_frame(of(*inputs)) for n, of in explainer.methods().items()}
+    methods = shown_methods(heats)
+    heat, by = first_heat({name: heats[name] for name in methods})
+    arrays = {f"film_heat_{name}": _normalized(maps) for name, maps in heats.items()}
     arrays |= {
         "film_frames": film.frames,
         "film_heat": _normalized(heat),
@@ -42,12 +41,10 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     frames = key_frames(flights, FILMED, context.scenes.task, len(film))
     numbers = {
         "layer": explainer.layer,
-        "methods": list(context.maps),
+        "methods": list(heats),
         "shown": methods[0],
         "film": {
-            "episode": FILMED,
             "heat_by": by,
-            "heat_of": list(every),
             "key_steps": [{"step": frame - first, "why": why} for frame, why in frames],
         },
     }
@@ -56,8 +53,8 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
 
 def shown_methods(methods: Collection[str]) -> list[str]:
     """Return the methods of "film_heat" among those that a policy allows, the first one first."""
-    shown = [name for name in SHOWN if name in methods]
-    return shown or [name for name in INSTEAD if name in methods][:1]
+    preferred = [name for name in SHOWN if name in methods]
+    return preferred or [name for name in INSTEAD if name in methods][:1]
 
 
 def first_heat(maps: Mapping[str, Tensor]) -> tuple[Tensor, list[str | None]]:
@@ -92,20 +89,19 @@ def key_frames(
     end); then those furthest from all.
     """
     frames = np.flatnonzero(dataset.episode == episode)[:most]
-    chosen: dict[int, str] = {int(frames[0]): "start"}
     reached, missed = (frames[dataset.event[frames] == event] for event in (1, -1))
-    half = frames[len(frames) // 2] if not len(reached) else (frames[0] + reached[0]) // 2
-    terms = task.vocabulary
-    events = [(int(t), f"{terms.reaches} a {terms.goal}") for t in reached]
-    events += [(int(t), f"misses a {terms.goal}") for t in missed]
-    end = int(dataset.end_reason[frames[-1]])
+    half = (frames[0] + reached[0]) // 2 if len(reached) else frames[len(frames) // 2]
+    terms, end = task.vocabulary, int(dataset.end_reason[frames[-1]])
+    reasons = [(frames[0], "start")]
+    reasons += [(frame, f"{terms.reaches} a {terms.goal}") for frame in reached]
+    reasons += [(frame, f"misses a {terms.goal}") for frame in missed]
     if end not in (0, task.success_end):
-        reason = task.ends(end).name.lower().replace("_", " ")
-        events.append((int(frames[-1]), f"fails: {reason}"))
-    for frame, why in [*events, (int(half), "approach")]:
-        if len(chosen) < COUNT:
-            chosen.setdefault(frame, why)
-    while len(chosen) < min(COUNT, len(frames)):
-        away = np.abs(frames[:, None] - np.array(list(chosen))[None]).min(1)
-        chosen[int(frames[away.argmax()])] = "in between"
-    return sorted(chosen.items())
+        reasons.append((frames[-1], f"fails: {task.ends(end).name.lower().replace('_', ' ')}"))
+    key_steps: dict[int, str] = {}
+    for frame, why in [*reasons, (half, "approach")]:
+        if len(key_steps) < COUNT:
+            key_steps.setdefault(int(frame), why)
+    while len(key_steps) < min(COUNT, len(frames)):
+        away = np.abs(frames[:, None] - np.array([*key_steps])).min(1)
+        key_steps[int(frames[away.argmax()])] = "in between"
+    return sorted(key_steps.items())

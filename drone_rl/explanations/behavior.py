@@ -71,7 +71,7 @@ def flaws_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]
     alike = median_frame_change(flights)
     pairs = find_pairs(data, alike, scenes.actions, data.offset(scenes.task))
     numbers = {
-        "contradictions": summarise_pairs(pairs, data, alike),
+        "contradictions": summarise_pairs(pairs, data),
         "loops": summarise_loops(flights, find_loops(flights, scenes.actions)),
     }
     return numbers, {}
@@ -113,7 +113,7 @@ def find_pairs(
     """
     flat = dataset.observations.reshape(len(dataset), -1).astype(np.float64)
     probs = dataset.probabilities
-    found = []
+    every = []
     for start in range(0, len(flat), 500):
         rows = slice(start, start + 500)
         distance = cdist(flat[rows], flat) / np.sqrt(flat.shape[1])
@@ -123,17 +123,17 @@ def find_pairs(
             away = np.abs(offset[left] - offset[right]).max()
             kind = "contradiction" if away <= ALIKE_METRES else "justified"
             kind = "unknown" if np.isnan(away) else kind
-            found.append(Pair(left, right, float(distance[i, j]), float(swing[i, j]), kind))
+            every.append(Pair(left, right, float(distance[i, j]), float(swing[i, j]), kind))
     used: set[int] = set()
     kept = []
-    for pair in sorted(found, key=lambda pair: (-pair.opposition, pair.distance)):
+    for pair in sorted(every, key=lambda pair: (-pair.opposition, pair.distance)):
         if not used & {pair.left, pair.right}:
             used |= {pair.left, pair.right}
             kept.append(pair)
     return kept
 
 
-def summarise_pairs(pairs: list[Pair], dataset: RolloutDataset, alike: float) -> dict[str, Any]:
+def summarise_pairs(pairs: list[Pair], dataset: RolloutDataset) -> dict[str, Any]:
     """Return counts by kind, and the first pairs."""
     worst = [pair.opposition for pair in pairs if pair.kind == "contradiction"]
     return {
@@ -144,9 +144,7 @@ def summarise_pairs(pairs: list[Pair], dataset: RolloutDataset, alike: float) ->
         "justified": sum(pair.kind == "justified" for pair in pairs),
         "unknown": sum(pair.kind == "unknown" for pair in pairs),
         "worst_opposition": max(worst, default=None),
-        "alike": alike,
         "alike_metres": ALIKE_METRES,
-        "min_opposition": MIN_OPPOSITION,
         "list": [dataclasses.asdict(pair) for pair in pairs[:LISTED]],
     }
 
@@ -169,8 +167,8 @@ def find_loops(
     for start, end in zip(starts, [*starts[1:], len(moves)], strict=True):
         reversals = int(turns[start : end - 1].sum())
         if reversals >= min_reversals and reversible[start]:
-            found = {"first": int(start), "length": int(end - start), "reversals": reversals}
-            loops.append(found)
+            loop = {"first": int(start), "length": int(end - start), "reversals": reversals}
+            loops.append(loop)
     return loops
 
 

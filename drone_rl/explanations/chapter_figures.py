@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageOps
 from scipy.spatial.distance import cdist
 
 from drone_rl.config.configuration import from_arguments
@@ -39,14 +39,11 @@ from drone_rl.utils.settings import Settings
 STEP_LENGTH = 0.25
 """Metres per action: episodes then have about as many frames as those of the chapter."""
 _POLICIES: Mapping[int, tuple[str, ...]] = {
-    **{7: ("poor", "right_and_forward"), 8: ("good",), 9: ("good",)},
-    **{10: ("good",), 11: ("uniform",), 12: ("right_and_forward",)},
-    **{13: ("good",), 14: ("uniform",), 15: ("right_and_forward",)},
-}
-"""Policies of each figure, by the names of shipped policies."""
-_COUNTS: Mapping[tuple[int, str], tuple[int, int]] = {
-    **{(7, "poor"): (400, 15), (7, "right_and_forward"): (400, 8), (8, "good"): (625, 7)},
-}
+    7: ("poor", "right_and_forward"), 8: ("good",), 9: ("good",), 10: ("good",), 11: ("uniform",),
+    12: ("right_and_forward",), 13: ("good",), 14: ("uniform",), 15: ("right_and_forward",),
+}  # fmt: skip
+"""Shipped policies of each figure."""
+_COUNTS = {(7, "poor"): (400, 15), (7, "right_and_forward"): (400, 8), (8, "good"): (625, 7)}
 """Frames and episodes that the chapter states for figures of t-SNE."""
 _PERPLEXITY = 30.0
 """Of t-SNE, unless there are too few frames."""
@@ -90,11 +87,8 @@ class ChapterFigure(Result):
         """Write `figure_N.png` and `figure_N.json`."""
         name = f"figure_{self.settings.figure}"
         self.image.save(folder / f"{name}.png")
-        written = {
-            **{"caption": self.caption, "settings": self.settings.values()},
-            **self.numbers,
-            **provenance(),
-        }
+        header = {"caption": self.caption, "settings": self.settings.values()}
+        written = {**header, **self.numbers, **provenance()}
         (folder / f"{name}.json").write_text(json.dumps(written, indent=2))
 
     def __str__(self) -> str:
@@ -127,18 +121,18 @@ def reproduce(
     """
     settings = from_arguments(FigureSettings, settings, {"figure": figure, **changes}, reproduce)
     if figure not in _MAKERS:
-        known = ", ".join(map(str, _MAKERS))
-        raise InputError(f"figure={figure} can't be reproduced; give one of {known}")
+        numbers = ", ".join(map(str, _MAKERS))
+        raise InputError(f"figure={figure} can't be reproduced; give one of {numbers}")
     subjects = [load_policy(name, outputs=outputs) for name in _POLICIES.get(figure, ())]
     image, caption, numbers = _MAKERS[figure](settings, subjects)
     return ChapterFigure(settings, image, caption, numbers)
 
 
-_Made = tuple[Image.Image, str, dict[str, Any]]
-_Maker = Callable[[FigureSettings, list[Policy]], _Made]
+_Drawn = tuple[Image.Image, str, dict[str, Any]]
+_Maker = Callable[[FigureSettings, list[Policy]], _Drawn]
 
 
-def _three_states(settings: FigureSettings, subjects: list[Policy]) -> _Made:
+def _three_states(settings: FigureSettings, subjects: list[Policy]) -> _Drawn:
     """Fig. 3: REINFORCE on the process, and its gradient next to the exact one."""
     del subjects
     seeds = [(settings.seed + i) % 2**64 for i in range(5)]  # torch's generators take 64 bits
@@ -157,25 +151,27 @@ def _three_states(settings: FigureSettings, subjects: list[Policy]) -> _Made:
     spread = 1.96 * float(estimates.std()) / len(estimates) ** 0.5
     right.hist(estimates.numpy(), bins=25, color=css(MUTED), label="estimates (Eq. 12)")
     right.axvline(exact, color=css(INK), label=f"exact gradient: {exact:.4f}")
-    mean_text = f"mean estimate: {float(estimates.mean()):.4f} ± {spread:.4f}"
-    right.axvline(float(estimates.mean()), color=css(INK), linestyle=":", label=mean_text)
+    estimated = float(estimates.mean())
+    label = f"mean estimate: {estimated:.4f} ± {spread:.4f}"
+    right.axvline(estimated, color=css(INK), linestyle=":", label=label)
     right.set(xlabel="gradient by the logit of a1, uniform policy", ylabel="batches")
     right.legend(frameon=False, fontsize=8)
-    right.set_ylim(0, 1.5 * right.get_ylim()[1])  # room for the legend
     caption = (
         "REINFORCE on the three-state process; action a1 leads from s0 to s2 and reward 1 with "
         f"probability {SUCCESS_PROBABILITY:g}, otherwise to s1."
     )
     numbers = {
-        **{"exact_gradient": exact, "estimated_gradient": float(estimates.mean())},
-        **{"half_width95": spread, "final_probability": float(mean[-1])},
+        "exact_gradient": exact,
+        "estimated_gradient": estimated,
+        "half_width95": spread,
+        "final_probability": float(mean[-1]),
     }
     return Image.open(io.BytesIO(to_png(figure))), caption, numbers
 
 
-def _embeddings(settings: FigureSettings, subjects: list[Policy]) -> _Made:
+def _embeddings(settings: FigureSettings, subjects: list[Policy]) -> _Drawn:
     """Figs. 7 and 8: t-SNE of the last layer's features, frames tinted by action."""
-    shown, numbers = [], {}
+    maps, numbers = [], {}
     for subject in subjects:
         frames, episodes = _COUNTS[settings.figure, subject.name]
         data, network, scenes = _record(subject, settings, frames, episodes)
@@ -195,19 +191,24 @@ def _embeddings(settings: FigureSettings, subjects: list[Policy]) -> _Made:
         explanation = Explanation(about, {"tsne_features": points}, arrays)
         count = len(np.unique(data.episode))
         title = f"{subject.name}: {len(data)} frames of {count} episodes"
-        shown.append(images.titled(tsne_map(explanation, "features"), title))
+        maps.append(images.titled(tsne_map(explanation, "features"), title))
         by_action = np.bincount(arrays["actions"], minlength=len(scenes.actions.names)).tolist()
         numbers[subject.name] = {
-            **{"frames": len(data), "episodes": count, "layer": layer, **faithful},
+            "frames": len(data),
+            "episodes": count,
+            "layer": layer,
+            **faithful,
             "frames_by_action": dict(zip(scenes.actions.names, by_action, strict=True)),
         }
     names = "forward violet, left orange, right blue"
     method = "SNE (Eq. 17 as printed)" if settings.kernel == "gaussian" else "t-SNE"
     caption = f"{method} of the policy's features, tinted by the {settings.tint} action: {names}."
-    return images.gridded(_padded(shown), len(shown)), caption, numbers
+    size = max(one.width for one in maps), max(one.height for one in maps)
+    canvases = [ImageOps.pad(one, size, color="white", centering=(0, 0)) for one in maps]
+    return images.gridded(canvases, len(maps)), caption, numbers
 
 
-def _pair(settings: FigureSettings, subjects: list[Policy]) -> _Made:
+def _pair(settings: FigureSettings, subjects: list[Policy]) -> _Drawn:
     """Fig. 9: two similar frames with opposite actions."""
     (subject,) = subjects
     data, _, scenes = _record(subject, settings, 625, 7)
@@ -221,62 +222,60 @@ def _pair(settings: FigureSettings, subjects: list[Policy]) -> _Made:
     flat = data.observations.reshape(len(data), -1)
     distance = cdist(flat[left], flat[right]) / np.sqrt(flat.shape[1])
     row, column = np.unravel_index(distance.argmin(), distance.shape)
-    pair = int(left[row]), int(right[column])
-    shown = [
+    pair = [int(left[row]), int(right[column])]
+    tiles = [
         images.frame_with_probabilities(data.arrays, frame, f"frame {frame}") for frame in pair
     ]
-    apart = float(np.abs(np.diff(data.offset(scenes.task)[list(pair)], axis=0)).max())
+    apart = float(np.abs(np.diff(data.offset(scenes.task)[pair], axis=0)).max())
     where = f"the next cube is {apart:.1f} m from its place in the other one"
-    where = "one of them has no next cube" if np.isnan(apart) else where
+    if np.isnan(apart):
+        where = "one of them has no next cube"
     caption = (
         f"The two most similar frames on which policy {subject.name} most probably moves to "
         f"opposite sides; {where}."
     )
-    known = None if np.isnan(apart) else apart
-    numbers = {"frames": list(pair), "distance": float(distance.min()), "metres_apart": known}
-    return images.gridded(shown, 2), caption, numbers
+    metres = None if np.isnan(apart) else apart
+    numbers = {"frames": pair, "distance": float(distance.min()), "metres_apart": metres}
+    return images.gridded(tiles, 2), caption, numbers
 
 
-def _class_models(settings: FigureSettings, subjects: list[Policy]) -> _Made:
+def _class_models(settings: FigureSettings, subjects: list[Policy]) -> _Drawn:
     """Figs. 10 to 12: class models with the chapter's refinements."""
     (subject,) = subjects
-    found = class_models(subject, seed=settings.seed, **CHAPTER)
+    models = class_models(subject, seed=settings.seed, **CHAPTER)
     caption = (
         f"Class models of policy {subject.name}: gradient ascent on the action's probability "
         "(Eq. 18) in steps of fixed length, with blur and the training set's mean and deviation."
     )
-    header, values = found.rows()
+    header, values = models.rows()
     probabilities = dict(zip(header[1:], map(float, values[1:]), strict=True))
-    return found.image(), caption, {"probabilities": probabilities}
+    return models.image(), caption, {"probabilities": probabilities}
 
 
-def _attributions(settings: FigureSettings, subjects: list[Policy]) -> _Made:
+def _attributions(settings: FigureSettings, subjects: list[Policy]) -> _Drawn:
     """Figs. 13 to 15: Grad-CAM of the sampled action in six frames."""
     (subject,) = subjects
     data, network, scenes = _record(subject, settings, None, 20)
     task: Any = scenes.task
     rows = _spread_by_side(data.offset(task)[:, 1], task.settings.touch_distance)
     explainer = Explainer(network, scenes.observe(empty_scene(scenes))[0])
-    taken = data.tensor("actions")[rows]
-    heat = explainer.grad_cam(data.tensor("observations")[rows], taken)
-    shown = []
+    heat = explainer.grad_cam(data.tensor("observations")[rows], data.tensor("actions")[rows])
+    tiles = []
     for letter, row, one in zip("abcdef", rows, scenes.to_frame(heat).numpy(), strict=False):
-        chosen = int(data.actions[row])
         hot = images.titled(images.enlarge(images.heated(data.frames[row], one)), f"({letter})")
-        shown.append(
-            images.stacked(
-                [hot, images.indicator(data.probabilities[row].tolist(), chosen, hot.width)]
-            )
-        )
+        bars = images.indicator(data.probabilities[row].tolist(), int(data.actions[row]), hot.width)
+        tiles.append(images.stacked([hot, bars]))
     caption = (
         f"Grad-CAM (Eqs. 19 and 20) of policy {subject.name} for the sampled action, whose bar is "
         "dark; the next cube is to the left, ahead or to the right."
     )
-    return images.gridded(shown, 3), caption, {"frames": rows.tolist()}
+    return images.gridded(tiles, 3), caption, {"frames": rows.tolist()}
 
 
 _MAKERS: Mapping[int, _Maker] = {
-    **{3: _three_states, 7: _embeddings, 8: _embeddings, 9: _pair},
+    3: _three_states,
+    **dict.fromkeys((7, 8), _embeddings),
+    9: _pair,
     **dict.fromkeys((10, 11, 12), _class_models),
     **dict.fromkeys((13, 14, 15), _attributions),
 }
@@ -287,45 +286,30 @@ def _record(
 ) -> tuple[RolloutDataset, Any, Scenes]:
     """Return frames of episodes with sampled actions, the network and the scenes.
 
-    The numbers of frames and episodes are those of the settings, or the given ones. If `frames` is
-    None, all frames are returned.
+    The settings' numbers of frames and episodes precede the arguments. If `frames` is None, all
+    frames are returned.
     """
     episodes = settings.episodes or episodes
-    if frames is not None:
-        frames = settings.frames or frames
     network = subject.make_network()
     layer = feature_layer(network)
     with subject.in_task(step_length=STEP_LENGTH).flying(episodes, seed=settings.seed) as made:
         env, actor = made
         flights, scenes = collect(env, actor, num_episodes=episodes), Scenes(env)
-        if frames is not None and frames > len(flights):
+        count = len(flights) if frames is None else settings.frames or frames
+        if count > len(flights):
             raise InputError(
-                f"frames={frames} is more than the {len(flights)} of {episodes} episodes of policy "
+                f"frames={count} is more than the {len(flights)} of {episodes} episodes of policy "
                 f"{subject.name}; give fewer frames or more episodes"
             )
-        rows = select_frames(flights.episode, frames or len(flights))
-        return (
-            render_frames(flights, rows, scenes, network, (layer,) if layer else ()),
-            network,
-            scenes,
-        )
+        rows = select_frames(flights.episode, count)
+        layers = (layer,) if layer else ()
+        return render_frames(flights, rows, scenes, network, layers), network, scenes
 
 
 def _spread_by_side(aside: NDArray, touch_distance: float) -> NDArray:
     """Return two frames each with the next cube to the left, ahead and to the right."""
     sides = (aside > touch_distance, np.abs(aside) <= touch_distance, aside < -touch_distance)
-    rows = [np.flatnonzero(side) for side in sides]
-    share = _SEQUENCE // len(sides)
-    chosen = [
-        one[np.linspace(0, len(one) - 1, share + 2)[1:-1].astype(int)] for one in rows if len(one)
-    ]
-    return np.concatenate(chosen)
-
-
-def _padded(shown: list[Image.Image]) -> list[Image.Image]:
-    """Return images on white canvases of the largest width and height."""
-    size = max(one.width for one in shown), max(one.height for one in shown)
-    canvases = [Image.new("RGB", size, "white") for _ in shown]
-    for canvas, one in zip(canvases, shown, strict=True):
-        canvas.paste(one)
-    return canvases
+    count = _SEQUENCE // len(sides)
+    rows = [np.flatnonzero(side) for side in sides if side.any()]
+    middles = [np.linspace(0, len(one) - 1, count + 2)[1:-1].astype(int) for one in rows]
+    return np.concatenate([one[middle] for one, middle in zip(rows, middles, strict=True)])

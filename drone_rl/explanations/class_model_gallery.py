@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import torch
 from PIL import Image
+from torch import Tensor
 
 from drone_rl.config.configuration import from_arguments
 from drone_rl.explanations.class_models import (
@@ -35,9 +36,9 @@ from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import listed, seed_line
 
 _PRINTED: Mapping[str, Any] = {
-    **{"maximize": "probability", "step": "plain", "lr": 1.0, "normalize": "none"},
-    **{"blur": 0.0, "clamp": False, "jitter": 0, "starts": 1},
-}
+    "maximize": "probability", "step": "plain", "lr": 1.0, "normalize": "none",
+    "blur": 0.0, "clamp": False, "jitter": 0, "starts": 1,
+}  # fmt: skip
 _LONG_STEPS = {**_PRINTED, "lr": 20.0, "step": "length"}
 CHAPTER: Mapping[str, Any] = {**_LONG_STEPS, "normalize": "match", "blur": 0.6}
 """Gradient ascent on Eq. 18 with the refinements that the chapter names, as far as they help.
@@ -78,12 +79,18 @@ class ClassModels(Result):
     """What the channels of an observation are, see `images.shown_picture`."""
     seed: RootSeed
 
+    def _best(self, attempts: Attempts) -> tuple[Tensor, list[float]]:
+        """Return the best image of each action, (A, C, h, w), and the probabilities."""
+        best = attempts.best()
+        pixels = torch.stack([attempts.images[a, i] for a, i in enumerate(best)])
+        return pixels, values_of(attempts, best)["probabilities"]
+
     def rows(self) -> list[list[str]]:
         """Return a table of texts: a header, then each setting's probability of each action."""
         order, names = self.actions.order, self.actions.names
         rows = [["settings", *(names[action] for action in order)]]
-        for title, found in self.tried.items():
-            reached = values_of(found, found.best())["probabilities"]
+        for title, attempts in self.tried.items():
+            _, reached = self._best(attempts)
             rows.append([title, *(f"{reached[action]:.3f}" for action in order)])
         return rows
 
@@ -92,59 +99,55 @@ class ClassModels(Result):
 
         Black and white are the limits of the observations; without clipping, those of the row.
         """
-        shown, order = [], self.actions.order
-        for title, found in self.tried.items():
-            best = found.best()
-            chosen = torch.stack([found.images[a, i] for a, i in enumerate(best)])
+        tiles, order = [], self.actions.order
+        for title, attempts in self.tried.items():
+            pixels, reached = self._best(attempts)
             low, high = self.statistics.low, self.statistics.high
-            if not found.settings.clamp:
-                low, high = float(chosen.min()), float(chosen.max())
+            if not attempts.settings.clamp:
+                low, high = float(pixels.min()), float(pixels.max())
             for action in order:
-                probability = float(found.probabilities[action, best[action]])
                 start = f"{title}: " if len(self.tried) > 1 and action == order[0] else ""
-                caption = f"{start}{self.actions.names[action]} {probability:.3f}"
-                pixels = images.shown_picture(chosen[action].numpy(), low, high, self.channels)
-                shown.append(images.titled(images.enlarge(pixels), caption))
-        return images.gridded(shown, len(order))
+                caption = f"{start}{self.actions.names[action]} {reached[action]:.3f}"
+                image = images.shown_picture(pixels[action].numpy(), low, high, self.channels)
+                tiles.append(images.titled(images.enlarge(image), caption))
+        return images.gridded(tiles, len(order))
 
     def save(self, folder: Path) -> None:
         """Write `class_models.png`, `class_models.json`, and all images as `class_models.npz`."""
         self.image().save(folder / "class_models.png")
         written = {
-            **{"policy": self.policy.origin["policy"], **self.seed.as_dict()},
+            "policy": self.policy.origin["policy"],
+            **self.seed.as_dict(),
             "statistics": dataclasses.asdict(self.statistics),
             "settings": {
-                title: {**found.settings.values(), **values_of(found, found.best())}
-                for title, found in self.tried.items()
+                title: {**attempts.settings.values(), **values_of(attempts, attempts.best())}
+                for title, attempts in self.tried.items()
             },
             **provenance(),
         }
         (folder / "class_models.json").write_text(json.dumps(written, indent=2))
-        tried = enumerate(self.tried.values())
-        arrays: dict[str, Any] = {f"images_{i}": found.images.numpy() for i, found in tried}
-        np.savez_compressed(folder / "class_models.npz", **arrays)
+        images_by_setting = {f"images_{i}": a.images for i, a in enumerate(self.tried.values())}
+        np.savez_compressed(folder / "class_models.npz", **images_by_setting)  # pyright: ignore[reportArgumentType]
 
-    def _failures(self) -> list[str]:
-        """Return a line for each setting by which no image makes some action probable."""
+    def _notes(self) -> list[str]:
+        """Return a line for each setting that makes some action improbable, and the seed's."""
         lines = []
-        for title, found in self.tried.items():
-            reached = values_of(found, found.best())["probabilities"]
+        for title, attempts in self.tried.items():
+            _, reached = self._best(attempts)
             failed = [self.actions.names[a] for a in self.actions.order if reached[a] <= 0.5]
             if failed:
                 lines.append(
                     f"{title}: no image found makes {listed(failed, 'or')} more probable than not; "
                     "the policy or these settings may be the reason, compare gallery=true"
                 )
-        return lines
+        return [*lines, seed_line(self.seed.as_dict())]
 
     def __str__(self) -> str:
-        notes = [*self._failures(), seed_line(self.seed.as_dict())]
-        return "\n".join([aligned(self.rows()), *notes])
+        return "\n".join([aligned(self.rows()), *self._notes()])
 
     def _repr_html_(self) -> str:
         head, *rows = self.rows()
-        notes = [*self._failures(), seed_line(self.seed.as_dict())]
-        return table(head, rows, notes) + picture(self.image())
+        return table(head, rows, self._notes()) + picture(self.image())
 
 
 def class_models(

@@ -39,13 +39,13 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
         return search(network, statistics, objective, seed=context.seed.value)
 
     with pool_like_caller(len(OBJECTIVES)) as pool:  # a small batch uses one core
-        found = dict(zip(OBJECTIVES, pool.map(optimize, OBJECTIVES), strict=True))
+        models = dict(zip(OBJECTIVES, pool.map(optimize, OBJECTIVES), strict=True))
     numbers = {
         "statistics": dataclasses.asdict(statistics),
         "channels": context.scenes.channels,
-        **{objective: model.summary() for objective, model in found.items()},
+        **{objective: model.summary() for objective, model in models.items()},
     }
-    arrays = {f"class_model_{name}": model.images.numpy() for name, model in found.items()}
+    arrays = {f"class_model_{name}": model.images.numpy() for name, model in models.items()}
     return {"class_model": numbers}, arrays
 
 
@@ -92,7 +92,6 @@ class ClassModel:
             {
                 **dataclasses.asdict(attempts.settings),
                 **values_of(attempts, attempts.best()),
-                "each_start": attempts.probabilities.tolist(),
                 "chosen": [a for a, i in enumerate(best) if i // starts == setting],
             }
             for setting, attempts in enumerate(self.tried)
@@ -102,7 +101,6 @@ class ClassModel:
             "starts": starts,
             "num_settings": len(self.tried),
             "highest": every.probabilities.amax(1).tolist(),
-            "starts_above_half": (every.probabilities > 0.5).sum(1).tolist(),
             "tried": rows,
         }
 

@@ -3,13 +3,11 @@
 import copy
 import dataclasses
 import functools
-import threading
-from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from tensordict.nn import TensorDictModuleBase
-from torch import Tensor
 from torchrl.envs import TransformedEnv
 
 from drone_rl.explanations.heat_maps import Explainer
@@ -23,7 +21,6 @@ from drone_rl.trust.verdict import CertificateClaim
 from drone_rl.utils.limits import FILM_BYTES, FILM_STEPS
 from drone_rl.utils.seeding import RootSeed, Stream, torch_generator, with_seed
 
-T = TypeVar("T")
 FILMED = 0  # the episode shown as a film: always the first
 
 
@@ -60,7 +57,6 @@ class Context:
         self.explainer = Explainer(network, self.absent, settings.grad_cam_layer)
         if self.layer is not None:
             features(network, self.absent[None], self.layer)  # refuse an unknown layer now
-        self._shared: dict[str, tuple[threading.Lock, list[Any]]] = {}
         self._start = env.base_env.state_dict()
 
     def restart(self) -> TensorDictModuleBase:
@@ -80,14 +76,6 @@ class Context:
             twin.network = copy.deepcopy(self.network)
             twin.explainer = dataclasses.replace(self.explainer, network=twin.network)
         return twin
-
-    def shared(self, name: str, compute: Callable[[], T]) -> T:
-        """Return the value called `name`; the first thread computes it, others wait for it."""
-        lock, values = self._shared.setdefault(name, (threading.Lock(), []))
-        with lock:
-            if not values:
-                values.append(compute())
-            return values[0]
 
     @functools.cached_property
     def flights(self) -> RolloutDataset:
@@ -114,16 +102,3 @@ class Context:
         most = min(FILM_STEPS, FILM_BYTES // (3 * camera.height * camera.width))
         rows = np.flatnonzero(self.flights.episode == FILMED)[:most]
         return render_frames(self.flights, rows, self.scenes, self.network)
-
-    @property
-    def maps(self) -> dict[str, Tensor]:
-        """Heat maps of the actions taken, by method, on the observations. Shape: (T, h, w)."""
-        inputs = self.dataset.tensor("observations"), self.dataset.tensor("actions")
-        methods = self.explainer.methods()
-        return self.shared("maps", lambda: {name: of(*inputs) for name, of in methods.items()})
-
-    @property
-    def frame_maps(self) -> dict[str, Tensor]:
-        """The same maps in the coordinates of the camera's frame. Shape: (T, H, W)."""
-        maps, to_frame = self.maps, self.scenes.to_frame
-        return self.shared("frame_maps", lambda: {name: to_frame(m) for name, m in maps.items()})

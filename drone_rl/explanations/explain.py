@@ -27,7 +27,8 @@ from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.trust.coverage import find_domain
 from drone_rl.trust.recorded import record_verdict
 from drone_rl.trust.rounding_sensitivity import require_function
-from drone_rl.trust.verdict import FindClaim
+from drone_rl.trust.shifts_file import SavedShifts
+from drone_rl.trust.verdict import CertificateClaim, FindClaim
 from drone_rl.utils.display import Result, page
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path, new_run_folder, to_file_name
@@ -43,14 +44,13 @@ Given = str | Path | BasePolicy | Logits  # a policy or something that `as_polic
 Section = Callable[[Context], tuple[dict[str, Any], dict[str, NDArray]]]
 """Returns entries of `explanation.json` and `arrays.npz`; writes nothing, runs at any time."""
 SECTIONS: dict[str, Section] = {
-    "asymmetry": response.asymmetry_section,
     "attribution": attribution.section,
     "class_models": class_models.section,
     "dataset": behavior.dataset_section,
     "embedding": embedding.section,
     "evaluation": behavior.evaluation_section,
     "flaws": behavior.flaws_section,
-    "response": response.response_section,
+    "response": response.section,
     "shifts": behavior.shifts_section,
     "truth": truth.section,
 }
@@ -115,10 +115,10 @@ def explain(
     """
     settings, seed = with_seed(from_arguments(ExplainSettings, settings, changes, explain))
     Whole(1).read(num_envs, "num_envs")
-    chosen = _named(policies, outputs)
+    by_name = _named(policies, outputs)
     progress = as_progress(progress)
     folder = new_run_folder("explain", outputs) if folder is None else as_path(folder, "folder")
-    folders = {n: folder / f"{i}_{to_file_name(n)}" for i, n in enumerate(chosen)}
+    folders = {n: folder / f"{i}_{to_file_name(n)}" for i, n in enumerate(by_name)}
 
     def explain_one(policy: BasePolicy, folder: Path) -> dict[str, Any]:
         require_function(policy, seed=seed.value, renderer=settings.renderer)
@@ -140,11 +140,11 @@ def explain(
                 seed=seed,
             )
 
-    for one in chosen.values():  # refused before any analysis
+    for one in by_name.values():  # refused before any analysis
         require_memoryless(one.make_network(), "explain")
     with torch_threads(1):  # same results for any number of cores; more would gain nothing
-        numbers = {name: explain_one(one, folders[name]) for name, one in chosen.items()}
-    for name, one in chosen.items():
+        numbers = {name: explain_one(one, folders[name]) for name, one in by_name.items()}
+    for name, one in by_name.items():
         record_verdict(folders[name], one, numbers[name]["verdict"])
     progress("report")
     report = write_report(list(folders.values()), folder)
@@ -157,12 +157,12 @@ def _named(policies: Given | Sequence[Given], outputs: str | Path) -> dict[str, 
     if isinstance(policies, str) or not isinstance(policies, Sequence):
         policies = [policies]
     loaded = [as_policy(policy, outputs) for policy in policies]
-    names = [policy.name for policy in loaded]
-    if len(set(names)) < len(names):
-        names = [policy.origin["policy"] for policy in loaded]
-    if not names or len(set(names)) < len(names):
-        raise InputError(f"policy={names} must name one or more policies, each once")
-    return dict(zip(names, loaded, strict=True))
+    by_name = {policy.name: policy for policy in loaded}
+    if len(by_name) < len(loaded):
+        by_name = {policy.origin["policy"]: policy for policy in loaded}
+    if not loaded or len(by_name) < len(loaded):
+        raise InputError(f"policy={[*by_name]} must name one or more policies, each once")
+    return by_name
 
 
 def explain_policy(
@@ -175,14 +175,17 @@ def explain_policy(
     provenance: dict[str, Any],
     progress: Callable[[str], None] = lambda _: None,
     sections: Mapping[str, Section] | None = None,
-    **more: Any,
+    claim: CertificateClaim | None = None,
+    measured: SavedShifts | None = None,
+    unlike: Mapping[str, Any] | None = None,
+    seed: RootSeed | None = None,
 ) -> dict[str, Any]:
     """Compute all sections for one policy and write them to a folder.
 
     The environments are held out, have not been stepped, and have the policy's transforms; the
     network is on the CPU. `provenance` is the origin of the policy as plain values. `sections` are
     `SECTIONS` by default; their order changes no result. `progress` is called with the title of
-    each. For `more` see `Context`.
+    each. The verdict quotes `claim`, `measured` and `unlike`. The seed is the settings' by default.
 
     Returns:
         The contents of `explanation.json`; "left_out" gives the reason for each section that can't
@@ -191,27 +194,27 @@ def explain_policy(
     Raises:
         InputError: The folder can't be written or a setting does not fit the policy.
     """
-    context = Context(env, network, settings, **more)
+    context = Context(env, network, settings, claim, measured, unlike, seed)
     results = _run(SECTIONS if sections is None else sections, context, progress)
     left_out = {title: str(one) for title, one in results.items() if isinstance(one, LeftOutError)}
-    made = {title: one for title, one in results.items() if not isinstance(one, LeftOutError)}
-    written = {
+    computed = {title: one for title, one in results.items() if not isinstance(one, LeftOutError)}
+    content = {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
         "name": name,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "settings": dataclasses.asdict(context.settings),
         **context.seed.as_dict(),
-        "seconds": {title: seconds for title, (_, _, seconds) in made.items()},
+        "seconds": {title: seconds for title, (_, _, seconds) in computed.items()},
         "actions": context.scenes.actions.as_dict(),
         "terms": context.scenes.task.vocabulary.as_dict(),
-        **{key: value for numbers, _, _ in made.values() for key, value in numbers.items()},
+        **{key: value for numbers, _, _ in computed.values() for key, value in numbers.items()},
         **({"left_out": left_out} if left_out else {}),
         "provenance": provenance,
     }
-    arrays = {key: value for _, some, _ in made.values() for key, value in some.items()}
-    _write(folder, written, arrays, context)
-    return written
+    arrays = {key: value for _, part, _ in computed.values() for key, value in part.items()}
+    _write(folder, content, arrays, context)
+    return content
 
 
 def _run(

@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Literal
 
 import torch
 from captum.attr import IntegratedGradients, LayerGradCam, Saliency
@@ -38,11 +38,8 @@ class Explainer:
             return
         find_layer(self.network, self.layer)
         if self.layer not in spatial:
-            none = (
-                "it has no convolution" if self.network.is_differentiable else "it has no gradient"
-            )
-            have = ", ".join(spatial) or f"none of this policy, because {none}"
-            raise InputError(f"layer={self.layer} has no feature map; those that do: {have}")
+            names = ", ".join(spatial) or "none of this policy"
+            raise InputError(f"layer={self.layer} has no feature map; those that do: {names}")
 
     def methods(self) -> dict[str, MapMethod]:
         """Return all methods that this policy allows, by name."""
@@ -79,17 +76,20 @@ class Explainer:
 
     def integrated_gradients(self, observations: Tensor, actions: Tensor) -> Tensor:
         """Return the absolute path integral from the baseline. Shape: (T, H, W)."""
-        return self._integrated(observations, actions).sum(1).abs()
+        quick = accelerated_gradients(self.network, wrt="pixels")
+        method = IntegratedGradients(self._forward("probability", quick))
 
-    def completeness_error(self, observations: Tensor, actions: Tensor) -> Tensor:
-        """Return the absolute error of the sum of integrated gradients. Shape: (T,).
+        def attribute(x: Tensor, a: Tensor) -> Tensor:
+            return method.attribute(
+                x,
+                self.absent[None],
+                a,
+                method="riemann_middle",
+                n_steps=INTEGRATION_STEPS,
+                internal_batch_size=BATCH,
+            )
 
-        The exact integral sums to the action's probability minus that on the baseline.
-        """
-        total = self._integrated(observations, actions).flatten(1).sum(1)
-        there = probabilities(self.network, observations).gather(1, actions[:, None])[:, 0]
-        absent = probabilities(self.network, self.absent[None])[0][actions]
-        return (total - (there - absent)).abs()
+        return _in_batches(attribute, observations, actions).sum(1).abs()
 
     def occlusion(self, observations: Tensor, actions: Tensor) -> Tensor:
         """Return the change of the probability if a patch is replaced by the baseline. (T, H, W).
@@ -99,25 +99,14 @@ class Explainer:
         """
         height, width = observations.shape[-2:]
         windows = _windows(height, width)
-        chosen = probabilities(self.network, observations).gather(1, actions[:, None])[:, 0]
-        change = chosen.new_zeros(len(chosen), len(windows))
+        before = probabilities(self.network, observations).gather(1, actions[:, None])[:, 0]
+        change = before.new_zeros(len(before), len(windows))
         absent = self.absent[None].expand_as(observations)
         for frames, patches, after in replaced(self.network, observations, absent, windows):
-            change[frames, patches] = chosen[frames] - after[range(len(frames)), actions[frames]]
+            change[frames, patches] = before[frames] - after[range(len(frames)), actions[frames]]
         covered = windows.flatten(1).float()
         mean = change @ covered / covered.sum(0).clamp_min(1)
         return mean.view(-1, height, width).abs()
-
-    def _integrated(self, observations: Tensor, actions: Tensor) -> Tensor:
-        """Return the path integral. Shape: (T, C, H, W)."""
-        quick = accelerated_gradients(self.network, wrt="pixels")
-        method = IntegratedGradients(self._forward("probability", quick))
-
-        def attribute(x: Tensor, a: Tensor) -> Tensor:
-            how: dict[str, Any] = {"n_steps": INTEGRATION_STEPS, "internal_batch_size": BATCH}
-            return method.attribute(x, self.absent[None], a, method="riemann_middle", **how)
-
-        return _in_batches(attribute, observations, actions)
 
     def _forward(
         self, objective: Objective, network: nn.Module | None = None

@@ -42,11 +42,11 @@ def layers(network: ImageNetwork) -> dict[str, tuple[nn.Module, tuple[int, ...]]
 
 def find_layer(network: ImageNetwork, name: str) -> nn.Module:
     """Return one of `layers` by name; if there is none, raise InputError with those that exist."""
-    found = layers(network)
-    if name not in found:
-        there = ", ".join(found) or "none, because it is no torch module made of layers"
-        raise InputError(f"layer={name} is not in the policy; choose from: {there}")
-    return found[name][0]
+    by_name = layers(network)
+    if name not in by_name:
+        names = ", ".join(by_name) or "none"
+        raise InputError(f"layer={name} is not in the policy; choose from: {names}")
+    return by_name[name][0]
 
 
 def spatial_layers(network: ImageNetwork) -> list[str]:
@@ -54,13 +54,13 @@ def spatial_layers(network: ImageNetwork) -> list[str]:
 
     For each convolution: the next layer if that keeps the shape and is no convolution, else itself.
     """
-    every, found = [*layers(network).items()], []
+    every, names = [*layers(network).items()], []
     for i, (name, (layer, shape)) in enumerate(every):
         if isinstance(layer, nn.Conv2d):
             after, (next_layer, then) = every[i + 1] if i + 1 < len(every) else ("", (None, ()))
             is_kept = then == shape and not isinstance(next_layer, nn.Conv2d)
-            found.append(after if is_kept else name)
-    return found
+            names.append(after if is_kept else name)
+    return names
 
 
 def feature_layer(network: ImageNetwork) -> str | None:

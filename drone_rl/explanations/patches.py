@@ -31,7 +31,7 @@ NO_CHANGE = 1e-9  # a logit with a smaller standard deviation over observations 
 
 
 @dataclasses.dataclass(frozen=True)
-class Grid:
+class PatchGrid:
     """Patches of one size; remaining rows and columns of pixels are left out on both sides."""
 
     height: int  # height of a patch, pixels
@@ -65,9 +65,9 @@ class Grid:
         return torch.stack(heat, 1).cpu().numpy()
 
 
-def make_grid(height: int, width: int, patches: int = PATCHES) -> Grid:
+def make_grid(height: int, width: int, patches: int = PATCHES) -> PatchGrid:
     """Return about so many patches, nearly square, that leave out few pixels of a frame."""
-    best, cost = Grid(1, 1, height, width), np.inf
+    best, cost = PatchGrid(1, 1, height, width), np.inf
     for rows in range(1, height + 1):
         for columns in range(1, min(width, 2 * patches // rows) + 1):
             down, across = height // rows, width // columns
@@ -77,7 +77,7 @@ def make_grid(height: int, width: int, patches: int = PATCHES) -> Grid:
             if 4 * lost + number + 0.5 * shape < cost:
                 cost = 4 * lost + number + 0.5 * shape
                 top, left = (height - rows * down) // 2, (width - columns * across) // 2
-                best = Grid(down, across, rows, columns, top, left)
+                best = PatchGrid(down, across, rows, columns, top, left)
     return best
 
 
@@ -99,7 +99,7 @@ def replaced(
 
 
 def patch_effects(
-    network: ImageNetwork, observations: Tensor, others: Iterable[Tensor], grid: Grid
+    network: ImageNetwork, observations: Tensor, others: Iterable[Tensor], grid: PatchGrid
 ) -> NDArray:
     """Return the effect on the policy of replacing each patch by alternatives (T, C, h, w).
 
@@ -151,11 +151,11 @@ def rank_correlation(first: NDArray, second: NDArray) -> NDArray:
 
 def sample_frames(episode: NDArray, most: int) -> NDArray:
     """Return indices of at most `most` frames of each episode, evenly spaced. Shape: (N,)."""
-    found = [np.zeros(0, np.int64)]
+    parts = [np.zeros(0, np.int64)]
     for number in np.unique(episode):
         rows = np.flatnonzero(episode == number)
-        found.append(rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(np.int64)])
-    return np.concatenate(found)
+        parts.append(rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(np.int64)])
+    return np.concatenate(parts)
 
 
 def summarise_scores(values: NDArray, episode: NDArray) -> dict[str, Any]:

@@ -7,7 +7,6 @@ environment shows before action t, the action and its probabilities, and the rew
 import contextlib
 import logging
 import math
-import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, cast
@@ -19,6 +18,7 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import TransformedEnv
 
+from drone_rl.config import RendererName
 from drone_rl.envs import DroneEnv
 from drone_rl.explanations.attribution import first_heat, shown_methods
 from drone_rl.explanations.heat_maps import Explainer
@@ -57,7 +57,8 @@ def record(
     *,
     greedy: bool = True,
     seed: int = 0,
-    **how: Any,
+    device: str = "cpu",
+    renderer: RendererName = "raytrace",
 ) -> list[Path]:
     """Record episodes in held-out environments as Rerun files, and return the files.
 
@@ -71,17 +72,16 @@ def record(
         episodes: Number of episodes, one file each.
         greedy: Whether the policy takes the most probable action, or samples it.
         seed: Root of the environments' random streams.
-        how: Device, renderer and appearance of the environments, see `Policy.make_env`.
+        device: Device of the environments and the policy.
+        renderer: Renderer of the environments.
 
     Raises:
-        InputError: There are no episodes, the extra `rerun` is missing, or a file can't be written.
+        InputError: The extra `rerun` is missing, or a file can't be written.
     """
     rerun = extra("rerun", "rerun", "format=rerun")
-    if episodes < 1:
-        raise InputError(f"episodes={episodes} records nothing; give 1 or more")
     files: list[Path] = []
-    with policy.flying(1, seed=seed, **how) as (env, actor):
-        network = policy.make_network(str(env.device or "cpu"))
+    with policy.flying(1, seed=seed, device=device, renderer=renderer) as (env, actor):
+        network = policy.make_network(device)
         for number in range(episodes):
             path = folder / f"episode_{number}.rrd"
             with _open(rerun, path, f"{policy.name}, seed {seed}, episode {number}") as stream:
@@ -111,10 +111,6 @@ def record_episode(
 def _open(rerun: Any, path: Path, name: str) -> Iterator[Any]:
     """Yield a stream to a new file; close the file afterwards."""
     stream = rerun.RecordingStream(APPLICATION)
-    if not stream.is_enabled():
-        raise InputError(
-            f"RERUN={os.environ.get('RERUN')} switches Rerun's recordings off; unset it"
-        )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(b"")  # Rerun's own error says neither which file nor why
@@ -133,36 +129,34 @@ def _open(rerun: Any, path: Path, name: str) -> Iterator[Any]:
 
 def _layout(rerun: Any, timestep: float) -> Any:
     """Return the arrangement of a recording's parts in the viewer, which plays in real time."""
-    made = rerun.blueprint
+    views = rerun.blueprint
 
     def image(path: str, name: str) -> Any:
-        return made.Spatial2DView(origin=path, name=name)
+        return views.Spatial2DView(origin=path, name=name)
 
-    cameras = [image(f"cameras/{name}", name.replace("_", " ")) for name in CAMERAS]
-    return made.Blueprint(
-        made.Horizontal(
-            made.Vertical(
-                made.Spatial3DView(origin="world", name="scene"),
-                image("cameras/chase", "from behind"),
-                made.Horizontal(*cameras),
-                row_shares=[3, 3, 1],
-            ),
-            made.Vertical(
-                made.Grid(
-                    image("world/camera", "policy's camera"),
-                    image("segmentation", "segmentation"),
-                    image("observation", "observation"),
-                    image("heat_map", "heat map"),
-                    grid_columns=2,
-                ),
-                made.TimeSeriesView(origin="action/probabilities", name="action probabilities"),
-                made.TimeSeriesView(origin="reward", name="reward and return"),
-                made.TextLogView(contents=["action/taken", "heat_map/method", "end"], name="log"),
-                row_shares=[2, 1, 1, 1],
-            ),
-            column_shares=[3, 2],
-        ),
-        made.TimePanel(timeline="step", fps=1 / timestep, state="collapsed"),
+    scene = views.Vertical(
+        views.Spatial3DView(origin="world", name="scene"),
+        image("cameras/chase", "from behind"),
+        views.Horizontal(*(image(f"cameras/{n}", n.replace("_", " ")) for n in CAMERAS)),
+        row_shares=[3, 3, 1],
+    )
+    observed = views.Grid(
+        image("world/camera", "policy's camera"),
+        image("segmentation", "segmentation"),
+        image("observation", "observation"),
+        image("heat_map", "heat map"),
+        grid_columns=2,
+    )
+    numbers = views.Vertical(
+        observed,
+        views.TimeSeriesView(origin="action/probabilities", name="action probabilities"),
+        views.TimeSeriesView(origin="reward", name="reward and return"),
+        views.TextLogView(contents=["action/taken", "heat_map/method", "end"], name="log"),
+        row_shares=[2, 1, 1, 1],
+    )
+    return views.Blueprint(
+        views.Horizontal(scene, numbers, column_shares=[3, 2]),
+        views.TimePanel(timeline="step", fps=1 / timestep, state="collapsed"),
         collapse_panels=True,
     )
 
@@ -181,8 +175,6 @@ class EpisodeLog:
         self._boxes = self._worlds.scene.prop_boxes()
         kinds = torch.tensor([*self._worlds.scene.semantic_classes, SemanticClass.SKY])
         self._class_of_geom = kinds.to(torch.uint8)  # geom -1 (the sky) reads the last entry
-        self._places: dict[str, list[float]] = {}
-        """Where each box is shown."""
         self._path: list[list[float]] = []
         """The drone's positions."""
         self._observed: list[Tensor] = []
@@ -248,15 +240,15 @@ class EpisodeLog:
         classes = [(kind.value, kind.name.lower(), color) for kind, color in CLASS_COLORS.items()]
         drone = self._box(SemanticClass.DRONE, half_sizes=[[half] * 3])
         names, colors = self._actions.names, self._actions.colors
-        for path, value in (
-            ("/", rr.AnnotationContext(classes)),
-            ("world", rr.ViewCoordinates.FLU),
-            ("world/drone", drone),
-            ("action/probabilities", rr.SeriesLines(names=names, colors=colors)),
-            ("reward/step", rr.SeriesLines(names=["reward"], colors=[palette.GOOD])),
-            ("reward/return", rr.SeriesLines(names=["return"], colors=[palette.MUTED])),
-        ):
-            self._stream.log(path, value, static=True)
+        stream = self._stream
+        stream.log("/", rr.AnnotationContext(classes), static=True)
+        stream.log("world", rr.ViewCoordinates.FLU, static=True)
+        stream.log("world/drone", drone, static=True)
+        lines = rr.SeriesLines(names=names, colors=colors)
+        stream.log("action/probabilities", lines, static=True)
+        for name, color in (("step", palette.GOOD), ("return", palette.MUTED)):
+            line = rr.SeriesLines(names=[name], colors=[color])
+            stream.log(f"reward/{name}", line, static=True)
 
     def _log_images(self) -> None:
         rr, seen = self._rr, render_step(self._base)
@@ -270,12 +262,12 @@ class EpisodeLog:
             self._stream.log(f"cameras/{name}", encoded)
 
     def _log_poses(self) -> None:
-        rr, worlds = self._rr, self._worlds
+        worlds = self._worlds
         appearance = (self._base.appearances.current() or Appearance()).over(worlds.appearance)
         body, poses = worlds.state.body, worlds.poses(worlds.state, appearance)
         self._path.append(body.position[0].tolist())
         self._log_pose("world/drone", body.position[0], body.attitude[0])
-        self._stream.log("world/trajectory", rr.LineStrips3D([self._path]))
+        self._stream.log("world/trajectory", self._rr.LineStrips3D([self._path]))
         self._log_camera(poses.position[0], poses.attitude[0], appearance.camera)
         sizes = [1.0] * len(self._boxes)
         if appearance.distractors is not None:  # the last of the props
@@ -283,25 +275,16 @@ class EpisodeLog:
             sizes[len(sizes) - len(scaled) :] = scaled
         for box, place, size in zip(self._boxes, poses.props[0].cpu().numpy(), sizes, strict=True):
             center, half = place + size * box.center, size * box.half_size
-            self._log_box(box.name, box.semantic_class, center, half)
+            drawn = self._rr.Clear(recursive=False)
+            if center[2] + half[2] > 0.0:  # tasks hide props under the ground
+                drawn = self._box(box.semantic_class, centers=[center], half_sizes=[half])
+            self._stream.log(["world", "objects", box.name], drawn)
 
-    def _log_box(self, name: str, kind: SemanticClass, center: NDArray, half: NDArray) -> None:
-        """Log a box where it has moved, or that it has vanished: tasks hide props under the ground.
-
-        Centre and half size: (3,), metres.
-        """
-        path = ["world", "objects", name]
-        is_there = center[2] + half[2] > 0.0
-        if not is_there and self._places.pop(name, None) is not None:
-            self._stream.log(path, self._rr.Clear(recursive=False))
-        if is_there and self._places.get(name) != center.tolist():
-            self._places[name] = center.tolist()
-            self._stream.log(path, self._box(kind, centers=[center], half_sizes=[half]))
-
-    def _box(self, kind: SemanticClass, **sizes: Any) -> Any:
+    def _box(self, kind: SemanticClass, **shape: Any) -> Any:
         """Return a box in the color of its class."""
-        style = {"fill_mode": "solid", "show_labels": False}
-        return self._rr.Boxes3D(class_ids=[kind.value], **sizes, **style)
+        return self._rr.Boxes3D(
+            class_ids=[kind.value], fill_mode="solid", show_labels=False, **shape
+        )
 
     def _log_camera(self, position: Tensor, attitude: Tensor, mounting: Mounting | None) -> None:
         """Log pose and projection of the policy's camera, from the drone's pose: (3,), (4,)."""

@@ -23,59 +23,50 @@ BLIND = 0.1  # a policy is blind to a target that changes its action probabiliti
 _RESPONSE, _OUTCOME = 0, 1  # numbers of the maps' grids
 
 
-def policy_response(context: Context) -> "ResponseMap":
-    """Return the response map of the policy, computed once."""
-    scenes, network, seed = context.scenes, context.network, context.seed.value
-    return context.shared("response", lambda: response_map(scenes, network, seed=seed))
-
-
-def response_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Return "response".
+def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Return "response", and "asymmetry": on the "dataset" and on the "grid" of the response map.
 
     Arrays: "response_..." and "outcome_...", the fields of `ResponseMap` and `OutcomeMap`.
     """
-    response = policy_response(context)
-    outcome = outcome_map(context.scenes, context.network, seed=context.seed.value)
+    scenes, network, seed = context.scenes, context.network, context.seed.value
+    data, actions = context.dataset, scenes.actions
+    response = response_map(scenes, network, seed=seed)
+    outcome = outcome_map(scenes, network, seed=seed)
     maps = {"response": vars(response), "outcome": vars(outcome)}
     arrays = {f"{n}_{key}": array for n, fields in maps.items() for key, array in fields.items()}
-    return {"response": summarise(response, outcome, context.scenes.task.strata)}, arrays
-
-
-def asymmetry_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Return "asymmetry": on the "dataset" and on the "grid" of the response map."""
-    data, actions = context.dataset, context.scenes.actions
-    seen = data.tensor("observations")
+    on_frames = asymmetry(network, data.tensor("observations"), data.episode, actions)
     numbers = {
-        "dataset": asymmetry(context.network, seen, data.episode, actions),
-        "grid": grid_asymmetry(policy_response(context), actions),
+        "response": summarise(response, outcome, scenes.task.strata),
+        "asymmetry": {"dataset": on_frames, "grid": grid_asymmetry(response, actions)},
     }
-    return {"asymmetry": numbers}, {}
+    return numbers, arrays
 
 
-@dataclasses.dataclass
-class ResponseMap:
-    """Action probabilities for one target at each place of a grid: Z up, F ahead, L sideways."""
+@dataclasses.dataclass(kw_only=True)
+class TargetGrid:
+    """Places of one target: Z up, F ahead, L sideways."""
 
     height: NDArray  # (Z,); metres above the drone
     forward: NDArray  # (F,); metres ahead of it
     lateral: NDArray  # (L,); metres to its left
-    probabilities: NDArray  # (Z, F, L, A)
-    without_target: NDArray  # (A,); action probabilities without a target
     oracle: NDArray  # (L,); the needed action: a turn where flying straight on would miss
     stratum: NDArray  # (L,); the task's stratum of a target there: its side
+
+
+@dataclasses.dataclass(kw_only=True)
+class ResponseMap(TargetGrid):
+    """Action probabilities for one target at each place."""
+
+    probabilities: NDArray  # (Z, F, L, A)
+    without_target: NDArray  # (A,); action probabilities without a target
     blind: NDArray  # (Z, F, L) bool; see `find_blind`
 
 
-@dataclasses.dataclass
-class OutcomeMap:
-    """Whether greedy rollouts reach a target at each place; fields as in `ResponseMap`."""
+@dataclasses.dataclass(kw_only=True)
+class OutcomeMap(TargetGrid):
+    """Whether greedy rollouts reach a target at each place."""
 
-    height: NDArray  # (Z,)
-    forward: NDArray  # (f,)
-    lateral: NDArray  # (l,)
-    collected: NDArray  # (Z, f, l) bool
-    oracle: NDArray  # (l,)
-    stratum: NDArray  # (l,)
+    collected: NDArray  # (Z, F, L) bool
 
 
 def response_map(
@@ -224,20 +215,9 @@ def asymmetry(
     }
 
 
-def grid_asymmetry(response: ResponseMap, actions: Actions) -> dict[str, Any]:
+def grid_asymmetry(response: ResponseMap, actions: Actions) -> dict[str, float]:
     """Compare a response map with its mirror image, which is the map read backwards."""
     here, there = response.probabilities, actions.mirror(response.probabilities[:, :, ::-1])
-    signed, distance = (
-        actions.prob_left(here) - actions.prob_left(there),
-        actions.distance(here, there),
-    )
-    at = np.unravel_index(distance.argmax(), distance.shape)
-    places = zip(("height", "forward", "lateral"), at, strict=True)
-    return {
-        "signed": float(signed.mean()),
-        "absolute": float(distance.mean()),
-        "worst": {
-            "distance": float(distance.max()),
-            **{axis: float(getattr(response, axis)[i]) for axis, i in places},
-        },
-    }
+    signed = actions.prob_left(here) - actions.prob_left(there)
+    distance = actions.distance(here, there)
+    return {"signed": float(signed.mean()), "absolute": float(distance.mean())}

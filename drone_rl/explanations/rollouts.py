@@ -234,7 +234,6 @@ class Step:
     rows: Tensor  # indices of the active environments. Shape: (n,).
     before: State
     after: State
-    action: Tensor  # shape: (n, *)
     reward: Tensor  # shape: (n,)
 
 
@@ -254,18 +253,18 @@ def rollout(
     """
     device = state.body.position.device
     rows = torch.arange(len(state), device=device)
-    done, now, earlier = state[rows], state, []
+    ends, now, earlier = state[rows], state, []
     while len(rows):
         frames = scenes.frames(now, appearance)
         observations = scenes.transform(frames, earlier)
         action = scenes.actions.greedy(outputs(network, observations)).to(device)
         before, (now, reward) = now, scenes.worlds.advance(now, action)
-        active = stays_active(Step(rows, before, now, action, reward))
-        done[rows] = now
+        active = stays_active(Step(rows, before, now, reward))
+        ends[rows] = now
         earlier = [*earlier, frames][-scenes.memory :] if scenes.memory else []
         earlier = [one[active] for one in earlier]
         now, rows = now[active], rows[active]
-    return done
+    return ends
 
 
 def run_to_end(scenes: Scenes, network: ImageNetwork, state: State) -> State:

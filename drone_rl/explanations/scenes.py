@@ -100,10 +100,10 @@ class Scenes:
         The task knows it for the actions of its default dynamics; for other actions it is the one
         with the same name. It is always -1 if any of those names is missing.
         """
-        names, known = self.actions.names, self.task.make_dynamics().actions.names
-        if not set(known) <= set(names):
+        names, defaults = self.actions.names, self.task.make_dynamics().actions.names
+        if not set(defaults) <= set(names):
             return torch.full(offset.shape[:1], -1)
-        same = torch.tensor([*(names.index(name) for name in known), -1], device=offset.device)
+        same = torch.tensor([*(names.index(name) for name in defaults), -1], device=offset.device)
         return same[self.task.needed(offset)]  # -1 reads the last entry
 
     def regions(self, state: State) -> Tensor:
@@ -153,10 +153,10 @@ def alternatives(scenes: Scenes, state: State, seed: int = 0) -> dict[str, Tenso
     brighter. Unlike a gray box, they are similar to observations that the policy was trained on.
     """
     generator = plain_generator(seed)
-    found = {"no targets": scenes.observe(scenes.task.without_targets(state))}
+    observations = {"no targets": scenes.observe(scenes.task.without_targets(state))}
     for i in range(PLACEMENTS):
         other = scenes.task.elsewhere(state, scenes.worlds.camera, generator)
-        found[f"targets elsewhere {i}"] = scenes.observe(other)
+        observations[f"targets elsewhere {i}"] = scenes.observe(other)
     for name, appearance in (("darker", DARK), ("brighter", BRIGHT)):
-        found[name] = scenes.transform(scenes.frames(state, appearance))
-    return found
+        observations[name] = scenes.transform(scenes.frames(state, appearance))
+    return observations

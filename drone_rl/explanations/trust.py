@@ -27,7 +27,7 @@ from torch import Tensor
 from drone_rl.explanations import patches
 from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.patches import (
-    Grid,
+    PatchGrid,
     likeness,
     make_grid,
     placebo_maps,
@@ -57,7 +57,7 @@ class Trial:
     effects: NDArray  # (T, patches); effect of each patch; see `patch_effects`
     placebos: dict[str, Tensor]  # (T, h, w) each
     episode: NDArray  # (T,)
-    grid: Grid
+    grid: PatchGrid
     frames_without_effect: int = 0  # left out, as no patch affects the policy
     seed: int = 0
 
@@ -75,8 +75,6 @@ class Trial:
 
     def maps(self, method: MapOf, network: ImageNetwork | None = None) -> Tensor:
         """Return a method's maps of the trial's frames. Shape: (T, h, w)."""
-        if not len(self.observations):
-            return self.observations.new_zeros(0, *self.observations.shape[-2:])
         return method(network or self.network, self.observations, self.actions)
 
     def scores(self, maps: Tensor) -> NDArray:
@@ -141,10 +139,10 @@ def make_trial(
     """
     rows = sample_frames(episode, FRAMES_AN_EPISODE)
     index = torch.from_numpy(rows)
-    chosen = state[index].to(scenes.worlds.device)
-    others = list(alternatives(scenes, chosen, seed).values())
+    sampled = state[index].to(scenes.worlds.device)
+    others = list(alternatives(scenes, sampled, seed).values())
     absent = scenes.observe(empty_scene(scenes))[0]
-    seen = scenes.observe(chosen)
+    seen = scenes.observe(sampled)
     return measure(network, actions[index], seen, others, absent, episode[rows], seed)
 
 
@@ -160,11 +158,10 @@ def method_maps(explainer: Explainer) -> dict[str, MapOf]:
 def check_maps(
     trial: Trial,
     methods: Mapping[str, MapOf],
-    maps: Mapping[str, Tensor] | None = None,
     *,
     num_methods: int | None = None,
 ) -> dict[str, Any]:
-    """Test methods, by name; `maps` has `trial.maps` of those for which it is already computed.
+    """Test methods, by name.
 
     The error rate is shared by `num_methods`, by default those that are given.
 
@@ -174,15 +171,14 @@ def check_maps(
         "level": error rate of each method; "confidence" of the intervals "lower" to "upper".
     """
     level = ERROR_RATE / (num_methods or max(1, len(methods)))
-    maps = maps or {}
-    results = {n: check_method(trial, of, level, maps.get(n)) for n, of in methods.items()}
+    results = {name: check_method(trial, method, level) for name, method in methods.items()}
     scores = {name: one["score"]["lower95"] for name, one in results.items() if one["trusted"]}
     return {
         "trusted": max(scores, key=lambda name: scores[name], default=None),
         "methods": results,
         "placebos": {
-            name: patches.summarise_scores(found, trial.episode)
-            for name, found in trial.placebo_scores.items()
+            name: patches.summarise_scores(placebo, trial.episode)
+            for name, placebo in trial.placebo_scores.items()
         },
         "frames": len(trial.episode),
         "frames_unmoved": trial.frames_without_effect,
@@ -192,9 +188,7 @@ def check_maps(
     }
 
 
-def check_method(
-    trial: Trial, method: MapOf, level: float, maps: Tensor | None = None
-) -> dict[str, Any]:
+def check_method(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
     """Test one method; see `check_maps`.
 
     Returns:
@@ -209,14 +203,14 @@ def check_method(
     if not len(episode):
         none = patches.summarise_scores(np.zeros(0), np.zeros(0))
         return {"trusted": False, "failed": ["nothing moves the policy"], "score": none}
-    maps = trial.maps(method) if maps is None else maps
+    maps = trial.maps(method)
     scores = trial.scores(maps)
     hit, chance = patches.pointing(trial.grid.means(maps), trial.effects)
     result = {
         "score": patches.summarise_scores(scores, episode),
         "placebos": {
-            name: _median(scores - found, episode, level)
-            for name, found in trial.placebo_scores.items()
+            name: _median(scores - placebo, episode, level)
+            for name, placebo in trial.placebo_scores.items()
         },
         "pointing": {
             **_median(hit - chance, episode, level),
@@ -243,16 +237,16 @@ def random_weights(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
         shuffled policies; "as_good": how many of them scored as much.
     """
     few = trial.thinned()
-    own = float(few.scores(few.maps(method)).mean())
+    score = float(few.scores(few.maps(method)).mean())
     others: list[float] = []
     is_as_good = False
     count = math.ceil(1 / level) - 1
     for network in shuffled_networks(trial.network, trial.observations, count, trial.seed):
         others.append(float(few.scores(few.maps(method, network)).mean()))
-        if is_as_good := others[-1] >= own - 1e-9:
+        if is_as_good := others[-1] >= score - 1e-9:
             break
     return {
-        "score": own,
+        "score": score,
         "best": max(others),
         "mean": float(np.mean(others)),
         "tried": len(others),
@@ -274,9 +268,9 @@ def _failed(result: dict[str, Any]) -> list[str]:
 def _likeness(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
     """Compare a policy's maps with those of shuffled weights, all seeds together and each."""
     few = trial.thinned()
-    own = few.maps(method)
+    maps = few.maps(method)
     networks = shuffled_networks(trial.network, trial.observations, WEIGHT_SEEDS, trial.seed)
-    seeds = np.stack([likeness(own, few.maps(method, network)) for network in networks])
+    seeds = np.stack([likeness(maps, few.maps(method, network)) for network in networks])
     medians = np.median(seeds, axis=1).tolist()
     return {**_median(seeds.mean(0), few.episode, level), "seeds": medians}
 

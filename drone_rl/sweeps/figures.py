@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.sweeps.rows import Row
-from drone_rl.sweeps.summary import FAILED, Group, median_band, on_grid
+from drone_rl.sweeps.summary import FAILED, RunGroup, median_band, on_grid
 from drone_rl.trust.rule import KINDS
 from drone_rl.utils.palette import BAD, FAINT, GOOD, MUTED, ONE_SIDED, css, light
 
@@ -32,8 +32,6 @@ MARKERS = dict(zip(COLORS, ("o", "D", "s", "v", "P", "X"), strict=True))
 MAX_PANELS = 6
 LOG_FROM = 3.0
 """Ratio of the greatest to the least value from which the axis is logarithmic."""
-MAX_LABELS = 7
-"""Greatest number of tick labels."""
 UNIFORM = float(np.log(len(SHOWN_MOVES.names)))
 """Entropy of the uniform distribution over the chapter's three moves, nats."""
 _ROUNDING = 1e-4
@@ -47,17 +45,17 @@ class Layout:
 
     axis: str | None
     """A swept setting; None if only seeds differ."""
-    panels: dict[str, list[Group]]
+    panels: dict[str, list[RunGroup]]
     """Groups by the values of the other settings; at most `MAX_PANELS`."""
     left_out: int = 0
     """Number of panels beyond this limit."""
 
 
-def lay_out(groups: Sequence[Group]) -> Layout:
+def lay_out(groups: Sequence[RunGroup]) -> Layout:
     """Put the learning rate, or else the last swept setting, on the x axis."""
     keys = list(groups[0].choice) if groups else []
     axis = FAVOURITE_AXIS if FAVOURITE_AXIS in keys else (keys[-1] if keys else None)
-    panels: dict[str, list[Group]] = {}
+    panels: dict[str, list[RunGroup]] = {}
     for group in groups:
         rest = [f"{key}={value}" for key, value in group.choice.items() if key != axis]
         panels.setdefault(", ".join(rest), []).append(group)
@@ -104,7 +102,7 @@ def _render(
     return file.getvalue()
 
 
-def _curves(axes: Axes, layout: Layout, groups: list[Group]) -> None:
+def _curves(axes: Axes, layout: Layout, groups: list[RunGroup]) -> None:
     colors = colormaps["viridis"](np.linspace(0.1, 0.9, max(1, len(groups))))
     for group, color in zip(groups, colors, strict=True):
         end = max((row.frames for row in group.known), default=0.0)
@@ -127,53 +125,50 @@ def _curves(axes: Axes, layout: Layout, groups: list[Group]) -> None:
         axes.legend(title=_literal(layout.axis or ""), fontsize=7, title_fontsize=7)
 
 
-def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
+def _verdicts(axes: Axes, layout: Layout, groups: list[RunGroup]) -> None:
     places = _places(axes, layout, groups)
     for i, kind in enumerate(COLORS):
         shares = [group.verdicts[kind] for group in groups]
-        known = [(x, s) for x, s in zip(places, shares, strict=True) if s["trials"]]
-        if not any(s["successes"] for _, s in known):
+        ended = [(x, s) for x, s in zip(places, shares, strict=True) if s["trials"]]
+        if not any(s["successes"] for _, s in ended):
             continue
-        x = _aside(axes, np.array([place for place, _ in known]), 0.08 * (i - 2), places)
-        y, low, high = (np.array([s[k] for _, s in known]) for k in ("share", "lower95", "upper95"))
+        x = _aside(axes, np.array([place for place, _ in ended]), 0.08 * (i - 2), places)
+        y, low, high = (np.array([s[k] for _, s in ended]) for k in ("share", "lower95", "upper95"))
         error = np.abs([y - low, high - y])
         axes.errorbar(x, y, yerr=error, markersize=4, capsize=2, **_style(kind))
     axes.set(ylabel="fraction of runs", ylim=(-0.03, 1.03))
     _explain_colors(axes)
 
 
-def _sides(axes: Axes, layout: Layout, groups: list[Group]) -> None:
+def _sides(axes: Axes, layout: Layout, groups: list[RunGroup]) -> None:
     _dots(axes, layout, groups, lambda row: row.lean)
     axes.axhline(0.0, color="0.5", linewidth=0.8, zorder=0)
     axes.set(ylabel="goals reached, right minus left", ylim=(-1.1, 1.1))
 
 
-def _entropies(axes: Axes, layout: Layout, groups: list[Group]) -> None:
+def _entropies(axes: Axes, layout: Layout, groups: list[RunGroup]) -> None:
     _dots(axes, layout, groups, lambda row: row.entropy)
     axes.set(ylabel="entropy at the end, nats")
-    known = [row.entropy for group in groups for row in group.rows if row.entropy is not None]
+    entropies = [r.entropy for group in groups for r in group.rows if r.entropy is not None]
     # values beyond are of other actions than the three moves
-    if all(0.0 <= entropy <= UNIFORM + _ROUNDING for entropy in known):
+    if all(0.0 <= entropy <= UNIFORM + _ROUNDING for entropy in entropies):
         axes.axhline(UNIFORM, color="0.5", linewidth=0.8, zorder=0)
         axes.set(ylim=(-0.06, 1.06 * UNIFORM))
 
 
 def _dots(
-    axes: Axes, layout: Layout, groups: list[Group], value: Callable[[Row], float | None]
+    axes: Axes, layout: Layout, groups: list[RunGroup], value: Callable[[Row], float | None]
 ) -> None:
-    """Plot a dot per judged run, hollow if uncertain; close values are shifted sideways."""
+    """Plot a dot per judged run, hollow if uncertain; the runs of a group are side by side."""
     places = _places(axes, layout, groups)
     for place, group in zip(places, groups, strict=True):
         judged = [(value(row), row) for row in group.finished if row.kind in KINDS]
-        rows = [(y, row) for y, row in judged if y is not None]
-        heights = np.round([y for y, _ in rows], 1)
-        for level in np.unique(heights):
-            close = [row for row, height in zip(rows, heights, strict=True) if height == level]
-            for i, (y, row) in enumerate(sorted(close, key=lambda r: KINDS.index(r[1].kind))):
-                shift = 0.05 * (i - (len(close) - 1) / 2)
-                x = _aside(axes, np.array([place]), shift, places)
-                fill = "full" if row.is_certain else "none"
-                axes.plot(x, [y], ls="", markersize=4, fillstyle=fill, **_style(str(row.kind)))
+        dots = [(y, row) for y, row in judged if y is not None]
+        for i, (y, row) in enumerate(sorted(dots, key=lambda dot: KINDS.index(dot[1].kind))):
+            shift = min(0.05, 0.6 / len(dots)) * (i - (len(dots) - 1) / 2)
+            x = _aside(axes, np.array([place]), shift, places)
+            fill = "full" if row.is_certain else "none"
+            axes.plot(x, [y], ls="", markersize=4, fillstyle=fill, **_style(str(row.kind)))
     _explain_colors(axes)
 
 
@@ -199,30 +194,19 @@ def _explain_colors(axes: Axes) -> None:
     figure.legend(handles=handles, loc="outside upper center", ncols=columns, fontsize=8)
 
 
-def _costs(axes: Axes, layout: Layout, groups: list[Group]) -> None:
+def _costs(axes: Axes, layout: Layout, groups: list[RunGroup]) -> None:
     for place, group in zip(_places(axes, layout, groups), groups, strict=True):
         for row in group.known:
-            shape, color = (
-                ("o", COLORS["good"]) if row.is_solved else ("^", COLORS["none of these"])
-            )
-            color = COLORS["poor"] if row.state == FAILED else color
-            fill = "full" if row.is_solved else "none"
-            axes.plot([place], [row.frames], shape, alpha=0.6, color=color, fillstyle=fill)
-        note = axes.annotate(
-            f"{group.solved['successes']}/{group.solved['trials']}",
-            (place, 1.0),
-            xycoords=("data", "axes fraction"),
-            ha="center",
-            va="top",
-            fontsize=7,
-        )
-        note.set_in_layout(False)
+            kind = "poor" if row.state == FAILED else "none of these"
+            color = COLORS["good" if row.is_solved else kind]
+            marker, fill = ("o", "full") if row.is_solved else ("^", "none")
+            axes.plot([place], [row.frames], marker, alpha=0.6, color=color, fillstyle=fill)
     every = [group for panel in layout.panels.values() for group in panel]  # they share the axis
     top = max((row.frames for group in every for row in group.known), default=0.0) or 1.0
     axes.set(ylabel="frames to solve", ylim=(0, 1.2 * top))
 
 
-Plot = Callable[[Axes, Layout, list[Group]], None]
+Plot = Callable[[Axes, Layout, list[RunGroup]], None]
 PLOTS: dict[str, tuple[str, Plot, float]] = {
     "curves": ("Learning curves", _curves, 3.6),
     "shares": ("Verdicts", _verdicts, 3.4),
@@ -233,7 +217,7 @@ PLOTS: dict[str, tuple[str, Plot, float]] = {
 """Title, function and height in inches of each plot, by the prefix of its `SENTENCES`."""
 
 
-def _places(axes: Axes, layout: Layout, groups: list[Group]) -> list[float]:
+def _places(axes: Axes, layout: Layout, groups: list[RunGroup]) -> list[float]:
     """Set the ticks and return the x position of each group: its number, or its index."""
     names = [str(group.choice.get(layout.axis or "", "")) for group in groups]
     axes.set_xlabel(_literal(layout.axis or "all runs"))
@@ -244,23 +228,11 @@ def _places(axes: Axes, layout: Layout, groups: list[Group]) -> list[float]:
         return [float(i) for i in range(len(names))]
     if min(places) > 0 and max(places) / min(places) >= LOG_FROM:
         axes.set_xscale("log")
-    axes.set_xticks(places, _labels(axes, places, names), fontsize=8)
+    axes.set_xticks(places, names, rotation=20, fontsize=7)
     axes.set_xticks([], minor=True)
     axes.update_datalim([(place, 0.0) for place in places])
     axes.autoscale_view()
     return places
-
-
-def _labels(axes: Axes, places: Sequence[float], names: Sequence[str]) -> list[str]:
-    """Return tick labels; a label that would overlap the previous one is empty."""
-    at = np.log(places) if axes.get_xscale() == "log" else np.asarray(places)
-    least = np.ptp(at) / MAX_LABELS
-    labels: list[str] = [""] * len(names)
-    last = -np.inf
-    for i in np.argsort(at, kind="stable"):
-        if at[i] - last >= least and at[i] > last:
-            labels[int(i)], last = _literal(names[int(i)]), at[i]
-    return labels
 
 
 def _literal(text: str) -> str:

@@ -88,9 +88,9 @@ class Run:
     def arguments(self) -> list[str]:
         """Return the arguments of `drone-rl` that begin or resume this run."""
         folder = quoted(str(self.folder))
-        own = ["hydra.mode=RUN", f"hydra.run.dir={folder}"]
+        single = ["hydra.mode=RUN", f"hydra.run.dir={folder}"]
         resume = [f"resume={folder}"] if self.checkpoint.is_file() else []
-        return ["train", *self.overrides, *own, *resume]
+        return ["train", *self.overrides, *single, *resume]
 
     def repeat_command(self) -> str:
         """Return the shell command that repeats this training run."""
@@ -137,8 +137,13 @@ class Sweep:
             {"number": r.number, "overrides": list(r.overrides), "folder": self.name_of(r)}
             for r in self.runs
         ]
-        own = {"format": FORMAT, "command": self.command, "settings": self.settings, "runs": runs}
-        content = {**own, **provenance()}
+        content = {
+            "format": FORMAT,
+            "command": self.command,
+            "settings": self.settings,
+            "runs": runs,
+            **provenance(),
+        }
         write_atomically(self.folder / "sweep.json", json.dumps(content, indent=2))
 
 
@@ -165,9 +170,6 @@ def read_sweep(folder: Path) -> Sweep:
             )
             for run in content["runs"]
         ]
-        if len({run.number for run in runs}) < len(runs):
-            raise InputError("two runs have the same number")
-        check_folders(runs)
         settings = dict(as_mapping(content["settings"], "settings"))
         return Sweep(folder, content["command"], settings, runs)
     except InputError as error:
@@ -223,14 +225,14 @@ def open_sweep(
         sweep = Sweep(folder, shlex.join(command), dict(settings), list(runs))
     else:
         sweep = read_sweep(folder)
-        known = {run.number: run.overrides for run in sweep.runs}
-        if any(known.get(run.number, run.overrides) != run.overrides for run in runs):
+        begun = {run.number: run.overrides for run in sweep.runs}
+        if any(begun.get(run.number, run.overrides) != run.overrides for run in runs):
             raise InputError(
                 f"hydra.sweep.dir={folder} holds another sweep, begun by: {sweep.command}; "
                 "choose another folder, or give that command to resume it"
             )
         check_same_config(sweep.settings, json.loads(json.dumps(settings)), MAY_CHANGE)
-        sweep.runs += [run for run in runs if run.number not in known]
+        sweep.runs += [run for run in runs if run.number not in begun]
         check_folders(sweep.runs)
     sweep.save()
     return sweep

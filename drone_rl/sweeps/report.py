@@ -16,7 +16,7 @@ from markupsafe import Markup, escape
 from drone_rl.sweeps import figures
 from drone_rl.sweeps.manifest import Sweep, read_sweep
 from drone_rl.sweeps.rows import read_rows
-from drone_rl.sweeps.summary import Group, make_groups, summarise_sweep, to_csv
+from drone_rl.sweeps.summary import RunGroup, make_groups, summarise_sweep, to_csv
 from drone_rl.utils.display import content_security_policy, page_environment, static_text
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, last_of, newest, write_atomically
@@ -104,13 +104,13 @@ def judge_sweep(sweep: Sweep, episodes: int, device: str) -> None:
     seed = root_seed(None)
     _log.info("%s", seed_line(seed.as_dict()))
     finished = [run for run in sweep.runs if read_result(run.folder) is not None]
-    for done, run in enumerate(finished, start=1):
+    for number, run in enumerate(finished, start=1):
         name = sweep.name_of(run)
         try:
             verdict = judge_run(run.folder, episodes, device, seed=seed)
-            _log.info("[%d/%d] %s: %s", done, len(finished), name, verdict["kind"])
+            _log.info("[%d/%d] %s: %s", number, len(finished), name, verdict["kind"])
         except InputError as error:
-            _log.warning("[%d/%d] %s not judged: %s", done, len(finished), name, error)
+            _log.warning("[%d/%d] %s not judged: %s", number, len(finished), name, error)
 
 
 def judge_run(
@@ -159,15 +159,14 @@ def render_page(name: str, summary: dict[str, Any], pictures: list[dict[str, str
     )
 
 
-def _plots(groups: Sequence[Group], sentences: Mapping[str, str]) -> list[dict[str, str]]:
-    known = [row for group in groups for row in group.known]
-    if not known:
+def _plots(groups: Sequence[RunGroup], sentences: Mapping[str, str]) -> list[dict[str, str]]:
+    rows = [row for group in groups for row in group.known]
+    if not rows:
         return []
     layout, plots = figures.lay_out(groups), []
-    shown, left_out = len(layout.panels), layout.left_out
-    note = f" Only the first {shown} of {shown + left_out} panels are shown." if left_out else ""
+    note = f" {layout.left_out} further panels are left out." if layout.left_out else ""
     for name, (title, *_) in figures.PLOTS.items():
-        if name in ("curves", "costs") or any(row.kind for row in known):
+        if name in ("curves", "costs") or any(row.kind for row in rows):
             images = (base64.b64encode(png).decode() for png in figures.draw(layout, name))
             light, dark = (f"data:image/png;base64,{image}" for image in images)
             text = _paragraph(sentences, f"{name}.") + note
@@ -205,13 +204,11 @@ def _share(value: Mapping[str, Any]) -> str:
 
 def _median(value: Mapping[str, Any]) -> str:
     """Format a median or its lower bound, with the interval if there is one."""
-    middle, beyond = value["median"], value["more_than"]
-    if beyond is not None:
-        text = f">{_number(beyond)}"
-    elif middle is not None:
-        text = _number(middle)
-    else:
+    median, bound = value["median"], value["more_than"]
+    figure = median if bound is None else bound
+    if figure is None:
         return ""
+    text = ("" if bound is None else ">") + _number(figure)
     if value["lower95"] is None:
         return text
     upper = "more" if value["upper95"] is None else _number(value["upper95"])

@@ -2,7 +2,7 @@
 
 import contextlib
 import dataclasses
-import math
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drone_rl.sweeps.manifest import Run, Sweep, read_failure, read_sweep
-from drone_rl.trust.rule import SIDES, Kind, Rule
+from drone_rl.trust.rule import SIDES, Rule, VerdictKind
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.readers import read_result, read_table
 from drone_rl.utils.schema import Flag, Maybe, OneOf, Real, Whole
 
 Array = NDArray[np.float64]
-_MAX_VALUE = 1e15
-"""Upper bound of every figure of a run."""
 LAST_UPDATES = 20
 """Number of last updates over which the entropy is averaged."""
 NOT_OFFERED = "not offered"
@@ -33,7 +31,7 @@ class Row:
     """The swept settings and their values, including the seed."""
     folder: str
     """Path of the run's folder inside the sweep's folder."""
-    state: str
+    state: str = "unfinished"
     """"finished", "failed", "damaged" or "unfinished"."""
     error: str | None = None
     """Reason of a failure or damage."""
@@ -63,7 +61,7 @@ class Row:
     @property
     def kind(self) -> str | None:
         """One of `KINDS`, without sides; None without a verdict."""
-        return None if self.verdict is None else Kind(self.verdict["kind"]).family
+        return None if self.verdict is None else VerdictKind(self.verdict["kind"]).family
 
     @property
     def is_certain(self) -> bool:
@@ -73,8 +71,7 @@ class Row:
     @property
     def has_older_verdict(self) -> bool:
         """Whether the run was judged by an outdated rule only."""
-        was_judged = "evaluation" in self.result or "verdict" in self.result
-        return was_judged and self.verdict is None
+        return "verdict" in self.result and self.verdict is None
 
     @property
     def lean(self) -> float | None:
@@ -129,7 +126,7 @@ def read_rows(sweep: Sweep) -> list[Row]:
     keys = list(dict.fromkeys(key for choice in choices for key in choice))
     swept = [key for key in keys if len({choice.get(key) for choice in choices}) > 1]
     return [
-        _read_row(run, {key: choice.get(key, "") for key in swept}, sweep.name_of(run))
+        _read_row(Row(run, {key: choice.get(key, "") for key in swept}, sweep.name_of(run)))
         for run, choice in zip(sweep.runs, choices, strict=True)
     ]
 
@@ -139,40 +136,37 @@ def _choice(run: Run) -> dict[str, str]:
     return {key.lstrip("+"): value for key, _, value in parts if key != "trial"}
 
 
-def _read_row(run: Run, choice: dict[str, str], folder: str) -> Row:
-    result = read_result(run.folder)
-    error = read_failure(run)
+def _read_row(row: Row) -> Row:
+    """Add to a row what the run's files contain."""
+    result, row.error = read_result(row.run.folder), read_failure(row.run)
     if result is None:
-        row = Row(run, choice, folder, "unfinished" if error is None else "failed", error)
-        with contextlib.suppress(ValueError, KeyError, TypeError):
-            if error is not None:  # a failed run may have metrics
-                _, (row.frames, row.seconds), row.entropy = _read_metrics(run.folder, 1)
+        if row.error is not None:
+            row.state = "failed"
+            with contextlib.suppress(*_DAMAGE):  # a failed run may have metrics
+                _read_metrics(row)
         return row
     try:
         _check_result(result)
-        curve, _, entropy = _read_metrics(run.folder, result["largest_reward"])
-        _check_curve(curve)
-        had = float(result["frames"]), float(result["seconds"])
-        row = Row(run, choice, folder, "finished", None, result, curve, *had, entropy)
-        if row.verdict is not None:
-            _KIND.read(row.verdict["kind"], "verdict.kind")
-            Flag().read(row.verdict["certain"], "verdict.certain")
-            for of in row.verdict["greedy"]["shares"].values():
-                Maybe(Real(0.0, 1.0)).read(of["mean"], "verdict.greedy.shares")
-        row.plain()
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        frames, rewards = _read_metrics(row)
+    except _DAMAGE as error:
         reason = str(error) if isinstance(error, InputError) else repr(error)
-        return Row(run, choice, folder, "damaged", f"its files can't be read ({reason})")
+        row.state, row.error = "damaged", f"its files can't be read ({reason})"
+        return row
+    row.state, row.error, row.result = "finished", None, result
+    row.curve = frames, rewards / result["largest_reward"]
+    row.frames, row.seconds = float(result["frames"]), float(result["seconds"])
     return row
 
 
-_KIND = OneOf(tuple(kind.value for kind in Kind))
+_DAMAGE = (ValueError, LookupError, TypeError, AttributeError)
+"""Exceptions that reading damaged files raises; `InputError` is a `ValueError`."""
+_KIND = OneOf(tuple(kind.value for kind in VerdictKind))
 _RESULT = {
     "frames": Whole(0, 10**15),
     "episodes": Whole(0, 10**12),
     "seconds": Real(0.0, 1e10),
     "largest_reward": Real(0.0, 1e6, is_above=True),
-    "running_reward": Real(-_MAX_VALUE, _MAX_VALUE),
+    "running_reward": Real(-1e15, 1e15),
 }
 """Schema of the figures in `result.json`."""
 
@@ -180,60 +174,29 @@ _RESULT = {
 def _check_result(result: dict[str, Any]) -> None:
     for key, kind in _RESULT.items():
         kind.read(result.get(key), f"result.{key}")
+    verdict = result.get("verdict")
+    if verdict is not None and verdict["rule"] == Rule().text:
+        _KIND.read(verdict["kind"], "verdict.kind")
+        Flag().read(verdict["certain"], "verdict.certain")
+        for of in verdict["greedy"]["shares"].values():
+            Maybe(Real(0.0, 1.0)).read(of["mean"], "verdict.greedy.shares")
 
 
-def _check_curve(curve: tuple[Array, Array]) -> None:
-    """Check the learning curve of a finished run."""
-    frames, shares = curve
-    if not (np.isfinite(frames).all() and (np.diff(frames, prepend=0.0) >= 0).all()):
-        raise InputError("metrics.csv: frames decrease or are not finite")
-    if not (np.abs(shares) < _MAX_VALUE).all():
-        raise InputError("metrics.csv: a reward is not finite")
-
-
-def _read_metrics(
-    folder: Path, largest_reward: float
-) -> tuple[tuple[Array, Array], tuple[float, float], float | None]:
-    """Return the learning curve, the final frames and seconds, and the final entropy."""
-    rows = _metrics_columns(folder / "metrics.csv")
-    frames, rewards, seconds, entropies = rows.T
-    had = (float(frames[-1]), float(seconds[-1])) if len(rows) else (0.0, 0.0)
-    if not all(0 <= value < _MAX_VALUE for value in had):
-        raise InputError("metrics.csv: frames or seconds are out of range")
-    last = entropies[-LAST_UPDATES:]
-    last = last[last != _EMPTY]
-    entropy = float(last.mean()) if len(last) and np.isfinite(last).all() else None
-    return (frames, rewards / largest_reward), had, entropy
-
-
-_EMPTY = math.inf
-"""Placeholder for an entropy that was not logged."""
-_COLUMNS = {
-    "frames": None,
-    "train/running_reward": None,
-    "seconds": 0.0,
-    "loss/entropy": _EMPTY,
-}
-"""Columns read from `metrics.csv`, with the value of an empty or missing cell (None: required)."""
-
-
-def _metrics_columns(path: Path) -> Array:
-    """Return the `_COLUMNS` of each update. Shape: (num_updates, 4)."""
-    rows = read_table(path)
-    places = {name: place for place, name in enumerate(next(rows, []))}
-    for name, empty in _COLUMNS.items():
-        if empty is None and name not in places:
-            raise InputError(f"metrics.csv has no column {name}")
-    wanted = [
-        (places.get(name), "" if empty is None else empty) for name, empty in _COLUMNS.items()
-    ]
-    table = [[float(_cell(row, place) or empty) for place, empty in wanted] for row in rows]
-    return np.array(table, np.float64).reshape(-1, len(wanted))
-
-
-def _cell(row: list[str], place: int | None) -> str:
-    """Return the text in a column; empty if the row or the table lacks it."""
-    return "" if place is None or place >= len(row) else row[place]
+def _read_metrics(row: Row) -> tuple[Array, Array]:
+    """Return frames and running reward of each update; add final figures to the row."""
+    header, *lines = read_table(row.run.folder / "metrics.csv")
+    if not {"frames", "train/running_reward"} <= {*header}:
+        raise InputError("metrics.csv lacks the columns frames and train/running_reward")
+    cells = itertools.zip_longest(*lines, fillvalue="") if lines else itertools.repeat(())
+    columns = dict(zip(header, cells, strict=False))
+    frames = np.array(columns["frames"], np.float64)
+    rewards = np.array(columns["train/running_reward"], np.float64)
+    if lines:
+        row.frames, row.seconds = float(frames[-1]), float(columns["seconds"][-1])
+    logged = [float(cell) for cell in columns.get("loss/entropy", ())[-LAST_UPDATES:] if cell]
+    entropy = float(np.mean(logged)) if logged else np.nan
+    row.entropy = entropy if np.isfinite(entropy) else None
+    return frames, rewards
 
 
 def choice_in_sweep(checkpoint: Path) -> tuple[str, dict[str, Any]] | None:

@@ -8,15 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from drone_rl.utils.errors import InputError, extra
-from drone_rl.utils.files import parse_json, read_bytes
+from drone_rl.utils.files import read_bytes
 from drone_rl.utils.limits import JOURNAL_BYTES
-from drone_rl.utils.schema import Whole, as_mapping
 
 NAME = "sweep"
 _JOURNAL = "optuna.journal"
-_OPERATIONS = Whole(0, 100)
-"""Operation codes of a journal line."""
-_DAMAGE = (LookupError, TypeError, ValueError, AttributeError, AssertionError)
+_DAMAGE = (LookupError, TypeError, ValueError, AttributeError, AssertionError, RecursionError)
 """Exceptions that Optuna raises for an inconsistent journal."""
 
 
@@ -42,7 +39,8 @@ def open_study(folder: Path, **settings: Any) -> Any:
     path = folder / _JOURNAL
     if "direction" not in settings and not path.exists():
         raise InputError(f"{folder} has no search ({_JOURNAL}); leave out trial=")
-    _check_journal(path)
+    if path.exists() and path.stat().st_size:
+        read_bytes(path, JOURNAL_BYTES)  # refuses a larger file, and what is no regular file
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     try:
         journal = optuna.storages.journal
@@ -60,22 +58,6 @@ def open_study(folder: Path, **settings: Any) -> Any:
         ) from error
 
 
-def _check_journal(path: Path) -> None:
-    """Check the journal's size and operation codes."""
-    if not path.exists() or (path.is_file() and path.stat().st_size == 0):
-        return
-    content = read_bytes(path, JOURNAL_BYTES)
-    *lines, _ = content.split(b"\n")  # a run may be writing the last one
-    try:
-        for number, line in enumerate(lines, start=1):
-            entry = as_mapping(parse_json(line, f"line {number}", allow_nan=True), f"line {number}")
-            _OPERATIONS.read(entry.get("op_code"), f"line {number}: op_code")
-    except InputError as error:
-        raise InputError(
-            f"{path} is damaged ({error}); move the folder away and search again"
-        ) from None
-
-
 def next_trials(study: Any, space: Mapping[str, Any], count: int, seed: int) -> list[Any]:
     """Return the trials from the first to the last unfinished one, or else `count` new ones.
 
@@ -84,8 +66,7 @@ def next_trials(study: Any, space: Mapping[str, Any], count: int, seed: int) -> 
     resumed search samples the same.
     """
     optuna = import_optuna()
-    running = optuna.trial.TrialState.RUNNING
-    left = [trial.number for trial in study.trials if trial.state == running]
+    left = [trial.number for trial in study.trials if not trial.state.is_finished()]
     if left:
         return study.trials[min(left) : max(left) + 1]
     begin = len(study.trials)

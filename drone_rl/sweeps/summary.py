@@ -30,16 +30,12 @@ def summarise_sweep(sweep: Sweep, rows: Sequence[Row]) -> dict[str, Any]:
     states = [row.state for row in rows]
     judged = [row.verdict for row in rows if row.verdict is not None]
     older = sum(row.has_older_verdict for row in rows)
-    keys = ("reason", "frames", "episodes", "seconds", "running_reward")
-    finished = (row.result for row in rows if row.state == "finished")
-    figures = [tuple(r[key] for key in keys) for r in finished if r["frames"]]  # clones have none
     folder = f"folder={_path_argument(sweep.folder)}"
     judge_arguments = (folder, "judge=true", *_plugins(sweep.runs))
     summary = {
         "command": sweep.command,
         "judge_command": shlex.join(["drone-rl", "sweep-report", *judge_arguments]),
         **{name: states.count(name) for name in STATES},
-        "copies": len(figures) - len(set(figures)),  # seconds are measured to a nanosecond
         "judged": len(judged),
         "certain": sum(verdict["certain"] for verdict in judged),
         "judged_by_older_rule": older,
@@ -56,32 +52,29 @@ def summarise_sweep(sweep: Sweep, rows: Sequence[Row]) -> dict[str, Any]:
 
 def _plugins(runs: Sequence[Run]) -> list[str]:
     """Return the override that imports the modules of a sweep's runs, if they have any."""
-    found = (o for run in runs for o in run.overrides if o.lstrip("+").startswith("plugins="))
-    return list(dict.fromkeys(found))[:1]
+    overrides = (o for run in runs for o in run.overrides if o.lstrip("+").startswith("plugins="))
+    return list(overrides)[:1]
 
 
 def _best(rows: Sequence[Row]) -> dict[str, Any] | None:
-    ranked = best_rows(rows)
-    if not ranked:
+    best = min(rows, key=_rank, default=None)
+    if best is None or best.verdict is None:
         return None
-    best, verdict = ranked[0], ranked[0].verdict or {}
     policy = f"policy={_path_argument(best.run.folder)}"
     return {
         **best.plain(),
-        "episodes": verdict["greedy"]["episodes"],
-        "equals": sum(row.share("all") == best.share("all") for row in ranked) - 1,
+        "episodes": best.verdict["greedy"]["episodes"],
         "command": best.run.repeat_command(),
         "report_command": shlex.join(["drone-rl", "verdict", policy, *_plugins([best.run])]),
     }
 
 
-def best_rows(rows: Sequence[Row]) -> list[Row]:
-    """Rank the judged runs by the fraction of goals reached, then by the fewest frames.
+def _rank(row: Row) -> tuple[bool, float, float]:
+    """Rank judged runs by the fraction of goals reached, then by the fewest frames.
 
     Fractions make tasks with different numbers of goals comparable.
     """
-    judged = [row for row in rows if row.verdict is not None]
-    return sorted(judged, key=lambda row: (-(row.share("all") or 0.0), row.frames))
+    return row.verdict is None, -(row.share("all") or 0.0), row.frames
 
 
 def to_csv(rows: Sequence[Row]) -> str:
@@ -102,7 +95,7 @@ def _path_argument(path: Path) -> str:
 
 
 @dataclasses.dataclass
-class Group:
+class RunGroup:
     """Runs that differ in their seed only."""
 
     choice: dict[str, str]
@@ -113,7 +106,7 @@ class Group:
     @property
     def finished(self) -> list[Row]:
         """Runs with a result."""
-        return self.of_state("finished")
+        return [row for row in self.rows if row.state == "finished"]
 
     @property
     def ended(self) -> list[Row]:
@@ -124,10 +117,6 @@ class Group:
     def known(self) -> list[Row]:
         """Runs with known progress: finished or failed."""
         return [row for row in self.ended if row.state != "damaged"]
-
-    def of_state(self, state: str) -> list[Row]:
-        """Return the runs in one state."""
-        return [row for row in self.rows if row.state == state]
 
     @property
     def solved(self) -> dict[str, Any]:
@@ -143,16 +132,16 @@ class Group:
         counts the certain verdicts.
         """
         judged = [row for row in self.finished if row.kind is not None]
-        failed = self.of_state("failed")
-        unknown = len(self.ended) - len(judged) - len(failed)
+        failed = len(self.known) - len(self.finished)
+        unknown = len(self.ended) - len(judged) - failed
         shares = {}
         for kind in KINDS:
             rows = [row for row in judged if row.kind == kind]
             shares[kind] = share_of_runs(len(rows), unknown, len(self.ended))
             shares[kind]["certain"] = sum(row.is_certain for row in rows)
-        damaged = len(self.of_state("damaged"))
-        failures = share_of_runs(len(failed), damaged, len(self.ended))
-        return {**shares, FAILED: {**failures, "certain": len(failed)}}
+        damaged = len(self.ended) - len(self.known)
+        failures = share_of_runs(failed, damaged, len(self.ended))
+        return {**shares, FAILED: {**failures, "certain": failed}}
 
     def plain(self) -> dict[str, Any]:
         """Return counts, fractions and medians with exact intervals, and their sentences."""
@@ -173,12 +162,12 @@ class Group:
         return {**figures, "sentences": said(GROUP_SENTENCES, figures)}
 
 
-def make_groups(rows: Sequence[Row]) -> list[Group]:
-    """Group runs that differ in their seed only, in the order of their first run."""
-    groups: dict[tuple, Group] = {}
+def make_groups(rows: Sequence[Row]) -> list[RunGroup]:
+    """RunGroup runs that differ in their seed only, in the order of their first run."""
+    groups: dict[tuple, RunGroup] = {}
     for row in rows:
         choice = {key: value for key, value in row.choice.items() if key != "seed"}
-        groups.setdefault(tuple(choice.items()), Group(choice, [])).rows.append(row)
+        groups.setdefault(tuple(choice.items()), RunGroup(choice, [])).rows.append(row)
     return list(groups.values())
 
 
@@ -227,10 +216,10 @@ def median_band(values: Array) -> tuple[Array, Array] | None:
     Lower and upper bounds have shape (num_points,) each; None for fewer than six runs.
     """
     bounds = [median_bounds(column) for column in np.asarray(values, float).T]
-    known = [pair for pair in bounds if pair is not None]
-    if not known:
+    existing = [pair for pair in bounds if pair is not None]
+    if not existing:
         return None
-    lower, upper = np.array(known).T
+    lower, upper = np.array(existing).T
     return lower, upper
 
 

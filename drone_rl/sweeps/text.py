@@ -2,12 +2,10 @@
 
 from collections.abc import Callable
 
-from drone_rl.config.training import DETERMINISTIC
 from drone_rl.utils.text import Evidence, Sentence, percent, plural
 
 MIN_RUNS = 6
 """Fewest runs whose median has an exact 95% interval."""
-_ROUNDING = 1e-4
 
 
 def from_to(values: list) -> str:
@@ -24,16 +22,10 @@ def counts(summary: Evidence) -> dict[str, int]:
     """Return numbers of runs and settings.
 
     "few": settings with readable runs, but too few for an interval of the median; "censored":
-    settings of which at least half of the runs never reached the target; "left", "right": runs
-    whose policy reaches goals on this side only; "still": finished runs with a practically
-    deterministic policy; "entropies": judged runs with a known final entropy.
+    settings of which at least half of the runs never reached the target; "entropies": judged runs
+    with a known final entropy.
     """
     runs, groups = summary["runs"], summary["groups"]
-    kinds = [run["verdict"] for run in runs]
-    known = [run for run in runs if run["entropy"] is not None]
-    # continuous actions have densities, whose entropy is below 0 also where actions vary
-    is_density = any(run["entropy"] < -_ROUNDING for run in known)
-    still = [r for r in known if r["state"] == "finished" and r["entropy"] < DETERMINISTIC]
     solved = sum(group["solved"]["successes"] for group in groups)
     return {
         "ended": len(runs) - summary["unfinished"],
@@ -41,10 +33,7 @@ def counts(summary: Evidence) -> dict[str, int]:
         "unsolved": summary["finished"] + summary["failed"] - solved,
         "few": sum(0 < readable(group) < MIN_RUNS for group in groups),
         "censored": sum(group["frames_to_solve"]["more_than"] is not None for group in groups),
-        "left": kinds.count("one-sided (left)"),
-        "right": kinds.count("one-sided (right)"),
-        "still": 0 if is_density else len(still),
-        "entropies": sum(run["certain"] is not None for run in known),
+        "entropies": sum(r["certain"] is not None and r["entropy"] is not None for r in runs),
     }
 
 
@@ -100,23 +89,10 @@ SENTENCES = (
         "medians and curves leave them out.",
     ),
     _if_any(
-        "runs.copies",
-        "runs have the same figures, measured seconds included",
-        "copies",
-        "{runs} with exactly the figures of another run, seconds included: probably copies of one "
-        "training, which count more than once.",
-    ),
-    _if_any(
         "runs.unfinished",
         "a run has not ended",
         "unfinished",
         "{runs} not ended yet: left out of every fraction and median.",
-    ),
-    _if_any(
-        "runs.solved_none",
-        "runs ended and none was solved",
-        lambda e: counts(e)["ended"] > 0 and counts(e)["solved"] == 0,
-        "No run with readable files was stopped by reaching its target.",
     ),
     _if_any(
         "runs.few",
@@ -189,12 +165,6 @@ SENTENCES = (
         ),
     ),
     _if_any(
-        "best.equals",
-        "others reach the same fraction of goals",
-        lambda e: 0 if e["best"] is None else e["best"]["equals"],
-        "{runs} reached the same fraction with at least as many frames.",
-    ),
-    _if_any(
         "best.flattered",
         "it was chosen among several",
         lambda e: e["best"] is not None and e["judged"] > 1,
@@ -211,25 +181,13 @@ SENTENCES = (
         f"a setting with {MIN_RUNS} readable ended runs or more",
         lambda e: any(readable(group) >= MIN_RUNS for group in e["groups"]),
         "Thick line: the median over runs; band: its exact pointwise 95% interval by order "
-        "statistics.",
+        "statistics. The curve of a finished run is extended by its last value.",
     ),
     _if_any(
         "curves.runs",
         f"a setting with fewer than {MIN_RUNS} readable ended runs",
         "few",
         f"Thin lines: single runs, where fewer than {MIN_RUNS} have ended with readable files.",
-    ),
-    _if_any(
-        "curves.ends",
-        "a run has finished",
-        "finished",
-        "The curve of a finished run is extended by its last value.",
-    ),
-    _if_any(
-        "curves.failed",
-        "a run failed",
-        "failed",
-        "A failed run counts as having learned nothing.",
     ),
     Sentence(
         "shares.bars",
@@ -248,18 +206,6 @@ SENTENCES = (
         "the fraction of those on its left.",
     ),
     _if_any(
-        "sides.lost_left",
-        "a policy is one-sided to the right",
-        "right",
-        "{runs} one-sided to the right.",
-    ),
-    _if_any(
-        "sides.lost_right",
-        "a policy is one-sided to the left",
-        "left",
-        "{runs} one-sided to the left.",
-    ),
-    _if_any(
         "sides.not_offered",
         "a policy was offered no goal on a side",
         "sides_not_offered",
@@ -273,16 +219,10 @@ SENTENCES = (
         "all are from 0 to ln 3, a line marks ln 3, that of three equally probable actions.",
     ),
     _if_any(
-        "entropies.still",
-        f"a finished run ended below {DETERMINISTIC} nats, and none below 0, as densities may",
-        "still",
-        f"{{runs}} ended below {DETERMINISTIC} nats: these policies are practically deterministic.",
-    ),
-    _if_any(
         "costs.dots",
         "a run was solved",
         "solved",
-        "Each dot is a run that reached its target; above: their number, of the runs that ended.",
+        "Each dot is a run that reached its target.",
     ),
     _if_any(
         "costs.open",

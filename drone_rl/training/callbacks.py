@@ -16,12 +16,11 @@ from tqdm import tqdm
 
 from drone_rl.config.training import DETERMINISTIC
 from drone_rl.utils.checkpoint import save_checkpoint
-from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import make_folder, remove_leftovers, write_atomically
 from drone_rl.utils.progress import Progress as Report
 from drone_rl.utils.progress import as_progress, note_shown
 from drone_rl.utils.readers import read_table
-from drone_rl.utils.schema import Instance, Several, shown
+from drone_rl.utils.schema import Instance, Several
 
 
 @dataclasses.dataclass
@@ -138,12 +137,10 @@ class CsvCallback(Callback):
 
     def on_clone(self, epoch: int, epochs: int, metrics: Mapping[str, float]) -> None:
         """Append a row to `cloning.csv`, which the first pass begins."""
-        is_first = epoch == 1
-        with self.path.with_name("cloning.csv").open("w" if is_first else "a", newline="") as file:
-            writer = csv.writer(file)
-            if is_first:
-                writer.writerow(["epoch", *metrics])
-            writer.writerow([epoch, *(f"{v:.6g}" for v in metrics.values())])
+        path = self.path.with_name("cloning.csv")
+        if epoch == 1:
+            path.unlink(missing_ok=True)
+        _append_row(path, {"epoch": epoch}, metrics)
 
     def on_start(self, training: OngoingTraining) -> None:
         """Keep the rows up to the state that training resumes from."""
@@ -151,35 +148,33 @@ class CsvCallback(Callback):
             return
         rows = [*read_table(self.path)] if self.path.stat().st_size else []
         whole = [r for r in rows[1:] if len(r) == len(rows[0])]  # the last may be cut short
-        kept = [r for r in whole if self._update_of(r) <= training.progress.updates]
+        last = training.progress.updates
+        kept = [r for r in whole if r[0].isdecimal() and int(r[0]) <= last]
         text = io.StringIO(newline="")
         csv.writer(text).writerows(rows[:1] + kept if kept else [])  # `on_update` writes the header
         write_atomically(self.path, text.getvalue())
-
-    def _update_of(self, row: Sequence[str]) -> int:
-        if not (row[0].isascii() and row[0].isdigit() and len(row[0]) < 20):
-            raise InputError(
-                f"{self.path} is damaged: {shown(row[0])} is no number of an update; move it away"
-            )
-        return int(row[0])
 
     def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
         """Append a row; delete result.json, which is of the training before this update."""
         self.path.with_name("result.json").unlink(missing_ok=True)
         done = training.progress
         counters = {"update": done.updates, "frames": done.frames, "episodes": done.episodes}
-        counters = {**counters, "seconds": round(done.seconds, 3)}
-        is_new = not self.path.exists() or self.path.stat().st_size == 0
-        with self.path.open("a", newline="") as file:
-            writer = csv.writer(file)
-            if is_new:
-                writer.writerow([*counters, *metrics])
-            writer.writerow([*counters.values(), *(f"{v:.6g}" for v in metrics.values())])
+        _append_row(self.path, {**counters, "seconds": round(done.seconds, 3)}, metrics)
 
     def on_end(self, training: OngoingTraining, reason: str) -> None:
         """Write only a header if there was no update, as in a run that only clones."""
         if not self.path.exists() or self.path.stat().st_size == 0:
             self.path.write_text("update,frames,episodes,seconds,train/running_reward\n")
+
+
+def _append_row(path: Path, counters: Mapping[str, float], metrics: Mapping[str, float]) -> None:
+    """Append a row to a table, which begins with the names of its columns."""
+    is_new = not path.exists() or path.stat().st_size == 0
+    with path.open("a", newline="") as file:
+        writer = csv.writer(file)
+        if is_new:
+            writer.writerow([*counters, *metrics])
+        writer.writerow([*counters.values(), *(f"{v:.6g}" for v in metrics.values())])
 
 
 class CollapseCheck(Callback):

@@ -55,7 +55,7 @@ class Cloning(Settings):
     seconds: Annotated[float, Real(0.0, 1e12)]
 
 
-class Frames(NamedTuple):
+class RecordedFrames(NamedTuple):
     """The frames of several flights, one flight after the other."""
 
     images: Tensor  # (N, H, W, 3) uint8
@@ -124,7 +124,7 @@ class Cloner:
         self.transforms = pixel_transforms(describe(settings).without_faults().make_transforms())
         self.optimizer = torch.optim.Adam(network.parameters(), lr=self.how.lr)
 
-    def learn(self, frames: Frames, generator: torch.Generator) -> dict[str, float]:
+    def learn(self, frames: RecordedFrames, generator: torch.Generator) -> dict[str, float]:
         """Pass over the frames once, in random order; return loss and accuracy while learning.
 
         Raises:
@@ -133,7 +133,9 @@ class Cloner:
         order = torch.randperm(len(frames.actions), generator=generator)
         return _mean(self._steps(frames, order.to(frames.actions.device)))
 
-    def _steps(self, frames: Frames, order: Tensor) -> Iterator[tuple[int, dict[str, float]]]:
+    def _steps(
+        self, frames: RecordedFrames, order: Tensor
+    ) -> Iterator[tuple[int, dict[str, float]]]:
         for rows in order.split(self.how.minibatch_size):
             self.optimizer.zero_grad()
             minibatch = TensorDict({"row": rows}, [len(rows)])
@@ -145,13 +147,13 @@ class Cloner:
         self.optimizer.zero_grad()
 
     @torch.no_grad()
-    def measure(self, frames: Frames) -> dict[str, float]:
+    def measure(self, frames: RecordedFrames) -> dict[str, float]:
         """Return mean loss and accuracy over the frames."""
         every = torch.arange(len(frames.actions), device=frames.actions.device)
         chunks = TensorDict({"row": every}, [len(every)]).split(self.limits.chunk_frames)
         return _mean((len(chunk), _named(self._terms(frames, chunk))) for chunk in chunks)
 
-    def _terms(self, frames: Frames, chunk: TensorDictBase) -> TensorDict:
+    def _terms(self, frames: RecordedFrames, chunk: TensorDictBase) -> TensorDict:
         """Return the mean loss and the accuracy of the frames with the indices "row"."""
         rows = chunk.get("row")
         taken, own = frames.actions[rows], self.network.actions
@@ -189,8 +191,8 @@ def clone(
     how, begin = settings.cloning, time.perf_counter()
     generator = torch_generator(settings.seed, Stream.CLONING)
     learned, held_out = hold_out(demonstrations, how.held_out_share, generator)
-    frames = Frames.of(learned, settings.device)
-    others = Frames.of(held_out, settings.device) if held_out else None
+    frames = RecordedFrames.of(learned, settings.device)
+    others = RecordedFrames.of(held_out, settings.device) if held_out else None
     cloner = Cloner(settings, network)
     done: dict[str, float] = {}
     for epoch in range(1, how.epochs + 1):

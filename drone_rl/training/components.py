@@ -7,10 +7,9 @@ from typing import Any, NamedTuple
 import torch
 from torchrl.envs import TransformedEnv
 
-from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.config.learning import CompleteEpisodes, Ray
 from drone_rl.config.training import TrainSettings
-from drone_rl.policies import ImageNetwork, make_actor
+from drone_rl.policies import ImageNetwork
 from drone_rl.policies.zoo import describe
 from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.tasks import FailureReplayTask
@@ -18,7 +17,7 @@ from drone_rl.utils.available_memory import require_memory
 from drone_rl.utils.errors import InputError
 
 
-class Group(NamedTuple):
+class EnvGroup(NamedTuple):
     """The environments of one thread or worker, with the policy."""
 
     env: TransformedEnv
@@ -33,13 +32,13 @@ class Components(NamedTuple):
     """The collector of batches with returns, and the network that learns from them."""
 
     collector: Any
-    """Has `actor`, `postproc` and `cache_activations`, in addition to what `Trainer` needs."""
+    """Has `actor` and `postproc`, in addition to what `Trainer` needs."""
     network: ImageNetwork
     generators: dict[str, torch.Generator]
     """Random streams of this process, by name."""
 
 
-def joined(collector: Any, groups: Sequence[Group]) -> Components:
+def joined(collector: Any, groups: Sequence[EnvGroup]) -> Components:
     """Return the components of a training run whose groups are in this process."""
     generators = {f"actions_{i}": group.generator for i, group in enumerate(groups)}
     return Components(collector, groups[0].network, generators)
@@ -95,15 +94,3 @@ def make_learner(settings: TrainSettings, components: Components) -> Any:
             'the policy\'s weights; add "policy": components.network.state_dict()'
         )
     return learner
-
-
-def learning_actor(settings: TrainSettings, components: Components) -> Any:
-    """Return the actor that the loss evaluates, with a fused network if it is supported."""
-    actor, threads = components.collector.actor, settings.trainer.num_threads
-    if components.network.is_recurrent or not settings.trainer.compiled:
-        return actor
-    cache = components.collector.cache_activations
-    fused = accelerated_gradients(components.network, threads, cache=cache)
-    if fused is components.network:
-        return actor
-    return make_actor(fused, actor.spec["action"])

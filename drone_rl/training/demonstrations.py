@@ -44,7 +44,6 @@ from drone_rl.utils.files import (
     refuse_links,
     write_atomically,
 )
-from drone_rl.utils.limits import ARRAYS_BYTES
 from drone_rl.utils.schema import Instance, Plain, Record, Text, Whole, as_mapping, shown
 
 FORMAT = "drone_rl demonstration"
@@ -155,9 +154,6 @@ class Demonstration:
                 f"conditions={shown(self.conditions)} is no FlightConditions; give "
                 "FlightConditions.of(settings)"
             )
-        for name in _ARRAYS:
-            if not isinstance(value := getattr(self, name), np.ndarray):
-                raise InputError(f"{name}={shown(value)} is no array; give one of numpy")
         steps = len(self.actions) if self.actions.ndim else 0
         if not steps:
             raise InputError("a flight has no steps; record at least one")
@@ -175,9 +171,6 @@ class Demonstration:
                     f"{name} has shape {array.shape} and type {array.dtype}; a flight of {steps} "
                     f"steps under these conditions has {shape} and {dtype}"
                 )
-        self._check_values(entry)
-
-    def _check_values(self, entry: Entry) -> None:
         low, high = entry.low, entry.high
         assert low is not None and high is not None
         if not ((self.actions >= low) & (self.actions <= high)).all():
@@ -186,12 +179,6 @@ class Demonstration:
             raise InputError("rewards hold NaN or infinity; give finite numbers")
         if self.done[:-1].any():
             raise InputError("done is true before the last step; write one file for each episode")
-        size = sum(getattr(self, name).nbytes for name in _ARRAYS)
-        if size > ARRAYS_BYTES:
-            raise InputError(
-                f"a flight of {len(self)} steps takes {size} bytes, more than {ARRAYS_BYTES}; "
-                "record a shorter one"
-            )
 
     def __len__(self) -> int:
         """Return the number of steps."""
@@ -284,8 +271,7 @@ def add_demonstration(folder: str | Path, demonstration: Demonstration) -> Path:
         InputError: It is no demonstration, or the folder can't be made or stays locked.
         OSError: The file can't be written.
     """
-    if not isinstance(demonstration, Demonstration):
-        raise InputError(f"{shown(demonstration)} is no drone_rl.Demonstration; give one")
+    Instance(Demonstration).read(demonstration, "demonstration")
     folder, content = as_path(folder, "folder"), demonstration.to_bytes()
     make_folder(folder)
     with folder_lock(folder, patience_s=_PATIENCE_S):

@@ -29,6 +29,7 @@ from drone_rl.training.callbacks import CheckpointCallback
 from drone_rl.training.cloning import Cloning
 from drone_rl.training.confirmation import Confirmation
 from drone_rl.training.demonstrations import Demonstration, FlightConditions, read_demonstrations
+from drone_rl.training.restore import check_fits
 from drone_rl.training.trainer import Trainer
 from drone_rl.utils.display import Result, picture, table
 from drone_rl.utils.errors import InputError
@@ -43,7 +44,7 @@ from drone_rl.utils.files import (
 )
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.readers import read_table
-from drone_rl.utils.schema import Real, shown
+from drone_rl.utils.schema import shown
 from drone_rl.utils.settings import kinds_of
 
 _log = logging.getLogger(__name__)
@@ -61,8 +62,6 @@ MAY_CHANGE = (
 """Settings that a resumed run may change: they don't enter into what is learned."""
 _WRITTEN = ("metrics.csv", "result.json", "run.yaml", "provable.json")
 """Files in a run's folder that are replaced when they are complete."""
-_NONE_YET = float("-inf")
-"""The best running mean before the first update."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -204,7 +203,8 @@ class RunFolder:
         """Load the state, if any, and write `run.yaml`; see `Trainer.load_state_dict`."""
         if state is not None:
             trainer.load_state_dict(state)
-            checkpoints.best = _read_best(state.get("best"))
+            check_fits(state.get("best"), checkpoints.best, "best")
+            checkpoints.best = state["best"]
             if "cloning" in state:
                 cloning = Cloning.read(state["cloning"], "the checkpoint's cloning")
                 checkpoints.extra["cloning"] = cloning.values()
@@ -348,9 +348,3 @@ def settings_of(config: Mapping[str, Any]) -> TrainSettings:
                 "nothing else; pass the settings, too"
             )
     return settings
-
-
-def _read_best(value: Any) -> float:
-    if type(value) is float and value == _NONE_YET:
-        return value
-    return Real(-1e15, 1e15).read(value, "the checkpoint's best")

@@ -14,6 +14,7 @@ from typing import Any
 import torch
 
 from drone_rl.collectors import EpisodeCollector, ThreadedCollector
+from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.config.learning import Episodes, Reinforce
 from drone_rl.config.registry import implements, modules_of
 from drone_rl.config.training import TrainSettings
@@ -26,7 +27,7 @@ from drone_rl.sim.tasks import FailureReplayTask, as_task
 from drone_rl.training import components, run_folder
 from drone_rl.training.callbacks import Callback, CollapseCheck, CsvCallback, with_progress
 from drone_rl.training.cloning import clone
-from drone_rl.training.components import Components, Group
+from drone_rl.training.components import Components, EnvGroup
 from drone_rl.training.confirmation import Confirmation
 from drone_rl.training.learners import NotANumberError, ReinforceLearner
 from drone_rl.training.run_folder import Judge, RunFolder, Training
@@ -171,7 +172,7 @@ def make_groups(
     sizes: list[int],
     replay: FailureReplayTask | None = None,
     numbers: Iterable[int] | None = None,
-) -> list[Group]:
+) -> list[EnvGroup]:
     """Make the environments of threads or workers, and the policy that acts in them.
 
     `sizes` are the numbers of environments of the groups, `numbers` the indices of those to make.
@@ -196,24 +197,28 @@ def make_groups(
         env = with_transforms(base, description.make_transforms())
         generator = torch_generator(seed, Stream.ACTIONS, number=number, device=device)
         actor = make_actor(network, env.action_spec, generator)
-        groups.append(Group(env, actor, network, generator))
+        groups.append(EnvGroup(env, actor, network, generator))
     return groups
 
 
 @implements(Reinforce)
 def reinforce_learner(settings: TrainSettings, parts: Components, **own: Any) -> ReinforceLearner:
     """Make the learner without a critic; `own` are the settings of its loss."""
-    limits, actor = settings.trainer, components.learning_actor(settings, parts)
-    is_fused = actor is not parts.collector.actor  # its kernel has `limits.num_threads` threads
-    optimizer = settings.optimizer.make(parts.network.parameters())
+    limits, network, actor = settings.trainer, parts.network, parts.collector.actor
+    may_fuse = limits.compiled and not network.is_recurrent
+    learning = accelerated_gradients(network, limits.num_threads) if may_fuse else network
+    is_fused = learning is not network  # its kernel has `limits.num_threads` threads
+    if is_fused:
+        actor = make_actor(learning, actor.spec["action"])
+    optimizer = settings.optimizer.make(network.parameters())
     return ReinforceLearner(
-        network=parts.network,
+        network=network,
         loss=ReinforceLoss(actor, **own).to(settings.device),
         optimizer=optimizer,
         scheduler=settings.scheduler.make(optimizer),
         max_grad_norm=limits.max_grad_norm,
         chunk_frames=limits.chunk_frames,
-        whole_episodes=parts.network.is_recurrent,
+        whole_episodes=network.is_recurrent,
         # the steps of an LSTM are too small to share
-        num_threads=1 if is_fused or parts.network.is_recurrent else None,
+        num_threads=1 if is_fused or network.is_recurrent else None,
     )

@@ -167,11 +167,11 @@ class OracleAgent:
     def _first_visible(self, context: StepContext, next_cube: Tensor) -> Tensor:
         """Return the index of the nearest visible cube, or the number of cubes. Shape: (n, 1)."""
         props = torch.tensor([*context.worlds.scene.props, -1], device=next_cube.device)
-        shown = props[context.render("segmentation").long()].float()[:, None]
-        shown = context.apply_faults(shown, context.active, _NOTHING).flatten(1)
+        numbers = props[context.render("segmentation").long()].float()[:, None]
+        numbers = context.apply_faults(numbers, context.active, _NOTHING).flatten(1)
         count = context.worlds.task.places(context.state).shape[1]  # distractors come after
-        stands = (shown >= next_cube) & (shown < count)
-        visible = torch.where(stands, shown, torch.full_like(shown, count))
+        is_cube = (numbers >= next_cube) & (numbers < count)
+        visible = torch.where(is_cube, numbers, torch.full_like(numbers, count))
         return visible.amin(-1, keepdim=True).long()
 
 

@@ -36,8 +36,8 @@ TOGETHER = 3
 class Scale(NamedTuple):
     """Scale on which distances between strengths are measured."""
 
-    there: Callable[[float], float]
-    back: Callable[[float], float]
+    forward: Callable[[float], float]
+    inverse: Callable[[float], float]
     rises: bool = True
     """Whether greater values have greater positions."""
 
@@ -57,7 +57,7 @@ class Axis:
     group: str
     """One of the ten kinds of shift."""
     unit: str
-    """Of values."""
+    """Unit of its values."""
     neutral: float
     """Strength of no perturbation."""
     strengths: tuple[float, ...]
@@ -78,7 +78,7 @@ class Axis:
 
     def position(self, strength: float) -> float:
         """Return the position of a strength on the axis's scale, relative to the neutral one."""
-        return self.scale.there(strength) - self.scale.there(self.neutral)
+        return self.scale.forward(strength) - self.scale.forward(self.neutral)
 
     @property
     def signs(self) -> dict[str, int]:
@@ -95,16 +95,16 @@ class Axis:
 
     def between(self, low: float, high: float, share: float = 0.5) -> float | None:
         """Return the strength at a fraction of the way between two, None if there is none."""
-        there, back, _ = self.scale
+        forward, inverse, _ = self.scale
         if not self.whole:
-            return back(there(low) + share * (there(high) - there(low)))
+            return inverse(forward(low) + share * (forward(high) - forward(low)))
         inside = round(abs(high - low)) - 1
         nearer = 1 + min(math.floor(share * inside), inside - 1)
         return math.copysign(nearer, high - low) + low if inside > 0 else None
 
     def at(self, position: float) -> float:
         """Return the strength at a position, the inverse of `position`."""
-        return self.scale.back(position + self.scale.there(self.neutral))
+        return self.scale.inverse(position + self.scale.forward(self.neutral))
 
 
 CORRELATION_TIME = -1.0 / math.log(0.95)

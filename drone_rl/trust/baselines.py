@@ -4,7 +4,7 @@ from typing import Any
 
 import torch
 
-from drone_rl.collectors.complete_episodes import Episodes, run_episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes, run_episodes
 from drone_rl.config import BaseTaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.policies.baselines import make_baseline
@@ -25,7 +25,7 @@ def run_baselines(
     episodes: int,
     device: str = "cpu",
     dynamics: Dynamics | None = None,
-) -> dict[str, Episodes]:
+) -> dict[str, CompleteEpisodes]:
     """Run so many episodes of every baseline, the k-th of each from the same initial state.
 
     `worlds` is `DroneEnv.state_dict` from before the policy's first episode, and `num_envs` the

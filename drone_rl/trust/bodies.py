@@ -103,29 +103,28 @@ def bodies(
     """
     settings, seed = with_seed(from_arguments(BodiesSettings, settings, changes, bodies))
     progress = as_progress(progress)
-    given = list(settings.policies) if policies is None else policies
-    listed = given if isinstance(given, list | tuple) else [given]
-    loaded = [as_policy(one, outputs) for one in listed]
-    names = [policy.name for policy in loaded]
-    if not names:
-        raise InputError("policies=[] is empty; give at least one policy")
-    if twice := next((name for name in names if names.count(name) > 1), None):
-        raise InputError(f"two policies are called {twice}; give each once, or rename a file")
+    loaded = _load(settings.policies if policies is None else policies, outputs)
+    if settings.loop_flights and in_the_loop is None:
+        raise InputError(f"loop_flights={settings.loop_flights} needs in_the_loop=")
     shared = settings.as_base(JudgeSettings)
     for policy, body in itertools.product(loaded, settings.bodies):  # before any episode
         policy.in_dynamics(**changes_of(body, policy.dynamics))
-    found: dict[str, dict[str, Any]] = {}
+    by_policy: dict[str, dict[str, Any]] = {}
     steps = len(loaded) * (len(settings.bodies) + bool(settings.loop_flights))
     for policy in loaded:
-        verdicts = found.setdefault(policy.name, {})
+        verdicts = by_policy.setdefault(policy.name, {})
         for body in settings.bodies:
-            count = sum(map(len, found.values()))
+            count = sum(map(len, by_policy.values()))
             progress(f"{policy.name}: {body}", count, steps)
             how = {"dynamics": changes_of(body, policy.dynamics), "outputs": outputs}
             done = judge(policy, shared, **how, progress=silent, drawn_seed=seed)
             verdicts[body] = done.verdict.as_dict()
-    numbers: dict[str, Any] = {"bodies": [*settings.bodies], **seed.as_dict(), "policies": found}
-    if settings.loop_flights and in_the_loop:
+    numbers: dict[str, Any] = {
+        "bodies": [*settings.bodies],
+        **seed.as_dict(),
+        "policies": by_policy,
+    }
+    if in_the_loop is not None and settings.loop_flights:
         looped = numbers[LOOPED] = {}
         for policy in loaded:
             progress(f"{policy.name}: {LOOPED}", steps - len(loaded) + len(looped), steps)
@@ -133,6 +132,17 @@ def bodies(
             looped[policy.name] = in_the_loop(still, settings.loop_flights, seed)
     progress("flown", steps, steps)
     return Bodies(settings, numbers)
+
+
+def _load(policies: Any, outputs: str | Path) -> list[BasePolicy]:
+    listed = policies if isinstance(policies, list | tuple) else [policies]
+    loaded = [as_policy(one, outputs) for one in listed]
+    if not loaded:
+        raise InputError("policies=[] is empty; give at least one policy")
+    names = [policy.name for policy in loaded]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise InputError(f"two policies are called {twice}; give each once, or rename a file")
+    return loaded
 
 
 def changes_of(body: str, own: DynamicsSettings) -> Mapping[str, Any]:

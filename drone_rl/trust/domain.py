@@ -18,17 +18,18 @@ import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import torch
+from torch import Tensor
 
-from drone_rl.collectors.complete_episodes import Episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.trust.agents import OracleAgent, PolicyAgent, has_oracle
 from drone_rl.trust.axes import Axis
-from drone_rl.trust.outcomes import OutcomeSet
 from drone_rl.trust.paired_evaluation import PairedEvaluator
 from drone_rl.trust.perturbations import Condition
-from drone_rl.trust.rule import Kind, Quantity, Rule, kinds_within
+from drone_rl.trust.rule import Quantity, Rule, VerdictKind, kinds_within
 from drone_rl.trust.suite import finite
-from drone_rl.trust.verdict import measure, widen
+from drone_rl.trust.verdict import estimate, observe_each
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import proportion
 from drone_rl.utils.seeding import Stream, torch_generator
@@ -108,7 +109,7 @@ class Prober:
     def __init__(
         self,
         evaluator: PairedEvaluator,
-        oracle: Episodes,
+        oracle: CompleteEpisodes,
         good_share: float,
         possible_share: float = 0.9,
         plain_part: float = WALKING,
@@ -123,7 +124,7 @@ class Prober:
         self._rule = Rule(
             good_share=good_share, strata=task.strata, blind_baselines=task.blind_baselines
         )
-        self._baselines: dict[Any, dict[str, Episodes]] = {}
+        self._baselines: dict[Any, dict[str, CompleteEpisodes]] = {}
         self.plain = self.probe(Condition(), plain_part)
 
     def rule_at(self, part: float) -> Rule:
@@ -155,16 +156,14 @@ class Prober:
             self._baselines[key] = self._evaluator.run_baselines(condition)
         rule = self.rule_at(part)
         baselines = {**self._baselines[key], "oracle": self._oracle}
-        unknown = OutcomeSet(None, torch.empty(0, dtype=torch.int64), agent.is_fragile)
-        widened = widen(measure(greedy, baselines, rule), greedy, baselines, rule, unknown)
-        found = dict(zip(rule.quantities, widened, strict=True))
+        quantities = measure_open(greedy, baselines, rule, agent.is_fragile)
         return {
-            "good": is_surely_good(found, rule),
-            "bad": Kind.GOOD not in _kinds(found, rule),
+            "good": is_surely_good(quantities, rule),
+            "bad": VerdictKind.GOOD not in _kinds(quantities, rule),
             "refused": None,
             "success": float(greedy.success.mean()),
             "fragile": int(agent.is_fragile.sum()),
-            "worst": _worst(found, rule),
+            "worst": _worst(quantities, rule),
         }
 
     def search(self, axis: Axis) -> dict[str, Any]:
@@ -200,35 +199,55 @@ class Prober:
         ]
         return range_of(axis, ends, failed, self._evaluator.subject)
 
-    def _explain(self, axis: Axis, strength: float, found: dict[str, Any]) -> dict[str, Any]:
-        if found["refused"] is not None or not has_oracle(self._oracle.task):
-            return {**found, "oracle": None, "impossible": False}
+    def _explain(self, axis: Axis, strength: float, probed: dict[str, Any]) -> dict[str, Any]:
+        if probed["refused"] is not None or not has_oracle(self._oracle.task):
+            return {**probed, "oracle": None, "impossible": False}
         condition = axis.make(strength, self._evaluator.subject)
         success = self._evaluator.run(condition, agent=OracleAgent()).episodes.success
         seen = proportion(int(success.sum()), len(success))
-        return {**found, "oracle": seen, "impossible": seen["upper95"] < self._possible}
+        return {**probed, "oracle": seen, "impossible": seen["upper95"] < self._possible}
 
 
-def is_surely_good(found: Mapping[str, Quantity], rule: Rule) -> bool:
+def measure_open(
+    greedy: CompleteEpisodes, baselines: Mapping[str, CompleteEpisodes], rule: Rule, is_open: Tensor
+) -> dict[str, Quantity]:
+    """Return a rule's quantities, with intervals that hold for any outcomes of open episodes.
+
+    Lower bounds count the worst value of a quantity in these episodes, (n,), bool, upper bounds the
+    best one.
+    """
+    quantities = {}
+    observed, rows = observe_each(greedy, baselines, rule), is_open.numpy()
+    for i, (name, values) in enumerate(zip(rule.quantities, observed, strict=True)):
+        middle, least, most = (
+            estimate(i, one[~np.isnan(one)], rule)
+            for one in (values, *(np.where(rows, end, values) for end in rule.ranges[i]))
+        )
+        low, high = min(middle.lower, least.lower), max(middle.upper, most.upper)
+        quantities[name] = middle._replace(lower=low, upper=high)
+    return quantities
+
+
+def is_surely_good(quantities: Mapping[str, Quantity], rule: Rule) -> bool:
     """Return whether the verdict is certainly good and certainly above all baselines."""
-    sees = all(found[f"above {name}"].levels[0] > 0 for name in rule.blind_baselines)
-    return sees and _kinds(found, rule) == {Kind.GOOD}
+    sees = all(quantities[f"above {name}"].levels[0] > 0 for name in rule.blind_baselines)
+    return sees and _kinds(quantities, rule) == {VerdictKind.GOOD}
 
 
-def _kinds(found: Mapping[str, Quantity], rule: Rule) -> frozenset[Kind]:
+def _kinds(quantities: Mapping[str, Quantity], rule: Rule) -> frozenset[VerdictKind]:
     """Return all kinds that the intervals admit."""
-    box = tuple(quantity.levels for quantity in found.values())
+    box = tuple(quantity.levels for quantity in quantities.values())
     return kinds_within(box, len(rule.strata))
 
 
-def _worst(found: Mapping[str, Quantity], rule: Rule) -> dict[str, Any] | None:
+def _worst(quantities: Mapping[str, Quantity], rule: Rule) -> dict[str, Any] | None:
     """Return the stratum with the smallest fraction of goals reached, None if unknown."""
-    shares = {s: found[f"collected {s}"].value for s in rule.strata}
-    known = {stratum: share for stratum, share in shares.items() if share is not None}
-    if not known:
+    shares = {s: quantities[f"collected {s}"].value for s in rule.strata}
+    rates = {stratum: share for stratum, share in shares.items() if share is not None}
+    if not rates:
         return None
-    side = min(known, key=lambda stratum: known[stratum])
-    return {"side": side, "share": known[side]}
+    side = min(rates, key=lambda stratum: rates[stratum])
+    return {"side": side, "share": rates[side]}
 
 
 def _course(axis: Axis, side: list[float], seed: int) -> Iterator[float]:

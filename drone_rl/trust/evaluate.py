@@ -19,9 +19,9 @@ from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.tasks import as_task
 from drone_rl.trust.baselines import run_baselines
-from drone_rl.trust.conditions_text import unlike as unlike_text
 from drone_rl.trust.metrics import summarise
 from drone_rl.trust.rounding_sensitivity import run_compared
+from drone_rl.trust.verdict_text import unlike as unlike_text
 from drone_rl.utils.display import Result, aligned, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
@@ -37,12 +37,12 @@ class Evaluation(Result):
     policy: BasePolicy
     settings: EvaluateSettings
     figures: dict[str, dict[str, Any]]
-    """Figures of "greedy", "sampled" and the baselines; see `evaluation.metrics.summarise`."""
+    """Figures of "greedy", "sampled" and the baselines; see `drone_rl.trust.metrics.summarise`."""
     seed: RootSeed
     """Root of the environments' random streams."""
     rounding: dict[str, Any] | None = None
     """The implementation that computed the actions, and the comparison with another one; see
-    `drone_rl.trust.outcomes.Rounding`."""
+    `drone_rl.trust.rounding_sensitivity.Rounding`."""
 
     @property
     def success(self) -> float:
@@ -72,12 +72,12 @@ class Evaluation(Result):
     def _rates(self, label: str, figures: Sequence[Mapping[str, Any]]) -> list[list[str]]:
         """Return a row of rates, and a row of the policy's 95% intervals."""
         rates = [f["share"] if "share" in f else f["mean"] for f in figures]
-        known = ["-" if rate is None else percent(rate) for rate in rates]
+        texts = ["-" if rate is None else percent(rate) for rate in rates]
         policy = [
             interval(figure) if name in ("greedy", "sampled") and rate is not None else ""
             for name, rate, figure in zip(self.figures, rates, figures, strict=True)
         ]
-        return [[label, *known], ["  95% CI", *policy]]
+        return [[label, *texts], ["  95% CI", *policy]]
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values, as in `evaluation.json`."""
@@ -138,8 +138,8 @@ def evaluate(
     settings, seed = with_seed(from_arguments(EvaluateSettings, settings, changes, evaluate))
     progress = as_progress(progress)
     policy = as_policy(policy, outputs, task=task, dynamics=dynamics, appearance=appearance)
-    if settings.baselines and (own := as_task(policy.task)).oracle is None:
-        raise InputError(f"task={own.name} has no oracle to compare with; give baselines=false")
+    if settings.baselines and (judged := as_task(policy.task)).oracle is None:
+        raise InputError(f"task={judged.name} has no oracle to compare with; give baselines=false")
     episodes, steps = settings.episodes, 3 if settings.baselines else 2
     with held_out_environments(policy, settings, seed) as (env, actor):
         state, flown = env.base_env.state_dict(), worlds_of(env).dynamics
@@ -168,28 +168,28 @@ def held_out_environments(
 
 
 def _same(evidence: Evidence) -> str:
-    found = evidence["rounding"]
-    what = "All actions" if found.get("bound", True) else "The outcomes"
+    check = evidence["rounding"]
+    what = "All actions" if check.get("bound", True) else "The outcomes"
     return (
-        f"{what} of the first {found['compared_episodes']:,} greedy episodes were the same "
-        f"when computed again ({found['compared']})."
+        f"{what} of the first {check['compared_episodes']:,} greedy episodes were the same "
+        f"when computed again ({check['compared']})."
     )
 
 
 def _other(evidence: Evidence) -> str:
-    found = evidence["rounding"]
-    what = "Actions" if found.get("bound", True) else "Actions or outcomes"
+    check = evidence["rounding"]
+    what = "Actions" if check.get("bound", True) else "Actions or outcomes"
     return (
-        f"{what} differed in {found['differing']:,} of the first {found['compared_episodes']:,} "
-        f"greedy episodes when computed again ({found['compared']}): decisions depend on rounding."
+        f"{what} differed in {check['differing']:,} of the first {check['compared_episodes']:,} "
+        f"greedy episodes when computed again ({check['compared']}): decisions depend on rounding."
     )
 
 
 def _fragile(evidence: Evidence) -> str:
-    found = evidence["rounding"]
+    check = evidence["rounding"]
     return (
-        f"These figures hold for this arithmetic only: in {found['fragile']:,} of "
-        f"{found['frames']:,} of these episodes' frames ({percent(found['fragile_rate'])}) the "
+        f"These figures hold for this arithmetic only: in {check['fragile']:,} of "
+        f"{check['frames']:,} of these episodes' frames ({percent(check['fragile_rate'])}) the "
         "order in which float32 sums are computed can change the action."
     )
 

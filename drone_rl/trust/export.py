@@ -15,8 +15,8 @@ from drone_rl.policies.zoo.files import exported_bytes
 from drone_rl.sim.vocabulary import some_cubes, terms_of
 from drone_rl.trust.coverage import find_domain
 from drone_rl.trust.evaluate import held_out_environments
-from drone_rl.trust.quoted_text import QUOTED, not_evaluated
-from drone_rl.trust.quoted_text import is_quoted as has_domain
+from drone_rl.trust.shifts_text import QUOTED, not_evaluated
+from drone_rl.trust.shifts_text import is_quoted as has_domain
 from drone_rl.trust.verdict import FindClaim, Verdict, judge_policy
 from drone_rl.trust.verdict_text import best_baseline, is_quoted
 from drone_rl.utils.errors import InputError
@@ -87,12 +87,12 @@ def recorded_origin(path: Path, state: dict[str, Any]) -> tuple[str | None, dict
 
     The command is None if it is unknown, as of a run that was trained from Python.
     """
-    own = state if path.suffix == ".safetensors" else {}  # nobody checked that of a checkpoint
-    noted, folder = own.get("command"), path.absolute().parent.parent
+    metadata = state if path.suffix == ".safetensors" else {}  # nobody checked that of a checkpoint
+    noted, folder = metadata.get("command"), path.absolute().parent.parent
     if noted is None and (folder / ".hydra" / "overrides.yaml").is_file():
         typed = [o for o in read_overrides(folder) if not o.startswith(("resume=", "trial="))]
         noted = shlex.join(["drone-rl", "train", *typed])
-    return noted, own.get("chosen")
+    return noted, metadata.get("chosen")
 
 
 def export_policy(
@@ -157,8 +157,8 @@ def write_card(name: str, digest: str, about: Evidence) -> str:
     """
     sentences = said(SENTENCES, about)
     verdict = sentences.pop("card.verdict")
-    known = about["provenance"]["versions"]
-    packages = {name: known.get(name, "unknown") for name in ("torch", "torchrl", "mujoco-warp")}
+    versions = about["provenance"]["versions"]
+    packages = {name: versions.get(name, "unknown") for name in ("torch", "torchrl", "mujoco-warp")}
     revision = about["provenance"]["git_revision"] or "unknown"
     points = "\n".join(f"- {text}" for text in sentences.values())
     by = "" if about["command"] is None else f"by `{about['command']}` "

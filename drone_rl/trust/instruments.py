@@ -20,8 +20,8 @@ _DEGREES = 40.0
 """Degrees of pitch from the centre of the horizon to its edge."""
 _SHARPER = 3
 """Supersampling factor of the horizon."""
-_SPEEDS, _BARS = (172, 30), 140
-"""Position of the speeds, and width of their bars, pixels."""
+_SPEEDS = (172, 40)
+"""Position of the speeds, pixels."""
 _MOTORS = (330, 30)
 _STILL = 0.05
 """Motion backward, right or down up to this speed, m/s, is labelled forward, left or climbs."""
@@ -51,16 +51,15 @@ def read(body: FlightState) -> Reading:
     return Reading(Attitude.of((w, x, y, z)), speeds, tuple(body.rotors[0].tolist()))
 
 
-def panel(reading: Reading, max_speed: float, hover: float) -> Image.Image:
+def panel(reading: Reading, hover: float) -> Image.Image:
     """Draw the instruments. Size: (WIDTH, HEIGHT).
 
-    Bars of speeds are full at `max_speed`, m/s. A mark on each bar of a motor shows `hover`, thrust
-    in hover as a fraction of the maximum thrust.
+    A mark on each bar of a motor shows `hover`, thrust in hover as a fraction of the maximum.
     """
     image = Image.new("RGB", (WIDTH, HEIGHT), _BACKGROUND)
     draw = ImageDraw.Draw(image)
     _draw_horizon(image, draw, reading.attitude)
-    _draw_speeds(draw, reading.speeds, max_speed)
+    _draw_speeds(draw, reading.speeds)
     _draw_motors(draw, reading.rotors, hover)
     return image
 
@@ -95,24 +94,13 @@ def _draw_horizon(image: Image.Image, draw: ImageDraw.ImageDraw, attitude: Attit
     draw.text((x, HEIGHT - 12), text, _TEXT, ImageFont.load_default(13), anchor="mm")
 
 
-def _draw_speeds(
-    draw: ImageDraw.ImageDraw, speeds: tuple[float, float, float], max_speed: float
-) -> None:
-    left, top = _SPEEDS
-    middle = left + _BARS // 2
-    draw.text((left, 8), "speed", _FAINT, ImageFont.load_default(13))
-    for row, (speed, words) in enumerate(zip(speeds, _WORDS, strict=True)):
-        y = top + 53 * row
-        word = words[speed < -_STILL]
-        draw.text((left, y), word, _TEXT, ImageFont.load_default(15))
-        text = f"{abs(speed):.1f} m/s"
-        draw.text((left + _BARS, y), text, _TEXT, ImageFont.load_default(15), anchor="ra")
-        draw.rectangle((left, y + 24, left + _BARS, y + 36), (50, 54, 63))
-        share = max(-1.0, min(1.0, speed / max_speed))
-        is_mirrored = row == 1  # to the left is on the left
-        end = middle + round(_BARS / 2 * (-share if is_mirrored else share))
-        draw.rectangle((min(middle, end), y + 24, max(middle, end), y + 36), _BAR)
-        draw.line((middle, y + 21, middle, y + 39), _TEXT, 2)
+def _draw_speeds(draw: ImageDraw.ImageDraw, speeds: tuple[float, float, float]) -> None:
+    x, y = _SPEEDS
+    draw.text((x, 8), "speed", _FAINT, ImageFont.load_default(13))
+    for speed, words in zip(speeds, _WORDS, strict=True):
+        text = f"{words[speed < -_STILL]} {abs(speed):.1f} m/s"
+        draw.text((x, y), text, _TEXT, ImageFont.load_default(15))
+        y += 53
 
 
 def _draw_motors(draw: ImageDraw.ImageDraw, rotors: tuple[float, ...], hover: float) -> None:

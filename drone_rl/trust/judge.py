@@ -5,7 +5,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, cast, overload
+from typing import Any, TypedDict, Unpack, cast, overload
 
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
@@ -21,12 +21,11 @@ from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.trust.baselines import BASELINES
 from drone_rl.trust.coverage import Coverage, compare_with_required, find_domain, recheck_domain
 from drone_rl.trust.evaluate import held_out_environments
-from drone_rl.trust.quoted_text import BRIEF, why_not
 from drone_rl.trust.recorded import identify
 from drone_rl.trust.rule import Rule
 from drone_rl.trust.shifts_file import SavedShifts
+from drone_rl.trust.shifts_text import BRIEF, why_not
 from drone_rl.trust.verdict import FindClaim, Verdict, judge_policy
-from drone_rl.trust.verdict_text import quantity_label
 from drone_rl.utils.display import Result, aligned, paragraph, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import NOT_COVERED, PROOF_MISSING
@@ -97,16 +96,7 @@ class Judgement(Result):
         return "\n".join(filter(None, (line, self.domain, required, seed)))
 
     def _repr_html_(self) -> str:
-        evidence = self.verdict.evidence
-        success = evidence["greedy"]["success"]
-        rate = [success[key] for key in ("share", "lower95", "upper95")]
-        figures = {"success rate (95% interval)": rate} | {
-            quantity_label(name, evidence): [q[key] for key in ("value", "lower", "upper")]
-            for name, q in evidence["quantities"].items()
-        }
-        shown = [[k, *("" if v is None else f"{v:.3f}" for v in row)] for k, row in figures.items()]
-        lines = "".join(map(paragraph, str(self).splitlines()))
-        return lines + table(["quantity", "value", "lower", "upper"], shown)
+        return "".join(map(paragraph, str(self).splitlines()))
 
 
 class Judgements(Result, tuple[Judgement, ...]):
@@ -131,24 +121,50 @@ class Judgements(Result, tuple[Judgement, ...]):
         return table(head, rows)
 
 
+class JudgeOptions(TypedDict, total=False):
+    """Arguments of `judge`: those of `judge_one`, and all of `JudgeSettings`."""
+
+    task: Mapping[str, Any] | None
+    dynamics: Mapping[str, Any] | None
+    appearance: AppearanceSettings | str | None
+    certificate: str | Path | None
+    shifts: str | Path | None
+    require_domain: str | Path | None
+    outputs: str | Path
+    progress: Progress | None
+    drawn_seed: RootSeed | None
+    find_claim: FindClaim | None
+    episodes: int
+    num_envs: int
+    seed: int | None
+    device: str
+    renderer: str
+    sampled: bool
+    good_share: float
+    certificate_flights: int
+    domain_flights: int
+
+
+Given = str | Path | BasePolicy | Logits
+"""A policy, or something that `as_policy` converts to one."""
+
+
 @overload
 def judge(
-    policy: str | Path | BasePolicy | Logits, settings: JudgeSettings | None = None, **how: Any
+    policy: Given, settings: JudgeSettings | None = None, **options: Unpack[JudgeOptions]
 ) -> Judgement: ...
 
 
 @overload
 def judge(
-    policy: Sequence[str | Path | BasePolicy | Logits],
-    settings: JudgeSettings | None = None,
-    **how: Any,
+    policy: Sequence[Given], settings: JudgeSettings | None = None, **options: Unpack[JudgeOptions]
 ) -> Judgements: ...
 
 
 def judge(
-    policy: str | Path | BasePolicy | Logits | Sequence[str | Path | BasePolicy | Logits],
+    policy: Given | Sequence[Given],
     settings: JudgeSettings | None = None,
-    **how: Any,
+    **options: Unpack[JudgeOptions],
 ) -> Judgement | Judgements:
     """Judge one policy, or a list or tuple of policies in the same environments.
 
@@ -156,29 +172,27 @@ def judge(
         policy: The policy, what `load_policy` takes, a callable, see `policy_from`, a model of
             Stable-Baselines3, or a baseline: "random", "forward", "left", "right" or "oracle".
         settings: Number of episodes, seed, device and so on.
-        how: See `drone_rl.trust.judge.judge_one`: task, dynamics, appearance, certificate,
-            shifts, require_domain, outputs, progress, and settings to change, as in
+        options: See `drone_rl.trust.judge.judge_one`; also settings to change, as in
             `judge("good", episodes=1000, appearance="fog")`.
 
     Raises:
         InputError: A policy, setting or file is unusable, or the list is empty.
     """
     if not isinstance(policy, list | tuple):
-        return judge_one(cast("Any", policy), settings, **how)
+        return judge_one(cast("Any", policy), settings, **options)
     if not policy:
         raise InputError("policy=[] is empty; give one or more policies")
     settings = from_arguments(JudgeSettings, settings, {}, judge_one)
-    changed = {name: how.get(name) for name in ("task", "dynamics", "appearance")}
+    changed = {name: options.get(name) for name in ("task", "dynamics", "appearance")}
     for one in policy:  # a wrong one is refused before any episode
-        _loaded(one, how.get("outputs", "outputs"), changed)
-    given = how.pop("seed", settings.seed)
-    seed = how.pop("drawn_seed", None) or root_seed(given)  # all in the same environments
-    done = (judge_one(one, settings, drawn_seed=seed, **how) for one in policy)
-    return Judgements(tuple(done))
+        _loaded(one, options.get("outputs", "outputs"), changed)
+    seed = options.pop("seed", settings.seed)  # all in the same environments
+    options["drawn_seed"] = options.get("drawn_seed") or root_seed(seed)
+    return Judgements(tuple(judge_one(one, settings, **options) for one in policy))
 
 
 def judge_one(
-    policy: str | Path | BasePolicy | Logits,
+    policy: Given,
     settings: JudgeSettings | None = None,
     *,
     task: Mapping[str, Any] | None = None,
@@ -228,12 +242,20 @@ def judge_one(
         name = str(loaded.path)
     claim = measured = coverage = None
     if loaded is None:
-        _refuse_files(name, certificate=certificate, shifts=shifts, require_domain=require_domain)
-        own = Changes(TaskSettings).read(as_changes(task, "task"), "task")
-        air = Changes(DynamicsSettings).read(as_changes(dynamics, "dynamics"), "dynamics")
-        moved = DynamicsSettings(**air)
-        moved.check_air()
-        worlds = _baseline(name, TaskSettings(**own), moved, settings, seed)
+        files = {"certificate": certificate, "shifts": shifts, "require_domain": require_domain}
+        for setting, path in files.items():
+            if path is not None:
+                raise InputError(
+                    f"{setting}={path}, but policy={name} has no network; give {setting}= with the "
+                    "policy that it is of"
+                )
+        changed_task = Changes(TaskSettings).read(as_changes(task, "task"), "task")
+        changed_dynamics = Changes(DynamicsSettings).read(
+            as_changes(dynamics, "dynamics"), "dynamics"
+        )
+        drone = DynamicsSettings(**changed_dynamics)
+        drone.check_air()
+        worlds = _baseline(name, TaskSettings(**changed_task), drone, settings, seed)
     else:
         measured = find_domain(loaded, shifts, outputs)
         needs = require_domain
@@ -244,17 +266,24 @@ def judge_one(
         if find_claim is not None:
             claim = find_claim(loaded, certificate, flights=flights, seed=seed, **where)
         worlds = held_out_environments(loaded, settings, seed)
-    is_sampled, rule = settings.sampled and loaded is not None, Rule(good_share=settings.good_share)
-    known = {"claim": claim, "unlike": loaded and loaded.unlike, "rule": rule, "seed": seed}
     with worlds as (env, actor):
-        verdict = judge_policy(env, actor, settings.episodes, sampled=is_sampled, **known)
+        verdict = judge_policy(
+            env,
+            actor,
+            settings.episodes,
+            sampled=settings.sampled and loaded is not None,
+            rule=Rule(good_share=settings.good_share),
+            claim=claim,
+            unlike=None if loaded is None else loaded.unlike,
+            seed=seed,
+        )
     progress("judged", 1, 1)
     path = None if claim is None else claim.path
-    done = Judgement(name, settings, verdict, path, measured, identify(loaded))
+    judgement = Judgement(name, settings, verdict, path, measured, identify(loaded))
     if coverage is None or measured is None:
-        return done
+        return judgement
     against = why_not(_quoted(measured, verdict))
-    return dataclasses.replace(done, coverage=dataclasses.replace(coverage, against=against))
+    return dataclasses.replace(judgement, coverage=dataclasses.replace(coverage, against=against))
 
 
 def _loaded(policy: Any, outputs: str | Path, changed: Mapping[str, Any]) -> BasePolicy | None:
@@ -284,16 +313,6 @@ def _reflown(
 def _quoted(measured: SavedShifts, verdict: Verdict) -> dict[str, Any]:
     """Evidence of the sentences about the operating domain."""
     return {"shifts": measured.evidence, "verdict": verdict.evidence}
-
-
-def _refuse_files(name: str, **given: str | Path | None) -> None:
-    """Refuse files of a network for a baseline."""
-    for setting, path in given.items():
-        if path is not None:
-            raise InputError(
-                f"{setting}={path}, but policy={name} has no network; give {setting}= with the "
-                "policy that it is of"
-            )
 
 
 @contextmanager

@@ -7,11 +7,11 @@ from typing import Any
 
 import torch
 
-from drone_rl.collectors.complete_episodes import Episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.utils.intervals import mean_bounds, proportion
 
 
-def summarise(episodes: Episodes) -> dict[str, Any]:
+def summarise(episodes: CompleteEpisodes) -> dict[str, Any]:
     """Return the figures of an evaluation as plain values, with 95% intervals over episodes.
 
     "success" is the success rate. "shares" are mean fractions of goals reached: of all goals, and
@@ -40,7 +40,7 @@ def summarise(episodes: Episodes) -> dict[str, Any]:
     }
 
 
-def failure_table(episodes: Episodes, confidence: float = 0.95) -> dict[str, Any]:
+def failure_table(episodes: CompleteEpisodes, confidence: float = 0.95) -> dict[str, Any]:
     """Count first failures by class of goal and by how the episode ended.
 
     An episode fails once: at the first goal that it misses, or by its end if it reached all goals

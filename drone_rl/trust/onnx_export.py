@@ -100,11 +100,11 @@ def export_onnx(
     model = open_onnx(content)
     without_faults = dataclasses.replace(policy, description=policy.description.without_faults())
     with without_faults.flying(_NUM_ENVS, seed=root_seed(seed).value) as (env, actor):
-        found = agreement(env, actor, model, _STEPS)
-    if not found.difference <= MAX_DIFFERENCE:
+        agreed = agreement(env, actor, model, _STEPS)
+    if not agreed.difference <= MAX_DIFFERENCE:
         raise InputError(
             f"the ONNX model of policy {policy.name} returns probabilities that differ by up to "
-            f"{found.difference:.2g} from the policy's, more than {MAX_DIFFERENCE:g}; export it "
+            f"{agreed.difference:.2g} from the policy's, more than {MAX_DIFFERENCE:g}; export it "
             "with format=safetensors"
         )
     try:
@@ -114,4 +114,4 @@ def export_onnx(
             f"the ONNX file {target} can't be written ({error.strerror}); free some space or "
             "choose another folder"
         ) from error
-    return found
+    return agreed

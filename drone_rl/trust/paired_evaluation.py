@@ -1,6 +1,7 @@
 """Run a policy under conditions, from the same initial states in each of them."""
 
 import dataclasses
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -8,7 +9,7 @@ import torch
 from torch import Tensor
 from torchrl.envs import Transform
 
-from drone_rl.collectors.complete_episodes import Episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.config import (
     COMPUTER_VISION,
     MINIMAL,
@@ -30,14 +31,13 @@ from drone_rl.trust.perturbations import (
     ONSET_STEP,
     Condition,
     FaultPipeline,
-    Mode,
+    PerturbationMode,
     clutter,
     sample_distractors,
     scene_appearance,
     task_region,
     variations,
 )
-from drone_rl.trust.rollouts import rollout
 from drone_rl.utils.seeding import Stream, torch_generator, world_random_state
 from drone_rl.utils.settings import prefixed_errors
 
@@ -64,7 +64,7 @@ class EvaluatedPolicy:
 class ConditionResult:
     """Episodes under a condition."""
 
-    episodes: Episodes
+    episodes: CompleteEpisodes
     """One of each environment."""
     trace: Tensor
     """A checksum of all images of each episode. Shape: (n,)."""
@@ -119,7 +119,10 @@ class PairedEvaluator:
 
     @torch.no_grad()
     def run(
-        self, condition: Condition, mode: Mode = Mode.CONSTANT, agent: Agent | None = None
+        self,
+        condition: Condition,
+        mode: PerturbationMode = PerturbationMode.CONSTANT,
+        agent: Agent | None = None,
     ) -> ConditionResult:
         """Run one episode of an agent, by default the policy, in every environment.
 
@@ -128,15 +131,15 @@ class PairedEvaluator:
         if agent is None:
             agent = PolicyAgent(self.subject.network, self.subject.transforms, self.episodes)
         stages = {0: condition}
-        if mode is Mode.ONSET:
+        if mode is PerturbationMode.ONSET:
             stages = {0: Condition(), ONSET_STEP: condition}
         stage = _Stage(self, stages[0], mode, agent)
         start = stage.worlds.start(self._drawn, self._seeds)
+        active = torch.arange(len(start), device=start.end_reason.device)
+        final, state = start[active], start
         trace = torch.zeros(len(start), dtype=torch.float64, device=stage.worlds.device)
         decided: list[Tensor] = []
-
-        def step(number: int, state: State, active: Tensor) -> tuple[State, Tensor]:
-            nonlocal stage
+        for number in itertools.count():
             if number and number in stages:
                 stage = _Stage(self, stages[number], mode, agent)
             delay = stage.delay
@@ -148,13 +151,17 @@ class PairedEvaluator:
             decided.append(action.new_zeros(len(start), *action.shape[1:]))
             decided[-1][active] = action
             state, _ = stage.worlds.advance(state, decided[max(number - delay, 0)][active])
-            return state, state.end_reason == 0
-
-        final, worlds = rollout(start, step), stage.worlds
-        episodes = Episodes.ended(worlds.task, worlds.info(final), final.steps)
+            final[active] = state
+            is_active = state.end_reason == 0
+            if not is_active.all():
+                state, active = state[is_active], active[is_active]
+            if not len(active):
+                break
+        worlds = stage.worlds
+        episodes = CompleteEpisodes.ended(worlds.task, worlds.info(final), final.steps)
         return ConditionResult(episodes, trace.cpu())
 
-    def run_baselines(self, condition: Condition) -> dict[str, Episodes]:
+    def run_baselines(self, condition: Condition) -> dict[str, CompleteEpisodes]:
         """Return the episodes of the task's random and constant baselines, by name."""
         worlds = self.worlds(condition)
         episodes = {}
@@ -180,7 +187,7 @@ class _Stage:
     """A part of an episode under one condition."""
 
     def __init__(
-        self, evaluator: PairedEvaluator, condition: Condition, mode: Mode, agent: Agent
+        self, evaluator: PairedEvaluator, condition: Condition, mode: PerturbationMode, agent: Agent
     ) -> None:
         self._evaluator, self._condition = evaluator, condition
         self.worlds, self.delay = evaluator.worlds(condition), condition.delay
@@ -198,10 +205,9 @@ class _Stage:
         """Everything that the agent may use at the next step."""
         appearances, condition = self._evaluator.appearances, self._condition
         variation = [part.to(self.worlds.device)[active] for part in next(self._variations)]
-        own = appearances.current(active) if appearances.varies else self._own
+        appearance = appearances.current(active) if appearances.varies else self._own
         if self._full is not None:
-            own = self._full if own is None else own.over(self._full)
-        appearance = own
+            appearance = self._full if appearance is None else appearance.over(self._full)
         for part, by in zip(
             (*condition.appearance_changes, *condition.mounts), variation, strict=True
         ):

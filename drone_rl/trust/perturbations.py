@@ -32,7 +32,7 @@ _AWAY = (2.0, 10.0)
 """Distance of distractors from the area of the task, metres, from and to."""
 
 
-class Mode(enum.StrEnum):
+class PerturbationMode(enum.StrEnum):
     """When a perturbation is active."""
 
     CONSTANT = "constant"
@@ -91,14 +91,14 @@ class Condition:
 
 
 def variations(
-    mode: Mode, dimensions: Sequence[int], num_envs: int, generator: torch.Generator
+    mode: PerturbationMode, dimensions: Sequence[int], num_envs: int, generator: torch.Generator
 ) -> Iterator[list[Tensor]]:
     """Yield the variations of each step, without end, of all environments, active or not.
 
     `dimensions` are those of each part of the condition; one tensor per part is yielded. Shapes:
     (num_envs, dimensions), float64.
     """
-    shape, is_drifting = (num_envs, sum(dimensions)), mode is Mode.DRIFTING
+    shape, is_drifting = (num_envs, sum(dimensions)), mode is PerturbationMode.DRIFTING
     variation = torch.rand(shape, generator=generator, dtype=torch.float64).round() * 2 - 1
     variation = torch.zeros_like(variation) if is_drifting else variation
     while True:
@@ -118,9 +118,9 @@ def scene_appearance(scene: Scene) -> Appearance:
 
     A class whose geoms differ in color is left out, so that it stays as in the model.
     """
-    known = {*scene.semantic_classes} - {SemanticClass.DISTRACTOR}
-    found = {m: {*map(tuple, scene.colors[scene.geoms(m), :3].tolist())} for m in known}
-    colors = {m: next(iter(own)) for m, own in found.items() if len(own) == 1}
+    classes = {*scene.semantic_classes} - {SemanticClass.DISTRACTOR}
+    by_class = {m: {*map(tuple, scene.colors[scene.geoms(m), :3].tolist())} for m in classes}
+    colors = {m: next(iter(own)) for m, own in by_class.items() if len(own) == 1}
     model = scene.model
     lights = (model.light_ambient[0], model.light_diffuse[0], model.light_dir[0])
     ambient, sun, direction = (tuple(light.tolist()) for light in lights)

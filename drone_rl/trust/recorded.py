@@ -44,10 +44,10 @@ def recorded_verdict(
     `read_verdicts`. Its "kind", "certain" and success rate are of the right types.
     """
     weights = identify(policy)
-    found = [*_own(policy)]
+    verdicts = [*_own(policy)]
     if weights is not None:
-        found += [one for one in of_commands if one[1].get("weights") == weights]
-    for _, verdict in sorted(found, key=lambda one: one[0], reverse=True):
+        verdicts += [dated for dated in of_commands if dated[1].get("weights") == weights]
+    for _, verdict in sorted(verdicts, key=lambda dated: dated[0], reverse=True):
         with suppress(KeyError, TypeError, ValueError):
             describe(verdict)
             return verdict

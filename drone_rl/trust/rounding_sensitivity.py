@@ -1,7 +1,7 @@
 """Check whether a policy's episodes depend on rounding, and whether implementations agree."""
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, cast
 
 import torch
@@ -11,14 +11,13 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.collectors.complete_episodes import (
-    Episodes,
+    CompleteEpisodes,
     StepLog,
     episode_batches,
     final_episodes,
     run_episodes,
 )
 from drone_rl.envs import base_env, worlds_of
-from drone_rl.envs.direct_renderer import DirectRenderer, Reasons
 from drone_rl.policies import ImageNetwork, make_actor
 from drone_rl.policies.external_policy import ExternalPolicy
 from drone_rl.policies.networks import require_finite
@@ -33,54 +32,108 @@ from drone_rl.policies.rounding import (
 )
 from drone_rl.sim.actions import DiscreteActions
 from drone_rl.sim.dynamics import ComputerVision
-from drone_rl.trust.outcomes import (
-    MAX_FRAGILE_EPISODES,
-    MAX_UNEXPLAINED,
-    OutcomeSet,
-    Rounding,
-    enumerate_outcomes,
-)
-from drone_rl.trust.rollouts import first_difference, only_index, outcome_difference
 from drone_rl.utils.errors import InputError
 
-_CHECKED_EPISODES = 32
-"""Episodes that check whether a third-party policy depends on the current frame only."""
+MAX_FRAGILE = 0.02
+"""Largest fraction of fragile frames for a certain verdict; honest policies have at most 0.003."""
+MAX_FRAGILE_EPISODES = 0.25
+"""Largest fraction of episodes with a fragile frame. Honest policies have at most 0.15."""
+MAX_UNEXPLAINED = 0.04
+"""Largest fraction of episodes that may end differently in another implementation if there is no
+bound on rounding, actions are continuous, or drones have flight dynamics. Otherwise an episode may
+take other actions only in or after a fragile frame."""
 COMPARED = 50
 """Episodes that are run again: by the other implementation, or in other batches."""
 ALONE = 16
 """Episodes that a third-party network runs again one frame at a time and in other batches."""
-
+_CHECKED_EPISODES = 32
+"""Episodes that check whether a third-party policy depends on the current frame only."""
 _BATCH_SIZES = (*range(1, 65), 100, 128, 200, 250, 256, 400, 500, 512, 1000)
 """Sizes of the batches in which the same frames are evaluated."""
 
 
+@dataclasses.dataclass(frozen=True)
+class Rounding:
+    """How far some episodes depend on rounding."""
+
+    arithmetic: str
+    """Arithmetic that computed the episodes, such as "float32 on cpu, fused kernel"."""
+    is_bound: bool
+    """Whether the rounding error is bounded, not estimated."""
+    frames: int
+    fragile: int
+    """Frames in which rounding can change the action."""
+    episodes: int
+    fragile_episodes: int
+    """Episodes with such a frame."""
+    compared: str
+    """Implementation that ran the episodes again."""
+    compared_episodes: int
+    differing: int
+    """Episodes in which it took other actions; with continuous actions or flight dynamics, episodes
+    that ended differently."""
+    unexplained: int
+    """Differing episodes without a fragile frame up to the first other action, or at all if
+    outcomes were compared."""
+
+    @property
+    def is_excessive(self) -> bool:
+        """Whether too much is fragile or unexplained for any verdict to be certain."""
+        allowed = 0.0 if self.is_bound else MAX_UNEXPLAINED
+        return self.frames > 0 and (
+            self.fragile > MAX_FRAGILE * self.frames
+            or self.fragile_episodes > MAX_FRAGILE_EPISODES * self.episodes
+            or self.unexplained > allowed * self.compared_episodes
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values, as in `verdict.json`."""
+        return {
+            "arithmetic": self.arithmetic,
+            "bound": self.is_bound,
+            "frames": self.frames,
+            "fragile": self.fragile,
+            "fragile_rate": self.fragile / max(1, self.frames),
+            "threshold": MAX_FRAGILE,
+            "episodes": self.episodes,
+            "fragile_episodes": self.fragile_episodes,
+            "fragile_episodes_rate": self.fragile_episodes / max(1, self.episodes),
+            "threshold_episodes": MAX_FRAGILE_EPISODES,
+            "compared": self.compared,
+            "compared_episodes": self.compared_episodes,
+            "differing": self.differing,
+            "unexplained": self.unexplained,
+            "excessive": self.is_excessive,
+        }
+
+
 def run_compared(
     env: EnvBase, actor: TensorDictModuleBase, num_episodes: int
-) -> tuple[Episodes, Rounding | None]:
+) -> tuple[CompleteEpisodes, Rounding | None]:
     """Run greedy episodes in PyTorch, and the first ones again by another implementation.
 
-    Return the episodes and what `compare_implementations` returns.
-
-    Raises:
-        InputError: See `check_rounding`.
+    Return the episodes and what `check_rounding` returns; see there for errors.
     """
     state, log = base_env(env).state_dict(), StepLog()
-    episodes = run_episodes(env, actor, num_episodes, log=log)
+    greedy = run_episodes(env, actor, num_episodes, log=log)
     base_env(env).load_state_dict(state)
-    return episodes, compare_implementations(env, actor, greedy=episodes, log=log)
+    return greedy, check_rounding(env, actor, COMPARED, greedy=greedy, log=log, is_compiled=False)
 
 
-def require_function(policy: BasePolicy, **how: Any) -> None:
+def require_function(
+    policy: BasePolicy, *, seed: int, device: str = "cpu", renderer: str = "raytrace"
+) -> None:
     """Check that a third-party policy depends on the current frame only.
 
-    Others are not checked: their descriptions state whether they use earlier frames. `how` are the
-    seed, device and renderer of the environments, see `BasePolicy.flying`.
+    Others are not checked: their descriptions state whether they use earlier frames. The seed,
+    device and renderer are those of the environments, see `BasePolicy.flying`.
 
     Raises:
         InputError: Its actions depend on the batch, on a frame's row, or on earlier calls.
     """
     if isinstance(policy, ExternalPolicy):
-        with policy.flying(_CHECKED_EPISODES, **how) as (env, actor):
+        options: dict[str, Any] = {"seed": seed, "device": device, "renderer": renderer}
+        with policy.flying(_CHECKED_EPISODES, **options) as (env, actor):
             run_compared(env, actor, _CHECKED_EPISODES)
 
 
@@ -89,256 +142,157 @@ def check_rounding(
     actor: TensorDictModuleBase,
     episodes: int,
     *,
-    greedy: Episodes,
+    greedy: CompleteEpisodes,
     log: StepLog,
+    is_compiled: bool = True,
 ) -> Rounding | None:
-    """Run the first episodes again in PyTorch, with a bound on the rounding error at every frame.
+    """Run the first episodes again, with a bound on the rounding error at every frame.
 
     They are compared with greedy episodes and their actions, `greedy` and `log`, which started from
-    the present state of the environments. Return None for an actor without a
-    network that depends on single images only.
+    the present state of the environments. If the fused kernel ran those, PyTorch runs them again;
+    otherwise the fused kernel, or PyTorch with the frames in other batches.
+
+    Args:
+        env: The environments.
+        actor: The policy's actor.
+        episodes: How many at most.
+        greedy: Greedy episodes of the policy.
+        log: Their actions.
+        is_compiled: Whether the fused kernel ran them if it supports the policy.
+
+    Returns:
+        None for an actor without a network that depends on single images only.
 
     Raises:
         InputError: An output is not finite, or a third-party network depends on other frames.
     """
-    network = _network_of(actor)
-    return network and _check_rounding(env, network, episodes, greedy, log)[0]
-
-
-def _network_of(actor: TensorDictModuleBase) -> ImageNetwork | None:
     network = getattr(actor, "network", None)
-    is_checked = isinstance(network, ImageNetwork) and not network.is_recurrent
-    return network if is_checked else None
-
-
-def _check_rounding(
-    env: EnvBase, network: ImageNetwork, episodes: int, greedy: Episodes, log: StepLog
-) -> tuple[Rounding, "_Checked"]:
+    if not isinstance(network, ImageNetwork) or network.is_recurrent:
+        return None
     decide, is_bound = decider(network)
     arithmetic, is_exact = arithmetic_on(worlds_of(env).device)
-    episodes, before = min(episodes, len(greedy)), base_env(env).state_dict()
-    checked, again = _run_checked(env, decide, network, episodes)
-    by_action = _by_action(env, network)
-    compared, count, ends = "PyTorch", episodes, checked.episodes
+    episodes, state = min(episodes, len(greedy)), base_env(env).state_dict()
+    ends, again, fragile = _run_checked(env, decide, network, episodes)
+    count = episodes
     if log.implementation == "PyTorch":
-        base_env(env).load_state_dict(before)
-        compared, count = "PyTorch, in other batches", min(COMPARED, episodes)
-        again, ends = _run_regrouped(env, network, count)
-    differing = _differences(greedy, ends, log.actions, again, count, by_action=by_action)
+        count = min(COMPARED, episodes)
+        if not is_compiled:
+            ends, again = _run_again(env, actor, count, state, is_compiled=True)
+        if is_compiled or again.implementation == "PyTorch":
+            mixed = make_actor(Regrouped(network, "mixed"), env.action_spec)
+            ends, again = _run_again(env, mixed, count, state)
+            again.implementation = "PyTorch, in other batches"
+    if by_action := _is_compared_by_action(env, network):
+        pairs = zip(log.actions[:count], again.actions[:count], strict=True)
+        steps = [_first_difference(one, other) for one, other in pairs]
+    else:
+        steps = [_other_outcome(greedy, ends, i) for i in range(count)]
     if not is_bound:
-        base_env(env).load_state_dict(before)
-        _require_function_of_frames(env, network, log, checked)
-    found = Rounding(
+        base_env(env).load_state_dict(state)
+        _require_function_of_frames(env, network, log, fragile)
+    return Rounding(
         arithmetic=f"{arithmetic}, {log.implementation}",
         is_bound=is_bound and by_action and is_exact,
-        frames=sum(map(len, checked.fragile)),
-        fragile=int(sum(f.sum() for f in checked.fragile)),
-        is_fragile=checked.is_fragile,
-        outcomes=checked.outcomes(),
-        compared=compared,
-        compared_episodes=count,
-        differing=len(differing),
-        unexplained=checked.unexplained(differing),
-    )
-    return found, checked
-
-
-def compare_implementations(
-    env: EnvBase, actor: TensorDictModuleBase, *, greedy: Episodes, log: StepLog
-) -> Rounding | None:
-    """Run the first episodes again by another implementation: the fused kernel if there is one.
-
-    Arguments, result and errors are those of `check_rounding`; `greedy` was run in PyTorch.
-    """
-    network = _network_of(actor)
-    if network is None:
-        return None
-    state, count = base_env(env).state_dict(), min(COMPARED, len(greedy))
-    found, checked = _check_rounding(env, network, count, greedy, log)
-    base_env(env).load_state_dict(state)
-    again, by_action = StepLog(), _by_action(env, network)
-    ends = run_episodes(env, actor, count, is_compiled=True, is_exact=True, log=again)
-    if again.implementation == log.implementation:
-        return found
-    differing = _differences(greedy, ends, log.actions, again.actions, count, by_action=by_action)
-    return dataclasses.replace(
-        found,
+        frames=sum(map(len, fragile)),
+        fragile=int(sum(f.sum() for f in fragile)),
+        episodes=len(fragile),
+        fragile_episodes=sum(bool(f.any()) for f in fragile),
         compared=again.implementation,
-        differing=len(differing),
-        unexplained=checked.unexplained(differing),
+        compared_episodes=count,
+        differing=sum(step is not None for step in steps),
+        unexplained=_count_unexplained(steps, fragile),
     )
 
 
-def _by_action(env: EnvBase, network: ImageNetwork) -> bool:
+def _run_checked(
+    env: EnvBase, decide: Decide, network: ImageNetwork, episodes: int
+) -> tuple[CompleteEpisodes, StepLog, list[Tensor]]:
+    """Run episodes in PyTorch; return also which frames of each are fragile, (T,), bool."""
+    log, fragile, finals = StepLog(), list[Tensor](), []
+    for batch in episode_batches(
+        env, _CheckingActor(decide, network), episodes, ("fragile",), log=log
+    ):
+        lengths = [len(actions) for actions in log.actions[len(fragile) :]]
+        fragile += cast(Tensor, batch["fragile"]).cpu().split(lengths)
+        finals.append(final_episodes(env, batch))
+    return CompleteEpisodes.joined(finals), log, fragile
+
+
+def _run_again(
+    env: EnvBase,
+    actor: TensorDictModuleBase,
+    episodes: int,
+    state: dict[str, Any],
+    *,
+    is_compiled: bool = False,
+) -> tuple[CompleteEpisodes, StepLog]:
+    """Run episodes from this state of the environments."""
+    base_env(env).load_state_dict(state)
+    log = StepLog()
+    return run_episodes(env, actor, episodes, is_compiled=is_compiled, is_exact=True, log=log), log
+
+
+def _is_compared_by_action(env: EnvBase, network: ImageNetwork) -> bool:
     """Return whether episodes are compared by action, not only by outcome.
 
     Implementations of flight dynamics round differently, so frames are not the same.
     """
-    return isinstance(network.actions, DiscreteActions) and isinstance(
-        worlds_of(env).dynamics, ComputerVision
+    dynamics = worlds_of(env).dynamics
+    return isinstance(network.actions, DiscreteActions) and isinstance(dynamics, ComputerVision)
+
+
+def _first_difference(one: Tensor, other: Tensor) -> int | None:
+    """Return the first step at which two sequences of actions differ, or None."""
+    shared = min(len(one), len(other))
+    steps = (one[:shared] != other[:shared]).nonzero()
+    if len(steps):
+        return int(steps[0, 0])
+    return None if len(one) == len(other) else shared
+
+
+def _other_outcome(one: CompleteEpisodes, other: CompleteEpisodes, i: int) -> int | None:
+    """Return the length of episode i if its outcomes differ, or None."""
+    is_same = bool(one.end_reason[i] == other.end_reason[i]) and torch.equal(
+        one.goals.reached[i], other.goals.reached[i]
     )
+    return None if is_same else int(one.length[i])
 
 
-def _differences(
-    greedy: Episodes,
-    ends: Episodes,
-    actions: Sequence[Tensor],
-    again: Sequence[Tensor],
-    count: int,
-    *,
-    by_action: bool,
-) -> dict[int, int]:
-    """By differing episode the first other action's step, or the length if the outcome differs."""
-    if by_action:
-        pairs = zip(actions[:count], again[:count], strict=True)
-        steps = [first_difference(one, other) for one, other in pairs]
-    else:
-        steps = [outcome_difference(greedy, ends, i) for i in range(count)]
-    return _differing(steps)
-
-
-def _differing(steps: Iterable[int | None]) -> dict[int, int]:
-    """Return the steps at which episodes differ, by the index of those that do."""
-    return {i: step for i, step in enumerate(steps) if step is not None}
+def _count_unexplained(steps: Iterable[int | None], fragile: Sequence[Tensor]) -> int:
+    """Count the differing episodes without a fragile frame up to the step where they differ."""
+    differing = ((i, step) for i, step in enumerate(steps) if step is not None)
+    return sum(not fragile[i][: step + 1].any() for i, step in differing)
 
 
 class _CheckingActor(TensorDictModuleBase):
     """Act greedily, and write whether rounding could change the action."""
 
-    def __init__(self, decide: Decide, network: ImageNetwork, *, is_contrary: bool = False) -> None:
-        """Take a network; `is_contrary`: take the other action where two are possible."""
+    def __init__(self, decide: Decide, network: ImageNetwork) -> None:
         super().__init__()
         self.in_keys, self.out_keys = ["pixels"], ["action", "fragile"]
-        self._decide, self._network, self._is_contrary = decide, network, is_contrary
+        self._decide, self._network = decide, network
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write "action" and "fragile"."""
-        found = self._decide(cast(Tensor, tensordict.get("pixels")))
-        require_finite(found.outputs, self._network.owner)
-        tensordict.set("fragile", found.is_fragile)
-        action = self._network.actions.greedy(found.outputs)
-        if self._is_contrary:
-            others = found.possible.scatter(1, action[:, None], False)
-            action = torch.where(others.sum(-1) == 1, others.int().argmax(-1), action)
-        return tensordict.set("action", action)
-
-
-@dataclasses.dataclass(frozen=True)
-class _Checked:
-    """Episodes whose every frame was checked for rounding."""
-
-    episodes: Episodes
-    fragile: list[Tensor]
-    """By episode, which frames are fragile. Shapes: (T,), bool."""
-    followed: list[tuple[int, OutcomeSet, Tensor]] | None
-    """By batch: its first episode, the outcomes of its fragile ones, and which these are. None if
-    they cannot be enumerated."""
-
-    def unexplained(self, differing: Mapping[int, int]) -> int:
-        """Count the episodes without a fragile frame up to the given step of each."""
-        return sum(not self.fragile[i][: step + 1].any() for i, step in differing.items())
-
-    @property
-    def is_fragile(self) -> Tensor:
-        """Episodes with a fragile frame. Shape: (n,), bool."""
-        return torch.tensor([bool(f.any()) for f in self.fragile])
-
-    def outcomes(self) -> OutcomeSet:
-        """Possible outcomes of all episodes."""
-        none = torch.empty(0, dtype=torch.int64)
-        if self.followed is None:
-            return OutcomeSet(None, none, self.is_fragile)
-        is_open = torch.zeros_like(self.is_fragile)
-        ends, owners = [], []
-        for first, found, worlds in self.followed:
-            is_open[first + worlds] = found.is_open
-            if found.episodes is not None:
-                ends.append(found.episodes)
-                owners.append(first + worlds[found.owner])
-        if not ends:
-            return OutcomeSet(None, none, is_open)
-        return OutcomeSet(Episodes.joined(ends), torch.cat(owners), is_open)
-
-
-def _run_checked(
-    env: EnvBase, decide: Decide, network: ImageNetwork, episodes: int
-) -> tuple[_Checked, list[Tensor]]:
-    """Run episodes and check each frame. Returns also the actions of each episode."""
-    renderer = DirectRenderer.try_create(env, ("pixels",), ())
-    is_discrete = isinstance(network.actions, DiscreteActions)
-    fragile, followed, log, finals, first = [], [], StepLog(), [], 0
-    before, actor = base_env(env).state_dict(), _CheckingActor(decide, network)
-    for batch in episode_batches(env, actor, episodes, ("fragile",), log=log):
-        lengths = [len(a) for a in log.actions[first:]]
-        fragile += cast(Tensor, batch["fragile"]).cpu().split(lengths)
-        finals.append(final_episodes(env, batch))
-        worlds = torch.tensor([bool(f.any()) for f in fragile[first:]]).nonzero()[:, 0]
-        if is_discrete and len(worlds):
-            if len(worlds) > MAX_FRAGILE_EPISODES * len(lengths):
-                found = OutcomeSet(None, worlds[:0], torch.ones_like(worlds, dtype=torch.bool))
-            elif not isinstance(renderer, Reasons):
-                found = enumerate_outcomes(renderer, decide, worlds.to(env.device))
-            else:
-                contrary = _CheckingActor(decide, network, is_contrary=True)
-                taken = log.actions[first:]
-                found = _run_other_actions(env, contrary, before, taken, fragile[first:], worlds)
-            followed.append((first, found, worlds))
-        first += len(lengths)
-        before = base_env(env).state_dict()
-    followed = followed if is_discrete else None
-    return _Checked(Episodes.joined(finals), fragile, followed), log.actions
-
-
-def _run_other_actions(
-    env: EnvBase,
-    actor: TensorDictModuleBase,
-    before: dict[str, Any],
-    taken: Sequence[Tensor],
-    fragile: Sequence[Tensor],
-    env_ids: Tensor,
-) -> OutcomeSet:
-    """Run a batch again with the other action in fragile frames where two are possible.
-
-    For policies whose observations cannot be rendered from a state. If each of the two rollouts
-    has a single fragile frame, in which they take different actions, there are no other outcomes.
-    `before` has the random streams at the start of the batch, `taken` the first rollout's actions,
-    and `env_ids` are the episodes with fragile frames.
-    """
-    after, log = base_env(env).state_dict(), StepLog()
-    base_env(env).load_state_dict(before)
-    (batch,) = episode_batches(env, actor, len(fragile), ("fragile",), log=log)
-    base_env(env).load_state_dict(after)
-    again = cast(Tensor, batch["fragile"]).cpu().split([len(a) for a in log.actions])
-    steps = [
-        (only_index(fragile[i]), only_index(again[i]), first_difference(taken[i], log.actions[i]))
-        for i in env_ids.tolist()
-    ]
-    is_open = torch.tensor([None in three or len(set(three)) > 1 for three in steps])
-    return OutcomeSet(final_episodes(env, batch)[env_ids], torch.arange(len(env_ids)), is_open)
-
-
-def _run_regrouped(
-    env: EnvBase, network: ImageNetwork, episodes: int
-) -> tuple[list[Tensor], Episodes]:
-    """Run with the network evaluated in other batches. Returns actions and episodes."""
-    log, actor = StepLog(), make_actor(Regrouped(network, "mixed"), env.action_spec)
-    ends = run_episodes(env, actor, episodes, is_exact=True, log=log)
-    return log.actions, ends
+        decisions = self._decide(cast(Tensor, tensordict.get("pixels")))
+        require_finite(decisions.outputs, self._network.owner)
+        tensordict.set("fragile", decisions.is_fragile)
+        return tensordict.set("action", self._network.actions.greedy(decisions.outputs))
 
 
 def _require_function_of_frames(
-    env: EnvBase, network: ImageNetwork, log: StepLog, checked: _Checked
+    env: EnvBase, network: ImageNetwork, log: StepLog, fragile: Sequence[Tensor]
 ) -> None:
     """Check that a third-party network depends on the frame alone, in batches of any size."""
     before, frames = base_env(env).state_dict(), torch.empty(0)
-    count = min(ALONE, len(checked.fragile))
+    count = min(ALONE, len(fragile))
     for groups, how in (("single", "one frame at a time"), ("mixed", "in other batches")):
         base_env(env).load_state_dict(before)
         again, actor = StepLog(), make_actor(Regrouped(network, groups), env.action_spec)
         for batch in episode_batches(env, actor, count, ("pixels",), log=again):
             frames = cast(Tensor, batch["pixels"])
-        steps = map(first_difference, log.actions, again.actions)  # until one log ends
-        other = checked.unexplained(_differing(steps))
+        steps = map(_first_difference, log.actions, again.actions)  # until one log ends
+        other = _count_unexplained(steps, fragile)
         if isinstance(network.actions, DiscreteActions) and other > MAX_UNEXPLAINED * count:
             raise InputError(
                 f"{network.owner} depends on more than the frame: evaluated {how} it takes other "

@@ -19,7 +19,7 @@ from drone_rl.utils.schema import Real
 _FRACTION = Real(0.0, 1.0, is_above=True, is_below=True)
 
 
-class Kind(enum.StrEnum):
+class VerdictKind(enum.StrEnum):
     """Kind of a policy."""
 
     GOOD = "good"
@@ -33,13 +33,18 @@ class Kind(enum.StrEnum):
     @property
     def exit_code(self) -> int:
         """Exit code if it is certain, see `drone_rl.utils.exit_codes`."""
-        codes = {Kind.GOOD: 0, Kind.POOR: POOR, Kind.NONE: NO_KIND, Kind.TRIVIAL: TRIVIAL}
+        codes = {
+            VerdictKind.GOOD: 0,
+            VerdictKind.POOR: POOR,
+            VerdictKind.NONE: NO_KIND,
+            VerdictKind.TRIVIAL: TRIVIAL,
+        }
         return codes.get(self, ONE_SIDED)
 
     @property
-    def mirrored(self) -> "Kind":
+    def mirrored(self) -> "VerdictKind":
         """The kind with left and right exchanged."""
-        left, right = Kind.ONE_SIDED_LEFT, Kind.ONE_SIDED_RIGHT
+        left, right = VerdictKind.ONE_SIDED_LEFT, VerdictKind.ONE_SIDED_RIGHT
         return {left: right, right: left}.get(self, self)
 
     @property
@@ -175,7 +180,7 @@ def level(value: float, thresholds: Iterable[float]) -> int:
     return sum(value > threshold for threshold in thresholds)
 
 
-def decide(levels: Sequence[int], num_strata: int = len(SIDES)) -> Kind:
+def decide(levels: Sequence[int], num_strata: int = len(SIDES)) -> VerdictKind:
     """Return the kind.
 
     Args:
@@ -189,17 +194,19 @@ def decide(levels: Sequence[int], num_strata: int = len(SIDES)) -> Kind:
     if success and all(
         share == 2 or not there for there, share in zip(offered, shares, strict=True)
     ):
-        return Kind.GOOD if all(unsolved) else Kind.TRIVIAL
+        return VerdictKind.GOOD if all(unsolved) else VerdictKind.TRIVIAL
     if offered[0] and offered[-1]:
         if (shares[0], shares[-1]) == (0, 2):
-            return Kind.ONE_SIDED_RIGHT
+            return VerdictKind.ONE_SIDED_RIGHT
         if (shares[0], shares[-1]) == (2, 0):
-            return Kind.ONE_SIDED_LEFT
-    return Kind.NONE if all(above) else Kind.POOR
+            return VerdictKind.ONE_SIDED_LEFT
+    return VerdictKind.NONE if all(above) else VerdictKind.POOR
 
 
 @functools.lru_cache(maxsize=4096)
-def kinds_within(box: tuple[tuple[int, int], ...], num_strata: int = len(SIDES)) -> frozenset[Kind]:
+def kinds_within(
+    box: tuple[tuple[int, int], ...], num_strata: int = len(SIDES)
+) -> frozenset[VerdictKind]:
     """Return the kinds of all cells of a box.
 
     Args:

@@ -28,7 +28,7 @@ from drone_rl.trust.axes import AXES, Axis, check_axes, find_axes
 from drone_rl.trust.charts import chart, strips
 from drone_rl.trust.domain import Prober
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
-from drone_rl.trust.perturbations import Condition, Mode
+from drone_rl.trust.perturbations import Condition, PerturbationMode
 from drone_rl.trust.rounding_sensitivity import require_function
 from drone_rl.trust.shifts_file import FORMAT, FORMAT_VERSION
 from drone_rl.trust.shifts_text import SHIFTS, is_tested, rows
@@ -58,8 +58,8 @@ class Shifts(Result):
     def area(self) -> float:
         """Mean over axes of the area under the curve of success rate against strength."""
         areas = [along["areas"]["constant"] for along in self.numbers["axes"].values()]
-        known = [area for area in areas if area is not None]
-        return sum(known) / max(len(known), 1)
+        defined = [area for area in areas if area is not None]
+        return sum(defined) / max(len(defined), 1)
 
     @property
     def sentence(self) -> str:
@@ -72,11 +72,11 @@ class Shifts(Result):
         `domain.yaml` has the ranges, if any, in the format of `drone-rl verdict
         require_domain=FILE`; `shifts.png` has curves, `strips.png` camera images.
         """
-        shown = {
+        images = {
             name: [None if one is None else packed(one) for one in strip]
             for name, strip in self.pictures.items()
         }
-        written = {**self.numbers, "pictures": shown, **provenance()}
+        written = {**self.numbers, "pictures": images, **provenance()}
         (folder / "shifts.json").write_text(json.dumps(written, indent=2))
         if self.numbers["domain"] is not None:
             (folder / "domain.yaml").write_text(yaml.safe_dump(ranges_of(self.numbers)))
@@ -142,8 +142,10 @@ def shifts(
         progress(text, next(done), total)
 
     with closing(PairedEvaluator(subject, settings.episodes, seed.value)) as evaluator:
-        suite = Suite(evaluator, [Mode(mode) for mode in settings.modes], settings.possible_share)
-        found = suite.run(axes, settings.strengths, report)
+        suite = Suite(
+            evaluator, [PerturbationMode(mode) for mode in settings.modes], settings.possible_share
+        )
+        measured = suite.run(axes, settings.strengths, report)
     domain = _domain(subject, axes, settings, seed, report) if settings.domain else None
     with closing(PairedEvaluator(subject, 1, seed.value)) as filmed:
         pictures = {axis.name: make_strip(filmed, axis) for axis in axes}
@@ -160,7 +162,7 @@ def shifts(
         "settings": settings.values(),
         **seed.as_dict(),
         "terms": as_task(subject.task).vocabulary.as_dict(),
-        **found,
+        **measured,
         "domain": domain,
         "seconds": time.perf_counter() - begin,
     }
@@ -201,10 +203,13 @@ def make_evaluated_policy(policy: BasePolicy, settings: ShiftSettings) -> Evalua
     Raises:
         InputError: The task has no settings to perturb, or its settings make another task.
     """
-    own: Any = policy.task
-    task: Any = own if isinstance(own, BaseTaskSettings) else getattr(own, "settings", None)
-    is_settings = isinstance(task, BaseTaskSettings)
-    if not is_settings or not (task is own or type(as_task(task)) is type(own)):
+    task: Any = policy.task
+    if not isinstance(task, BaseTaskSettings):
+        settings_of_task = getattr(task, "settings", None)
+        is_rebuilt = isinstance(settings_of_task, BaseTaskSettings)
+        is_rebuilt = is_rebuilt and type(as_task(settings_of_task)) is type(task)
+        task = settings_of_task if is_rebuilt else None
+    if task is None:
         raise InputError(
             f"the task of policy={policy.name} has no settings to perturb; give another policy"
         )

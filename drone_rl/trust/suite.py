@@ -17,7 +17,7 @@ from torch import Tensor
 from drone_rl.trust.agents import OracleAgent, StepContext, has_oracle
 from drone_rl.trust.axes import TOGETHER, Axis
 from drone_rl.trust.paired_evaluation import ConditionResult, PairedEvaluator
-from drone_rl.trust.perturbations import Condition, Mode
+from drone_rl.trust.perturbations import Condition, PerturbationMode
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds, proportion
 
@@ -30,7 +30,7 @@ class Suite:
     """Run a policy and the oracle under all conditions."""
 
     def __init__(
-        self, evaluator: PairedEvaluator, modes: Sequence[Mode], possible_share: float
+        self, evaluator: PairedEvaluator, modes: Sequence[PerturbationMode], possible_share: float
     ) -> None:
         """Run both without perturbation.
 
@@ -49,12 +49,12 @@ class Suite:
             Plain values: "plain", without perturbation; "axes", by name; and "together", all axes
             combined, each at its third strength.
         """
-        found = {axis.name: self.along(axis, numbers, report) for axis in axes}
+        by_axis = {axis.name: self.along(axis, numbers, report) for axis in axes}
         report("all together")
         parts = (axis.make(axis.strengths[TOGETHER - 1], self._evaluator.subject) for axis in axes)
         together = functools.reduce(lambda a, b: a | b, parts, Condition())
         plain = {"oracle": _success(self.oracle), **self._figures(self.plain)}
-        return {"plain": plain, "axes": found, "together": self.level(together)}
+        return {"plain": plain, "axes": by_axis, "together": self.level(together)}
 
     def along(self, axis: Axis, numbers: Sequence[int], report: Report) -> dict[str, Any]:
         """Measure one axis at some of its strengths."""
@@ -93,7 +93,7 @@ class Suite:
             "modes": {
                 mode.value: self._figures(self._evaluator.run(condition, mode))
                 for mode in self._modes
-                if drifts or mode is not Mode.DRIFTING
+                if drifts or mode is not PerturbationMode.DRIFTING
             },
         }
 
@@ -173,16 +173,11 @@ def mcnemar(before: Tensor, after: Tensor) -> dict[str, Any]:
     Returns:
         "lost": pairs with success only before, "gained": only after; "p": the p-value.
     """
-    lost, gained = int((before > after).sum()), int((after > before).sum())
-    return {"lost": lost, "gained": gained, "p": mcnemar_p(lost, gained)}
-
-
-def mcnemar_p(lost: int, gained: int) -> float:
-    """Return the p-value of `mcnemar` from its counts."""
     from scipy.special import bdtr  # slow to import
 
+    lost, gained = int((before > after).sum()), int((after > before).sum())
     tail = float(bdtr(min(lost, gained), lost + gained, 0.5)) if lost + gained else 0.5
-    return min(1.0, 2 * tail)
+    return {"lost": lost, "gained": gained, "p": min(1.0, 2 * tail)}
 
 
 def area(positions: Sequence[float], shares: Sequence[float]) -> float:
@@ -191,7 +186,9 @@ def area(positions: Sequence[float], shares: Sequence[float]) -> float:
     return float(np.trapezoid(shares, positions)) / width if width else float(shares[0])
 
 
-def success_area(levels: Iterable[dict[str, Any]], plain: float, mode: Mode) -> float | None:
+def success_area(
+    levels: Iterable[dict[str, Any]], plain: float, mode: PerturbationMode
+) -> float | None:
     """Return the mean height of the curve of success rate against strength; None without levels."""
     points = [(0.0, plain)] + [
         (level["position"], level["modes"][mode.value]["success"]["share"])

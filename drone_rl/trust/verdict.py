@@ -1,7 +1,7 @@
 """Judge a policy: run episodes, apply the rule and return a verdict."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
-from drone_rl.collectors.complete_episodes import Episodes, StepLog, run_episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes, StepLog, run_episodes
 from drone_rl.envs import base_env, worlds_of
 from drone_rl.policies.baselines import check_baselines
 from drone_rl.policies.policy import BasePolicy, load_policy
@@ -20,9 +20,8 @@ from drone_rl.sim.tasks import Task
 from drone_rl.sim.vocabulary import terms_of
 from drone_rl.trust.baselines import run_baselines
 from drone_rl.trust.metrics import failure_table, summarise
-from drone_rl.trust.outcomes import OutcomeSet, Rounding
-from drone_rl.trust.rounding_sensitivity import check_rounding
-from drone_rl.trust.rule import Kind, Quantity, Rule, decide, kinds_within
+from drone_rl.trust.rounding_sensitivity import Rounding, check_rounding
+from drone_rl.trust.rule import Quantity, Rule, VerdictKind, decide, kinds_within
 from drone_rl.trust.verdict_text import SENTENCES, is_proved
 from drone_rl.utils.exit_codes import NOT_CERTAIN
 from drone_rl.utils.intervals import mean_bounds, proportion
@@ -46,7 +45,9 @@ class CertificateClaim(Protocol):
         """Why it is refused, in one line; None if it is not."""
         ...
 
-    def as_evidence(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
+    def as_evidence(
+        self, greedy: CompleteEpisodes, *, rounding: Rounding | None = None
+    ) -> dict[str, Any]:
         """Return the evidence that a verdict on these greedy episodes may quote."""
         ...
 
@@ -72,7 +73,7 @@ class FindClaim(Protocol):
 class Verdict:
     """The kind of a policy, whether that is certain, and the evidence."""
 
-    kind: Kind
+    kind: VerdictKind
     certain: bool
     evidence: dict[str, Any]
     """Plain values: all entries of `as_dict` except the sentence."""
@@ -103,12 +104,15 @@ def judge_policy(
     episodes: int,
     *,
     sampled: bool = True,
-    **known: Any,
+    rule: Rule | None = None,
+    claim: CertificateClaim | None = None,
+    unlike: Mapping[str, Any] | None = None,
+    seed: RootSeed | None = None,
 ) -> Verdict:
     """Run so many episodes of a policy and of each baseline, and apply the rule.
 
-    Initial states are the same. `sampled` also runs the policy with sampled actions; `known` are
-    the arguments "rule", "claim", "unlike" and "seed" of `apply_rule`.
+    Initial states are the same. `sampled` also runs the policy with sampled actions; for the other
+    arguments see `apply_rule`.
 
     Raises:
         InputError: The task has no oracle, baselines or strata; also what `check_rounding` raises.
@@ -126,7 +130,16 @@ def judge_policy(
         drawn = run_episodes(env, actor, episodes, greedy=False)
     base.load_state_dict(state)
     rounding = check_rounding(env, actor, episodes, greedy=greedy, log=log)
-    return apply_rule(greedy, baselines, sampled=drawn, rounding=rounding, **known)
+    return apply_rule(
+        greedy,
+        baselines,
+        rule=rule,
+        sampled=drawn,
+        claim=claim,
+        unlike=unlike,
+        seed=seed,
+        rounding=rounding,
+    )
 
 
 def judge_for_selection(
@@ -162,16 +175,16 @@ def check_judged(task: Task[Any], actions: Actions) -> None:
 
 def _rule_of(rule: Rule | None, task: Task[Any]) -> Rule:
     """Return the rule for a task's strata and baselines; an `InputError` if it has none."""
-    own = {"strata": task.strata, "blind_baselines": task.blind_baselines}
-    return dataclasses.replace(rule or Rule(), **own)
+    of_task = {"strata": task.strata, "blind_baselines": task.blind_baselines}
+    return dataclasses.replace(rule or Rule(), **of_task)
 
 
 def apply_rule(
-    greedy: Episodes,
-    baselines: Mapping[str, Episodes],
+    greedy: CompleteEpisodes,
+    baselines: Mapping[str, CompleteEpisodes],
     *,
     rule: Rule | None = None,
-    sampled: Episodes | None = None,
+    sampled: CompleteEpisodes | None = None,
     claim: CertificateClaim | None = None,
     unlike: Mapping[str, Any] | None = None,
     seed: RootSeed | None = None,
@@ -189,7 +202,7 @@ def apply_rule(
             "flown".
         seed: Root of the environments' random streams; without it the verdict says that a policy
             could have been fitted to these environments.
-        rounding: How rounding can change `greedy`; None if that was not checked.
+        rounding: How far `greedy` depends on rounding; None if that was not checked.
 
     Raises:
         ValueError: The initial states differ.
@@ -199,13 +212,13 @@ def apply_rule(
     for other in (*baselines.values(), greedy if sampled is None else sampled):
         if not torch.equal(other.goals.world, greedy.goals.world):
             raise ValueError("policy and baselines have different initial states; use the same")
-    found = measure(greedy, baselines, rule)
-    kind = decide([quantity.level for quantity in found], len(rule.strata))
-    certain = is_enough = _is_certain(found, rule)
-    if rounding is not None:
-        found = widen(found, greedy, baselines, rule, rounding.outcomes)
-        certain = is_enough and not rounding.is_excessive and _is_certain(found, rule)
-    depends = is_enough and not certain
+    quantities = measure(greedy, baselines, rule)
+    kind = decide([quantity.level for quantity in quantities], len(rule.strata))
+    is_enough, is_open = (
+        _is_certain(quantities, rule),
+        rounding is not None and rounding.is_excessive,
+    )
+    certain, depends = is_enough and not is_open, is_enough and is_open
     evidence = {
         "kind": kind.value,
         "certain": certain,
@@ -228,15 +241,17 @@ def apply_rule(
         if sampled is None
         else mean_bounds(sampled.success - greedy.success, -1.0, 1.0),
         "failures": failure_table(greedy),
-        "quantities": {name: q._asdict() for name, q in zip(rule.quantities, found, strict=True)},
-        "enough": len(greedy) if is_enough else _enough(greedy, baselines, rule, rounding),
+        "quantities": {
+            name: q._asdict() for name, q in zip(rule.quantities, quantities, strict=True)
+        },
+        "enough": _enough(greedy, baselines, rule) if is_enough or not is_open else None,
         **({"unlike": dict(unlike)} if unlike else {}),
     }
     return Verdict(kind, certain, evidence)
 
 
 def measure(
-    greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule, times: int = 1
+    greedy: CompleteEpisodes, baselines: Mapping[str, CompleteEpisodes], rule: Rule, times: int = 1
 ) -> tuple[Quantity, ...]:
     """Return the rule's quantities with simultaneous confidence intervals.
 
@@ -246,47 +261,14 @@ def measure(
     return tuple(estimate(i, np.tile(values, times), rule) for i, values in enumerate(observed))
 
 
-def widen(
-    found: Sequence[Quantity],
-    greedy: Episodes,
-    baselines: Mapping[str, Episodes],
-    rule: Rule,
-    outcomes: OutcomeSet,
-    times: int = 1,
-) -> tuple[Quantity, ...]:
-    """Widen the intervals of `measure` to include all outcomes that rounding makes possible.
-
-    Lower bounds hold even if every episode has the worst of its possible outcomes for a quantity,
-    upper bounds even if each has the best one. Every episode counts `times` times, as in `measure`.
-    """
-    observed = _observe_each(greedy, baselines, rule)
-    others = [values[:0] for values in observed]
-    if outcomes.episodes is not None:
-        beside = {name: of[outcomes.owner] for name, of in baselines.items()}
-        others = _observe_each(outcomes.episodes, beside, rule)
-    widened = []
-    for i, (quantity, values, ends) in enumerate(zip(found, observed, others, strict=True)):
-        low, high = rule.ranges[i]
-        lower, upper = values.copy(), values.copy()
-        owner, is_open = outcomes.owner.numpy(), outcomes.is_open.numpy().copy()
-        # whether the episode counts at all depends on the outcome: it may have any value
-        is_open[owner[np.isnan(ends) != np.isnan(values[owner])]] = True
-        is_known = ~np.isnan(ends)
-        np.fmin.at(lower, owner[is_known], ends[is_known])
-        np.fmax.at(upper, owner[is_known], ends[is_known])
-        lower[is_open], upper[is_open] = low, high
-        least, most = (estimate(i, np.tile(v[~np.isnan(v)], times), rule) for v in (lower, upper))
-        low, high = min(quantity.lower, least.lower), max(quantity.upper, most.upper)
-        widened.append(quantity._replace(lower=low, upper=high))
-    return tuple(widened)
-
-
-def observe(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
+def observe(
+    greedy: CompleteEpisodes, baselines: Mapping[str, CompleteEpisodes], rule: Rule
+) -> list[NDArray]:
     """Return each episode's value of each of the rule's quantities, float64.
 
     Shapes: (at most n,); those of "collected" are only of episodes that offered such a goal.
     """
-    each = _observe_each(greedy, baselines, rule)
+    each = observe_each(greedy, baselines, rule)
     return [values[~np.isnan(values)] for values in each]
 
 
@@ -300,7 +282,9 @@ def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
     return Quantity(mean["mean"], mean["lower95"], mean["upper95"], thresholds)
 
 
-def _observe_each(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
+def observe_each(
+    greedy: CompleteEpisodes, baselines: Mapping[str, CompleteEpisodes], rule: Rule
+) -> list[NDArray]:
     """Return the values of `observe` for all episodes, NaN if undefined. Shapes: (n,), float64."""
     oracle = baselines["oracle"]
     observed = [greedy.success - rule.good_share * oracle.success]
@@ -324,18 +308,10 @@ def _is_certain(found: tuple[Quantity, ...], rule: Rule) -> bool:
 
 
 def _enough(
-    greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule, rounding: Rounding | None
+    greedy: CompleteEpisodes, baselines: Mapping[str, CompleteEpisodes], rule: Rule
 ) -> int | None:
-    """Return about how many episodes certainty needs; None if more than `MANY` covers.
-
-    None also if rounding leaves it open however many they are.
-    """
-    if rounding is not None and rounding.is_excessive:
-        return None
-    for times in MANY:
-        found = measure(greedy, baselines, rule, times)
-        if rounding is not None:
-            found = widen(found, greedy, baselines, rule, rounding.outcomes, times)
-        if _is_certain(found, rule):
+    """Return about how many episodes certainty needs; None if more than `MANY` covers."""
+    for times in (1, *MANY):
+        if _is_certain(measure(greedy, baselines, rule, times), rule):
             return times * len(greedy)
     return None

@@ -1,10 +1,10 @@
 """Sentences of a verdict. Evidence: `verdict.json`."""
 
+import json
 from collections.abc import Callable
 from typing import Any
 
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.trust.conditions_text import unlike
 from drone_rl.utils.text import (
     Evidence,
     Sentence,
@@ -26,6 +26,8 @@ _ACTING = {
     "left": "flying left",
     "right": "flying right",
 }
+_MAX_NAMED = 4
+"""Greatest number of items in a sentence; the last one counts the settings that do not fit."""
 
 
 def is_quoted(evidence: Evidence) -> bool:
@@ -202,29 +204,29 @@ def _open(evidence: Evidence) -> str:
 
 
 def depends_on_rounding(evidence: Evidence) -> bool:
-    """Return whether the episodes are enough, but rounding can change the kind."""
+    """Return whether the episodes are enough, but too many decisions depend on rounding."""
     return bool((evidence.get("rounding") or {}).get("decides"))
 
 
 def _rounding(evidence: Evidence) -> str:
-    found = evidence["rounding"]
+    check = evidence["rounding"]
     text = (
         "Not certain: decisions depend on rounding. In "
-        f"{found['fragile']:,} of {found['frames']:,} frames ({percent(found['fragile_rate'])}) "
+        f"{check['fragile']:,} of {check['frames']:,} frames ({percent(check['fragile_rate'])}) "
         "the order in which float32 sums are computed can change the action, in "
-        f"{found['fragile_episodes']:,} of {found['episodes']:,} episodes"
+        f"{check['fragile_episodes']:,} of {check['episodes']:,} episodes"
     )
-    if found["unexplained"]:
-        count = f"{found['unexplained']:,} of {found['compared_episodes']:,} episodes"
-        took = "took other actions" if found.get("bound", True) else "gave other results"
-        text += f"; {found['compared']} {took} in {count} for no such reason"
+    if check["unexplained"]:
+        count = f"{check['unexplained']:,} of {check['compared_episodes']:,} episodes"
+        took = "took other actions" if check.get("bound", True) else "gave other results"
+        text += f"; {check['compared']} {took} in {count} for no such reason"
     return f"{text}."
 
 
 def _arithmetic(evidence: Evidence) -> str:
-    found = evidence["rounding"]
-    tried = "" if found.get("bound", True) else "; effects of rounding were estimated, not bounded"
-    return f"The verdict holds for {found['arithmetic']}{tried}."
+    check = evidence["rounding"]
+    tried = "" if check.get("bound", True) else "; effects of rounding were estimated, not bounded"
+    return f"The verdict holds for {check['arithmetic']}{tried}."
 
 
 def _shares(evidence: Evidence) -> str:
@@ -302,24 +304,28 @@ def _sampled_difference(evidence: Evidence) -> str:
     )
 
 
-def quantity_label(name: str, evidence: Evidence) -> str:
-    """Return the label of one of the rule's quantities, by name."""
-    terms, share = terms_of(evidence), f"{100 * evidence['good_share']:g}%"
-    kind, _, of = name.partition(" ")
-    baseline = of.removeprefix("by ")
-    return {
-        "success": f"success rate above {share} of the oracle's (margin, good if above 0)",
-        "offered": f"episodes that offer {terms.goals} {of} (fraction)",
-        "collected": f"{terms.goals} {terms.reached} {of} (fraction)",
-        "above": (
-            f"{terms.goals} {terms.reached} beyond a sixth of the way from {of} to the oracle "
-            "(margin)"
-        ),
-        "unsolved": (
-            f"{share} of the oracle's success rate above that of {baseline} (margin, trivial if "
-            "not above 0)"
-        ),
-    }.get(kind, name)
+def unlike(evidence: Evidence) -> str:
+    """Return how dynamics and appearance (dotted names) differ from those of training."""
+    differences = evidence["unlike"]
+    parts = [
+        f"{name if '.' in name else f'dynamics.{name}'}={_said(of['flown'])} instead of "
+        f"{_said(of['own'])}"
+        for name, of in differences.items()
+    ]
+    if len(parts) > _MAX_NAMED:
+        parts[_MAX_NAMED - 1 :] = [f"{len(parts) - _MAX_NAMED + 1} other changed settings"]
+    moved = [] if all("." in name for name in differences) else ["other dynamics"]
+    seen = ["another appearance"] if any("." in name for name in differences) else []
+    return f"It was trained with {listed(moved + seen)}: here it flew with {listed(parts)}."
+
+
+def _said(value: Any) -> str:
+    """Return a value as one types it in a setting."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_said, value))}]"
+    if isinstance(value, float):
+        return f"{value:.12g}"  # without ".0"
+    return value if isinstance(value, str) else json.dumps(value)
 
 
 SENTENCES = (
@@ -332,7 +338,7 @@ SENTENCES = (
     ),
     Sentence(
         "rounding",
-        "the episodes are enough, but rounding can change the kind",
+        "the episodes are enough, but too many decisions depend on rounding",
         lambda e: not e["certain"] and depends_on_rounding(e),
         _rounding,
     ),

@@ -60,15 +60,22 @@ _BACKGROUND, _TEXT, _CHOSEN, _BAR = (24, 26, 31), (235, 235, 240), PAPER, MUTED
 
 
 def film(
-    policy: Policy, folder: Path, episodes: int, *, greedy: bool = True, **how: Any
+    policy: Policy,
+    folder: Path,
+    episodes: int,
+    *,
+    greedy: bool = True,
+    seed: int = 0,
+    device: str = "cpu",
+    renderer: str = "raytrace",
 ) -> list[Path]:
     """Film episodes in held-out environments as MP4 and GIF files, and return the files.
 
-    The policy takes the most probable action, or samples it. `how` are the seed, device, renderer
-    and appearance of the environments, see `Policy.make_env`.
+    The policy takes the most probable action, or samples it. For the other arguments see
+    `Policy.make_env`.
     """
     files: list[Path] = []
-    with policy.flying(1, **how) as (env, actor):
+    with policy.flying(1, seed=seed, device=device, renderer=renderer) as (env, actor):
         for episode in range(episodes):
             frames = list(film_episode(env, actor, greedy=greedy))
             files += write_video(frames, folder / f"episode_{episode}")
@@ -83,7 +90,14 @@ def has_display() -> bool:
     return sys.platform in ("darwin", "win32") or any(os.environ.get(name) for name in names)
 
 
-def view(policy: Policy, *, greedy: bool = True, seed: int = 0, **how: Any) -> None:
+def view(
+    policy: Policy,
+    *,
+    greedy: bool = True,
+    seed: int = 0,
+    device: str = "cpu",
+    renderer: str = "raytrace",
+) -> None:
     """Open dm_control's viewer on the composer task, controlled by a policy; see `film`.
 
     The viewer shows the dm_control simulation; observations are rendered as in training.
@@ -97,7 +111,7 @@ def view(policy: Policy, *, greedy: bool = True, seed: int = 0, **how: Any) -> N
     import dm_env
     from dm_control import viewer
 
-    env = policy.make_env(1, seed=seed, **how)
+    env = policy.make_env(1, seed=seed, device=device, renderer=renderer)
     base = cast(DroneEnv, env.base_env)
     actor, worlds = policy.make_actor(env, seed=seed), base.worlds
     shown = make_environment(
@@ -216,8 +230,7 @@ def render_step(base: DroneEnv) -> StepImages:
     strip = worlds.render_all(worlds.state, five, look)["rgb"][0]
     body, dynamics, panel = worlds.state.body, worlds.dynamics, None
     if isinstance(body, FlightState) and isinstance(dynamics, Quadrotor):
-        reading, settings = instruments.read(body), dynamics.settings
-        panel = instruments.panel(reading, settings.velocity_limit, settings.hover_throttle)
+        panel = instruments.panel(instruments.read(body), dynamics.settings.hover_throttle)
     return StepImages(base.last_pixels[0], chase, strip, panel)
 
 

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drone_rl.collectors.complete_episodes import Episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.config.commands import JudgeSettings
 from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.zoo import certificate_path
 from drone_rl.sim.tasks.collect_cubes import EndReason
-from drone_rl.trust.outcomes import Rounding
+from drone_rl.trust.rounding_sensitivity import Rounding
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path
 from drone_rl.utils.seeding import RootSeed, root_seed
@@ -52,11 +52,13 @@ class Claim:
         """
         return 1.0 - 0.05 ** (1.0 / self.uniform) if self.uniform else None
 
-    def as_evidence(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
+    def as_evidence(
+        self, greedy: CompleteEpisodes, *, rounding: Rounding | None = None
+    ) -> dict[str, Any]:
         """Return what a verdict may quote: nothing if an episode contradicts the certificate.
 
-        A proof holds for any order of sums, so nothing is quoted either if rounding can lead to an
-        end that is not stated.
+        A proof holds for any order of sums, so nothing is quoted either if the episodes depend too
+        much on rounding.
 
         Returns:
             Plain values: "refused" (the reason or None) and, unless refused, "every" (whether all
@@ -72,7 +74,7 @@ class Claim:
         if not all(held):
             count = f"{len(held) - sum(held)} of {len(held)} greedy flights of this verdict"
             return {"refused": f"{count} ended otherwise than it states"}
-        if rounding is not None and _can_end_otherwise(stated, greedy, rounding):
+        if rounding is not None and rounding.is_excessive:
             return {"refused": "decisions of the policy depend on rounding"}
         won, lost = (
             [o for o in stated.outcomes if len(o.boxes) and (o.end == EndReason.ALL_CUBES) == wins]
@@ -99,13 +101,14 @@ def find_claim(
     *,
     flights: int = JudgeSettings.certificate_flights,
     seed: RootSeed | None = None,
-    **options: Any,
+    device: str = "cpu",
+    renderer: str = "raytrace",
 ) -> Claim | None:
     """Find and check the certificate of a policy in its task, see `checker.read_validated`.
 
     It is the given file or the certificate.json of the given folder, by default the file next to
     the policy, see `drone_rl.policies.zoo.certificate_path`. Rollouts from so many other
-    placements, by default of a fresh seed, re-check it with `options`, "device" and "renderer".
+    placements, by default of a fresh seed, re-check it.
     Return None if there is none; an invalid one next to the policy is returned as refused.
 
     Raises:
@@ -122,24 +125,19 @@ def find_claim(
     if given is not None:
         path = as_path(given, "certificate")
         path = path / "certificate.json" if path.is_dir() else path
-        return _read_and_check(policy, path, flights, seed, **options)
+        return _read_and_check(policy, path, flights, seed, device, renderer)
     path = certificate_path(policy.path)
     try:
-        return _read_and_check(policy, path, flights, seed, **options) if path.is_file() else None
+        return (
+            _read_and_check(policy, path, flights, seed, device, renderer)
+            if path.is_file()
+            else None
+        )
     except InputError as error:
         return Claim(path, None, refused=str(error))
 
 
-def _can_end_otherwise(stated: Certificate, greedy: Episodes, rounding: Rounding) -> bool:
-    """Whether rounding can lead to another end than the stated one."""
-    ends = rounding.outcomes
-    is_stated = _outcomes_of(stated, greedy) < len(stated.outcomes)
-    unknown = bool((ends.is_open.numpy() & is_stated).any())
-    is_other = ends.episodes is not None and not all(_ends_as_stated(stated, ends.episodes))
-    return rounding.is_excessive or unknown or is_other
-
-
-def _outcomes_of(stated: Certificate, episodes: Episodes) -> NDArray[np.int64]:
+def _outcomes_of(stated: Certificate, episodes: CompleteEpisodes) -> NDArray[np.int64]:
     """Index of each episode's outcome; the number of outcomes where none is stated.
 
     Episodes record placements in float32. Where that leaves open which of two outcomes is stated,
@@ -154,7 +152,7 @@ def _outcomes_of(stated: Certificate, episodes: Episodes) -> NDArray[np.int64]:
     return np.where(low == high, low, len(stated.outcomes))
 
 
-def _ends_as_stated(stated: Certificate, greedy: Episodes) -> list[bool]:
+def _ends_as_stated(stated: Certificate, greedy: CompleteEpisodes) -> list[bool]:
     """For each episode with a stated end, whether it ended so."""
     outcome = _outcomes_of(stated, greedy)
     ended = zip(outcome, greedy.end_reason.tolist(), greedy.goals.reached.tolist(), strict=True)
@@ -166,13 +164,15 @@ def _ends_as_stated(stated: Certificate, greedy: Episodes) -> list[bool]:
 
 
 def _read_and_check(
-    policy: Policy, path: Path, flights: int, seed: RootSeed, **options: Any
+    policy: Policy, path: Path, flights: int, seed: RootSeed, device: str, renderer: str
 ) -> Claim:
     weights = policy.state["policy"]
     certificate = read_validated(path, policy.description, weights)
     if not flights:
         return Claim(path, certificate)
-    found = check_certificate(certificate, weights, flights=flights, seed=seed.value, **options)
+    found = check_certificate(
+        certificate, weights, flights=flights, seed=seed.value, device=device, renderer=renderer
+    )
     if not found.accepted:
         raise InputError(f"certificate {path} does not hold: {found.lines()[0]}; prove again")
     return Claim(

@@ -12,7 +12,10 @@ from typing import Annotated, Any, Self
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from tensordict.nn import TensorDictModuleBase
+from torchrl.envs import EnvBase
 
+from drone_rl.collectors.complete_episodes import episode_batches
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ProvableSettings, ProveSettings
 from drone_rl.config.configuration import as_config, check_same_config, from_arguments
@@ -33,7 +36,6 @@ from drone_rl.training.run_folder import (
     settings_of,
 )
 from drone_rl.training.train import learn
-from drone_rl.trust.rollouts import find_failures
 from drone_rl.trust.verdict import check_judged, judge_for_selection
 from drone_rl.utils.archives import read_array
 from drone_rl.utils.errors import InputError
@@ -256,6 +258,30 @@ def train_until_proved(
         judge = Judge(check_judged, judge_for_selection)
         done = finish(journal.settings, folder, result, judge)
     return reraise_signal(done, "train_until_proved")
+
+
+def find_failures(
+    env: EnvBase, actor: TensorDictModuleBase, num_episodes: int, enough: int
+) -> tuple[NDArray[np.float64], int]:
+    """Search for cube placements from which a greedy policy misses a cube.
+
+    It runs at least `num_episodes`, in whole batches, unless `enough` failures were found before.
+
+    Returns:
+        Placements, metres to the left of the start, (failures, num_cubes); number of episodes.
+    """
+    names = ("collected", "cube_positions")
+    found: list[NDArray[np.float64]] = []
+    episodes = 0
+    for batch in episode_batches(env, actor, num_episodes, keep=names, is_exact=False):
+        is_last = batch["next", "done"][:, 0]
+        collected, cubes = (batch["next", "info", name][is_last] for name in names)
+        failed = cubes[~collected.all(-1)]
+        found.append(np.asarray(failed[..., 1].double().cpu()))
+        episodes += len(collected)
+        if sum(map(len, found)) >= enough:
+            break
+    return np.concatenate(found), episodes
 
 
 def _is_stopped(journal: Journal, result: Mapping[str, Any]) -> bool:

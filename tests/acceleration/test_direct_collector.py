@@ -1,12 +1,17 @@
-"""The direct collector equals TorchRL's collector bit for bit."""
+"""The direct collector and stepper equal TorchRL's bit for bit."""
+
+import copy
 
 import pytest
 import torch
 from torchrl.envs import CatFrames, RewardSum
 
+from drone_rl.acceleration import DirectStepper
 from drone_rl.acceleration.direct_collector import DirectCollector
-from drone_rl.collectors import EpisodeCollector
+from drone_rl.collectors import EpisodeCollector, RolloutCollector
 from drone_rl.collectors.episodes import SteppingCollector
+from drone_rl.collectors.rollouts import TorchrlStepper
+from drone_rl.collectors.speedups import accelerated_stepper
 from drone_rl.config import AppearanceSettings, PillarsSettings, TaskSettings
 from drone_rl.envs import (
     Blur,
@@ -150,3 +155,56 @@ def test_policies_that_read_the_true_state_are_supported(name):
     if name != "random":  # the stepping collector also samples actions of finished environments
         for key in direct.keys(True, True):
             assert torch.equal(direct[key], stepped[key]), key
+
+
+def rollout_collector(is_direct, task, next_keys=(("next", "info", "end_reason"),), look=None):
+    env = with_transforms(DroneEnv(5, task, appearance=look), [GrayPixels(), StandardizePixels()])
+    generator = torch.Generator().manual_seed(0)
+    shape = tuple(env.observation_spec["pixels"].shape[1:])
+    network = SmallCNN(shape, 3, channels=(4,), hidden=(8,), generator=generator)
+    actor = make_actor(network, env.action_spec, generator)
+    made = RolloutCollector(env, actor, 9, next_keys=next_keys)
+    assert isinstance(made._stepper, DirectStepper)
+    if not is_direct:
+        made._stepper = TorchrlStepper(env, made._observed, made._kept, Reasons(["a test"]))
+    return made, generator
+
+
+def check_same(one, other):
+    assert set(one.keys(True, True)) == set(other.keys(True, True))
+    for key in one.keys(True, True):
+        assert torch.equal(one[key], other[key]), key
+
+
+@pytest.mark.parametrize("task", [SHORT, PillarsSettings(num_rows=1)])
+def test_direct_and_torchrl_steppers_are_identical(task):
+    next_keys = (("next", "info", "end_reason"), ("next", "info", "drone"))
+    collectors = [rollout_collector(is_direct, task, next_keys)[0] for is_direct in (True, False)]
+    for _ in range(4):
+        one, other = (made.collect() for made in collectors)
+        check_same(one, other)
+    assert collectors[0].episodes == collectors[1].episodes > 3
+
+
+@pytest.mark.parametrize("saved", [True, False])
+@pytest.mark.parametrize("loaded", [True, False])
+@pytest.mark.parametrize("look", [None, AppearanceSettings(fog_visibility=(5.0, 50.0))])
+def test_direct_and_torchrl_steppers_exchange_states(saved, loaded, look):
+    first, drawn = rollout_collector(saved, SHORT, look=look)
+    first.collect()
+    state, stream = copy.deepcopy(first.state_dict()), drawn.get_state()
+    second, drawn = rollout_collector(loaded, SHORT, look=look)
+    second.load_state_dict(state)
+    drawn.set_state(stream)
+    check_same(second.collect(), first.collect())
+
+
+def test_stacked_frames_are_stepped_by_torchrl():
+    env = with_transforms(DroneEnv(2, SHORT), [GrayPixels()])
+    assert isinstance(accelerated_stepper(env, ["pixels"], KEPT), DirectStepper)
+    env.close()
+    stack = CatFrames(2, dim=-3, in_keys=["pixels"])
+    env = with_transforms(DroneEnv(2, SHORT), [GrayPixels(), stack])
+    reasons = accelerated_stepper(env, ["pixels"], KEPT)
+    assert reasons == ("transform CatFrames is not fused",)
+    env.close()

@@ -9,8 +9,7 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl.acceleration import fused_collector
 from drone_rl.acceleration.direct_collector import DirectCollector
-from drone_rl.acceleration.fused_collector import FusedCollector
-from drone_rl.acceleration.fused_network import FusedNetwork
+from drone_rl.acceleration.fused_collector import FusedCollector, RolloutBuffer
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.collectors.episodes import SteppingCollector
 from drone_rl.config import (
@@ -134,13 +133,6 @@ def test_fused_episodes_equal_their_replay_by_torchrl_bit_for_bit(first, second)
     assert collector.episodes == 10 and collector.frames > 10
 
 
-def test_resize_to_the_same_size_changes_nothing():
-    resized = make(transforms=(GrayPixels, lambda: Resize(height=25, width=64), StandardizePixels))
-    assert isinstance(resized.source, FusedCollector)
-    one, other = make().collect(), resized.collect()
-    assert all(torch.equal(one[key], other[key]) for key in one.keys(True, True))
-
-
 @pytest.mark.parametrize("is_cropped_first", [True, False])
 def test_cropped_frames_and_a_network_with_pooling_are_fused(is_cropped_first):
     """As in the original study: the collector keeps the rows that the network sees."""
@@ -156,28 +148,6 @@ def test_cropped_frames_and_a_network_with_pooling_are_fused(is_cropped_first):
             assert torch.equal(one[key], other[key]), key
     assert torch.allclose(one["logits"], other["logits"], atol=1e-4)
     assert one["pixels"].shape[1:] == (1, 20, 64)
-
-
-@pytest.mark.parametrize("network", [None, OriginalCNN((1, 20, 64), 3, channels=(2, 3))])
-def test_cached_activations_of_cropped_frames_and_of_pooling_are_found(network):
-    transforms = (GrayPixels, StandardizePixels, lambda: CropRows(3, 23))
-    collector = make(transforms=transforms, network=network)
-    plain, reusing = FusedNetwork(collector.actor.module[0].module), cached(collector)
-    plain.network.zero_grad()
-    batch = collector.collect()
-    assert torch.equal(reusing(batch["pixels"], batch["activations"]), batch["logits"])
-    expected = learned(plain.network, plain, batch)
-    found = learned(plain.network, reusing, batch, batch["activations"])
-    assert all(torch.equal(*pair) for pair in zip(found, expected, strict=True))
-
-
-def test_kernel_reports_the_same_info_as_a_replay():
-    brief, replayed = make(), make(next_keys=[REASON, ("next", "info", "drone")])
-    for _ in range(2):
-        one, other = brief.collect(), replayed.collect()
-        for key in one.keys(True, True):
-            assert torch.equal(one[key], other[key]) and one[key].dtype == other[key].dtype, key
-        assert {*other.keys(True, True)} == {*one.keys(True, True), ("next", "info", "drone")}
 
 
 def test_stepping_collector_returns_entries_of_the_same_types():
@@ -246,92 +216,6 @@ def test_observations_are_optional():
     assert "pixels" not in batch and "logits" not in batch and "action" in batch
 
 
-def learned(network, by, batch, *handles):
-    """Return the logits of a batch and the gradients of their weighted sum."""
-    network.zero_grad()
-    logits = by(batch["pixels"], *handles)
-    (logits * torch.linspace(-1, 1, logits.numel()).view(logits.shape)).sum().backward()
-    return [logits.detach(), *(p.grad.clone() for p in network.parameters())]
-
-
-def cached(collector, num_threads=1):
-    """Return the collector's network, fused, and a version that uses cached activations."""
-    cache = collector.source.cache_activations()
-    return FusedNetwork(collector.actor.module[0].module, num_threads, cache=cache)
-
-
-@pytest.mark.parametrize("max_steps", [64, 2])
-@pytest.mark.parametrize("is_greedy", [True, False])
-def test_cached_activations_equal_computed_ones(max_steps, is_greedy, monkeypatch):
-    monkeypatch.setattr(fused_collector, "_MAX_STEPS", max_steps)
-    collector = make(num_envs=35, num_threads=2)
-    network = collector.actor.module[0].module
-    reusing, plain = cached(collector, 2), FusedNetwork(network, 2)
-    cache, weights = collector.source.cache_activations(), collector.source._network.weights
-    for _ in range(2):
-        kind = DETERMINISTIC if is_greedy else ExplorationType.RANDOM
-        with set_exploration_type(kind):
-            batch = collector.collect()
-        assert cache.find(batch["activations"], weights, batch["pixels"]) is not None
-        half = batch[len(batch) // 2 :]
-        for part in (batch, half):
-            found = learned(network, reusing, part, part["activations"])
-            expected = learned(network, plain, part)
-            assert all(torch.equal(*pair) for pair in zip(found, expected, strict=True))
-            assert torch.equal(found[0], part["logits"])
-            reusing(torch.zeros_like(batch["pixels"]))  # computed, not cached
-        darker = batch["pixels"] * 0.5
-        assert torch.equal(reusing(darker, batch["activations"]), plain(darker))
-        with torch.no_grad():
-            network.layers.fc1.weight.add_(0.1)  # the cached activations are stale
-        logits = plain(batch["pixels"])
-        assert torch.equal(reusing(batch["pixels"], batch["activations"]), logits)
-        assert not torch.equal(logits, batch["logits"])
-
-
-def test_the_next_batch_overwrites_cached_activations():
-    collector = make()
-    network = cached(collector)
-    batch = collector.collect()
-    logits = network(batch["pixels"], batch["activations"])
-    other = collector.collect()
-    with pytest.raises(RuntimeError, match="collected between the forward and the backward pass"):
-        logits.sum().backward()
-    again = network(
-        batch["pixels"], batch["activations"]
-    )  # stale handles, so activations are computed
-    assert torch.allclose(again, batch["logits"], atol=1e-5)
-    again.sum().backward()
-    assert torch.equal(network(other["pixels"], other["activations"]), other["logits"])
-
-
-@pytest.mark.parametrize(("parts", "fits"), [(0, False), (2, False), (6, True)])
-def test_activations_are_cached_if_they_fit(parts, fits, monkeypatch):
-    size = make().source.cache_activations().outputs.shape[1]
-    monkeypatch.setattr(fused_collector, "_MAX_STEPS", 2)
-    monkeypatch.setattr(fused_collector, "_MAX_ACTIVATIONS", parts * 5 * 2 * size)
-    collector = make()
-    cache = collector.source.cache_activations()
-    batch = collector.collect()
-    assert 4 < batch["collector", "traj_ids"].bincount().max() <= 12
-    assert (cache is None) is (parts == 0)
-    if cache is not None:
-        weights = collector.source._network.weights
-        rows = cache.find(batch["activations"], weights, batch["pixels"])
-        assert (rows is not None) is fits
-        network = cached(collector)
-        assert torch.equal(network(batch["pixels"], batch["activations"]), batch["logits"])
-
-
-def test_no_activations_without_a_request_or_without_observations():
-    assert "activations" not in make().collect()
-    assert make(acceleration="direct").source.cache_activations() is None
-    collector = make(keep_actor_entries=False)
-    cache = collector.source.cache_activations()
-    assert cache is not None and collector.source.cache_activations() is cache
-    assert not {"pixels", "activations"} & set(collector.collect().keys())
-
-
 @pytest.mark.parametrize(
     ("how", "reason"),
     [
@@ -366,23 +250,6 @@ def test_resuming_from_a_state_gives_the_same_batches():
     other.actor.module[1].distribution_kwargs["source"].generator.set_state(actions)
     found = other.collect()
     assert all(torch.equal(found[key], expected[key]) for key in found.keys(True, True))
-
-
-@pytest.mark.parametrize(
-    "what",
-    [
-        {"acceleration": "direct"},
-        {"transforms": (GrayPixels, StandardizePixels, RewardSum)},
-        {"transforms": (GrayPixels, lambda: CropRows(2, 22), lambda: CropRows(1, 19))},
-        {"transforms": (GrayPixels, StandardizePixels, StandardizePixels)},
-        {"task": PillarsSettings(num_rows=1)},
-        {"network": MLP((1, 25, 64), 3)},
-    ],
-)
-def test_unsupported_configurations_fall_back(what):
-    collector = make(**what)
-    assert isinstance(collector.source, DirectCollector | SteppingCollector)
-    assert len(collector.collect())
 
 
 def test_other_renderers_fall_back():
@@ -438,17 +305,45 @@ def test_kernel_ends_the_episode_of_a_lost_drone():
     assert batch[REASON].flatten().tolist().count(EndReason.LOST_CONTROL) == 1
 
 
-def test_images_without_standardization_equal_rendered_ones():
-    collector = make(transforms=(GrayPixels,))
-    assert isinstance(collector.source, FusedCollector)
-    batch = collector.collect()
-    first = torch.stack([batch[batch["collector", "traj_ids"] == i][0]["pixels"] for i in range(5)])
-    env = with_transforms(DroneEnv(5, SHORT), [GrayPixels()])
-    assert torch.equal(first, env.reset()["pixels"])
-    assert 0.0 <= first.min() < first.max() <= 1.0
-
-
 @pytest.mark.parametrize(("shape", "num_actions"), [((1, 25, 32), 3), ((1, 25, 64), 5)])
 def test_networks_for_other_frames_or_actions_are_not_fused(shape, num_actions):
     collector = make(network=SmallCNN(shape, num_actions))
     assert "outputs is not fused with frames of (1, 25, 64) and 3 outputs" in collector.source.name
+
+
+def make_buffer(num_rows=4):
+    return RolloutBuffer(
+        {"action": torch.zeros(num_rows, dtype=int), "pixels": torch.zeros(num_rows, 2)}
+    )
+
+
+def write(part_rows, *numbers):
+    part_rows["action"][:] = torch.tensor(numbers)
+    part_rows["pixels"][:] = torch.tensor(numbers)[:, None] * torch.tensor([1.0, 0.5])
+
+
+def test_rows_are_read_in_any_order():
+    buffer = make_buffer()
+    for part in range(3):
+        write(buffer.open(part, ("action", "pixels")), *(10 * part + row for row in range(4)))
+    read = buffer.read(torch.tensor([9, 0, 3, 4]), ("action", "pixels"))
+    assert read["action"].tolist() == [21, 0, 3, 10]
+    assert read["pixels"].tolist() == [[n, n / 2] for n in (21, 0, 3, 10)]
+    assert [*buffer.read(torch.tensor([11]), ["action"]).items()] == [
+        ("action", torch.tensor([23]))
+    ]
+
+
+@pytest.mark.parametrize("num_parts", [1, 2, 3, 9])
+def test_buffer_grows_with_the_number_of_parts(num_parts):
+    buffer = make_buffer(3)
+    where = []
+    for _ in range(2):  # the second time without growing
+        for part in range(num_parts):
+            part_rows = buffer.open(part, ("action", "pixels"))
+            write(part_rows, part, part + 100, part + 200)
+        where.append(part_rows["pixels"].data_ptr())
+        rows = torch.arange(3 * num_parts)
+        expected = [part + hundreds for part in range(num_parts) for hundreds in (0, 100, 200)]
+        assert buffer.read(rows, ["action"])["action"].tolist() == expected
+    assert where[0] == where[1]

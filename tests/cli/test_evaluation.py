@@ -1,15 +1,18 @@
-"""Evaluations as a user runs them, of good files and of bad ones."""
+"""`drone-rl evaluate`, `play`, `shifts`, `bodies` and `export` on policy files."""
 
 import json
+import os
+import sys
 from pathlib import Path
 
+import pytest
 import torch
 
 from tests.cli.running import error_line
 
 
 def test_evaluate_writes_table_json_and_videos(run, in_process):
-    args = ["evaluate", f"checkpoint={run}", "episodes=5", "videos=1", "hydra.run.dir=evaluation"]
+    args = ["evaluate", f"policy={run}", "episodes=5", "videos=1", "hydra.run.dir=evaluation"]
     done = in_process(*args, cwd=run)
     assert done.returncode == 0, done.stderr
     assert "all cubes" in done.stdout
@@ -20,23 +23,87 @@ def test_evaluate_writes_table_json_and_videos(run, in_process):
     assert {p.suffix for p in (run / "evaluation" / "videos").iterdir()} == {".mp4", ".gif"}
 
 
-def test_checkpoint_of_another_architecture_truncated_or_with_code(run, in_process, tmp_path):
+def test_damaged_checkpoints(run, in_process, tmp_path):
     state = torch.load(run / "checkpoints" / "last.pt", weights_only=True)
     state["description"]["network"]["hidden"] = [7]
     torch.save(state, tmp_path / "other.pt")
-    line = error_line(in_process("evaluate", "checkpoint=other.pt", cwd=tmp_path))
+    line = error_line(in_process("evaluate", "policy=other.pt", cwd=tmp_path))
     assert "fc1" in line
     data = (run / "checkpoints" / "last.pt").read_bytes()
     (tmp_path / "short.pt").write_bytes(data[: len(data) // 2])
-    line = error_line(in_process("evaluate", "checkpoint=short.pt", cwd=tmp_path))
+    line = error_line(in_process("evaluate", "policy=short.pt", cwd=tmp_path))
     assert "damaged" in line
     torch.save({"format": "drone_rl checkpoint", "x": Path("/")}, tmp_path / "code.pt")
-    line = error_line(in_process("evaluate", "checkpoint=code.pt", cwd=tmp_path))
+    line = error_line(in_process("evaluate", "policy=code.pt", cwd=tmp_path))
     assert "could run code" in line
 
 
-def test_unknown_setting_of_the_evaluated_task(run, in_process):
-    line = error_line(in_process("evaluate", f"checkpoint={run}", "task.num_cubs=5", cwd=run))
-    assert "num_cubs" in line
-    line = error_line(in_process("evaluate", f"checkpoint={run}", "task.num_cubes=0", cwd=run))
-    assert "num_cubes=0" in line
+@pytest.mark.skipif("DISPLAY" in os.environ, reason="there is a display")
+def test_viewer_without_a_display(run, in_process):
+    line = error_line(in_process("play", f"policy={run}", "viewer=true", cwd=run))
+    assert "needs a display" in line
+
+
+def test_play_films(run, in_process):
+    args = ["play", f"policy={run}", "episodes=1", "appearance=blocks", "hydra.run.dir=films"]
+    done = in_process(*args, cwd=run)
+    assert done.returncode == 0, done.stderr
+    assert {p.name for p in (run / "films").glob("episode_0.*")} == {
+        "episode_0.mp4",
+        "episode_0.gif",
+    }
+
+
+def test_play_records_for_rerun(run, in_process):
+    pytest.importorskip("rerun", reason="rerun isn't installed: extra [rerun]")
+    done = in_process(
+        "play", f"policy={run}", "episodes=2", "format=rerun", "hydra.run.dir=r", cwd=run
+    )
+    assert done.returncode == 0, done.stderr
+    assert {p.name for p in (run / "r").glob("episode_*")} == {"episode_0.rrd", "episode_1.rrd"}
+
+
+def test_play_names_a_missing_extra(in_process, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    line = error_line(in_process("play", "policy=good", "format=rerun"))
+    assert "format=rerun needs rerun" in line and "pip install -e '.[rerun]'" in line
+
+
+def test_shifts_of_one_axis(in_process, tmp_path):
+    few = ("axes=dead_rows", "strengths=[5]", "modes=[constant]", "episodes=10", "domain=false")
+    done = in_process("shifts", "policy=poor", *few, "hydra.run.dir=s")
+    assert done.returncode == 0, done.stderr
+    assert "dead rows" in done.stdout and "12: " in done.stdout
+    kept = json.loads((tmp_path / "s" / "shifts.json").read_text())
+    assert kept["axes"]["dead_rows"]["levels"][0]["number"] == 5
+    assert {path.name for path in (tmp_path / "s").glob("*.png")} == {"shifts.png", "strips.png"}
+
+
+def test_bodies_writes_a_table_and_files(in_process, tmp_path):
+    few = ("episodes=3", "bodies=[computer vision,simple flight]", "num_envs=3")
+    done = in_process("bodies", "policies=[good]", *few, "hydra.run.dir=b")
+    assert done.returncode == 0, done.stderr
+    head, row = done.stdout.splitlines()[:2]
+    assert head.split() == ["computer", "vision", "simple", "flight"]
+    assert row.startswith("good")
+    kept = json.loads((tmp_path / "b" / "bodies.json").read_text())
+    assert kept["bodies"] == ["computer vision", "simple flight"]
+    assert {p.suffix for p in (tmp_path / "b").glob("bodies.*")} == {".json", ".png", ".svg"}
+
+
+def test_an_export_can_be_judged(in_process, tmp_path):
+    done = in_process("export", "policy=good", "name=mine", "episodes=20", "hydra.run.dir=e")
+    assert done.returncode == 0, done.stderr
+    assert "drone-rl train" in (tmp_path / "e" / "mine.md").read_text()
+    assert done.stdout.startswith("good (not certain): This policy")
+    done = in_process("verdict", "policy=e/mine.safetensors", "episodes=20", "hydra.run.dir=v")
+    assert done.returncode == 13, done.stderr  # as good as can be, but 20 episodes prove nothing
+    assert done.stdout.startswith("good (not certain): ")
+
+
+def test_an_export_for_other_programs(in_process, tmp_path, monkeypatch):
+    monkeypatch.setattr("drone_rl.trust.onnx_export._STEPS", 5)  # a few images suffice here
+    done = in_process("export", "policy=poor", "name=mine", "format=onnx", "hydra.run.dir=e")
+    assert done.returncode == 0, done.stderr
+    assert {path.name for path in (tmp_path / "e").iterdir()} == {".hydra", "mine.onnx"}
+    assert done.stdout.startswith("recorded verdict: poor 0.0% (0.0 to ")

@@ -1,4 +1,4 @@
-"""Explanations as a user asks for them; their report, made again."""
+"""`drone-rl explain` and `report`."""
 
 from pathlib import Path
 
@@ -7,7 +7,6 @@ import pytest
 import drone_rl
 from drone_rl.explanations.explain import Explanations
 from drone_rl.utils.seeding import RootSeed
-from tests.cli.running import error_line
 from tests.explanations.quick import quick, quick_figures
 
 
@@ -43,24 +42,3 @@ def test_several_policies_are_explained_together(in_process, monkeypatch):
     assert (seen["frames"], seen["num_envs"]) == (150, 7)
     assert "good: good. It is." in done.stdout and "poor: poor. It is." in done.stdout
     assert in_process("explain", "policy=[good,poor]", "require=good").returncode == 13
-
-
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [
-        (["explain", "policy=nobody"], ["nobody does not exist", "right_and_forward"]),
-        (["explain", "policy=[]"], ["policy="]),
-        (["explain", "policy=[good,good]"], ["each once"]),
-        (["explain", "policy=good", "frames=3"], ["frames=3", "30 (data_episodes)"]),
-        (["explain", "policy=good", "perplexity=500"], ["perplexity=500", "1 to 199"]),
-        (["explain", "policy=good", "layer=conv9"], ["layer=conv9", "conv1, relu1"]),
-        (["explain", "policy=good", "grad_cam_layer=fc1"], ["layer=fc1", "relu1, relu2"]),
-        (
-            ["explain", "policy=good", "require=great"],
-            ["require='great'", "good, good, but trivial, poor"],
-        ),
-    ],
-)
-def test_mistakes_get_one_line(in_process, command, words):
-    line = error_line(in_process(*command))
-    assert all(word in line for word in words), line

@@ -3,8 +3,6 @@
 import json
 import shutil
 
-import pytest
-
 from drone_rl.policies.zoo import policy_names
 
 
@@ -40,18 +38,3 @@ def test_trained_policies_newest_first(run, in_process, tmp_path):
     assert max(map(len, lines)) <= 100
     done = in_process("policies", "most=1")
     assert "and 2 older policies; list all with most=3" in done.stdout
-
-
-@pytest.mark.parametrize(("kind", "more"), [("splendid", 1), ("\x1b[2Jsplendid", 0)])
-def test_a_verdict_of_another_checkpoint_or_of_no_text_is_not_listed(
-    run, in_process, tmp_path, kind, more
-):
-    folder = tmp_path / "outputs" / "train" / "runs" / "2026-01-01_00-00-00-000001"
-    shutil.copytree(run, folder)
-    result = json.loads((folder / "result.json").read_text())
-    success = {"share": 1.0, "lower95": 0.9, "upper95": 1.0}
-    result["verdict"] = {"kind": kind, "certain": True, "greedy": {"success": success}}
-    result["frames"] += more
-    (folder / "result.json").write_text(json.dumps(result))
-    printed = in_process("policies").stdout
-    assert "splendid" not in printed and "not judged" in printed

@@ -1,4 +1,4 @@
-"""Sweeps as a user runs them: killed, gone on with, one run of them a mistake."""
+"""A sweep that is killed and resumed, with one run that fails; sweeps on clusters."""
 
 import json
 import os
@@ -49,7 +49,7 @@ def sweep(tmp_path_factory):
     return found
 
 
-def test_a_killed_sweep_ends_as_one_that_never_was(sweep, tmp_path):
+def test_a_killed_sweep_ends_like_an_uninterrupted_one(sweep, tmp_path):
     (run,) = sweep.glob("0_*seed-0*")
     done = drone_rl("train", *TINY, "seed=0", "hydra.run.dir=alone", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -63,7 +63,7 @@ def test_a_killed_sweep_ends_as_one_that_never_was(sweep, tmp_path):
     )
 
 
-def test_the_mistake_stands_in_the_summary_and_harms_no_other(sweep):
+def test_a_failed_run_is_in_the_summary(sweep):
     summary = json.loads((sweep / "summary.json").read_text())
     states = {run["seed"]: run["state"] for run in summary["runs"]}
     assert states == {"0": "finished", "-1": "failed"}
@@ -72,7 +72,7 @@ def test_the_mistake_stands_in_the_summary_and_harms_no_other(sweep):
     assert "seed=-1 is out of range" in (sweep / "report.html").read_text()
 
 
-def test_one_run_of_a_sweep_can_be_gone_on_with_by_hand(sweep, in_process):
+def test_one_run_of_a_sweep_can_be_resumed(sweep, in_process):
     (run,) = sweep.glob("0_*seed-0*")
     in_process("train", f"resume={run}", "trainer.total_frames=1600", cwd=sweep)
     assert json.loads((run / "result.json").read_text())["frames"] >= 1600

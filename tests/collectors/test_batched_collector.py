@@ -8,9 +8,8 @@ import torch
 from tensordict import TensorDict
 from tensordict.nn import TensorDictModule
 from torchrl.collectors import BaseCollector
-from torchrl.envs import RewardSum, TransformedEnv
 
-from drone_rl.collectors import EpisodeCollector, RolloutCollector, take_rows
+from drone_rl.collectors import EpisodeCollector, RolloutCollector
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.policies.baselines import oracle_policy
@@ -51,25 +50,6 @@ def test_stops_at_total_frames(make):
     assert [batch.numel() for batch in make(total_frames=frames[0] + 1)] == frames[:2]
 
 
-def test_frames_and_episodes_are_counted(make):
-    collector = make()
-    batches = [collector.collect() for _ in range(4)]
-    assert collector.frames == sum(batch.numel() for batch in batches)
-    assert collector.episodes == sum(int(batch["next", "done"].sum()) for batch in batches)
-
-
-def test_postproc_receives_each_batch(make):
-    for batch in make(postproc=lambda batch: batch.set("seen", batch["action"]), total_frames=20):
-        assert torch.equal(batch["seen"], batch["action"])
-
-
-def test_only_existing_entries_are_kept(make):
-    keep = (("next", "info", "cubes"), ("next", "wind"))
-    batch = make(next_keys=keep).collect()
-    assert ("next", "info", "cubes") in batch.keys(True)
-    assert ("next", "wind") not in batch.keys(True)
-
-
 def test_set_seed_seeds_the_environments(make):
     collector = make()
     first = collector.collect()["info", "cube_positions"]
@@ -103,25 +83,9 @@ def test_shutdown_can_leave_the_environment_open(make):
     assert collector.env.is_closed
 
 
-def test_base_env_is_behind_transforms():
-    env = DroneEnv(2, TASK, pixels=False)
-    assert EpisodeCollector(TransformedEnv(env, RewardSum()), oracle_policy(TASK)).base_env is env
-    assert EpisodeCollector(env, oracle_policy(TASK)).base_env is env
-
-
 def test_unbatched_environment_raises(make):
     env = DroneEnv(1, TASK, pixels=False)
     env.batch_size = torch.Size([])
     for kind in KINDS.values():
         with pytest.raises(InputError, match=r"batch size \[\]; give one with one batch dimension"):
             kind(env, oracle_policy(TASK))
-
-
-def test_take_rows_equals_indexing():
-    part = TensorDict({"a": torch.arange(4.0), "b": {"c": torch.arange(8).view(4, 2)}}, [4])
-    rows = torch.tensor([3, 0, 3])
-    taken = take_rows(part, rows)
-    assert taken.shape == (3,)
-    assert (taken == part[rows]).all()
-    taken["a"][0] = 9.0
-    assert part["a"].tolist() == [0, 1, 2, 3]

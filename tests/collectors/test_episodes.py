@@ -1,21 +1,23 @@
 """Complete episodes in order, and the interface of TorchRL's collectors."""
 
-import itertools
+import gc
 
 import pytest
 import torch
 from tensordict import TensorDict
-from tensordict.nn import TensorDictModule
-from torchrl.collectors import BaseCollector
+from tensordict.nn import TensorDictModule, probabilistic
 from torchrl.data import Binary, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
+from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl.collectors import EpisodeCollector
+from drone_rl.collectors.episodes import SteppingCollector
 from drone_rl.config import TaskSettings
-from drone_rl.envs import DroneEnv
+from drone_rl.envs import DroneEnv, GrayPixels, with_transforms
+from drone_rl.envs.direct_renderer import Reasons
 from drone_rl.objectives import RewardToGo
+from drone_rl.policies import SmallCNN, make_actor
 from drone_rl.policies.baselines import oracle_policy
-from drone_rl.utils.errors import InputError
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
 
@@ -94,10 +96,6 @@ def test_total_frames_stops_before_an_unneeded_batch():
     assert [len(batch) for batch in scripted(total_frames=0)] == []
 
 
-def test_collects_without_limit_by_default():
-    assert [len(batch) for batch in itertools.islice(scripted(), 3)] == [6, 7, 7]
-
-
 def test_nested_entries_are_read_and_kept_as_leaves():
     """One actor reads the true state; the other writes an entry in addition to its action."""
     env = DroneEnv(2, SHORT, pixels=False)
@@ -108,13 +106,6 @@ def test_nested_entries_are_read_and_kept_as_leaves():
     batch = EpisodeCollector(Scripted(), actor, next_keys=()).collect()
     assert torch.equal(batch["note", "more"], batch["frame"] + 1)
     assert batch["frame"][:, 0].tolist() == [0, 1, 2, 100, 200, 201]
-
-
-def test_kept_entries():
-    batch = scripted(keep_actor_entries=False).collect()
-    assert set(batch.keys()) == {"action", "next", "collector"}
-    assert set(batch["next"].keys()) == {"reward", "done", "terminated", "frame"}
-    assert set(scripted().collect().keys()) == {"frame", "action", "next", "collector"}
 
 
 def test_state_resumes_collection():
@@ -129,13 +120,6 @@ def test_state_resumes_collection():
     assert second.collect()["collector", "traj_ids"].unique().tolist() == [3, 4, 5]
 
 
-def test_second_shutdown_has_no_effect():
-    collector = scripted()
-    collector.shutdown()
-    assert collector.env.is_closed
-    collector.shutdown()
-
-
 @pytest.fixture
 def collector(make_pipeline):
     return EpisodeCollector(*make_pipeline(5, task=SHORT), next_keys=TRUTH)
@@ -148,42 +132,6 @@ def test_batch_contains_complete_episodes(collector):
     assert torch.equal(ids, ids.sort().values)
     last = torch.cat([ids[1:] != ids[:-1], torch.tensor([True])])
     assert torch.equal(done, last)  # done is exactly the last step of each episode
-
-
-def test_frames_are_ordered_and_follow_from_the_actions(collector):
-    batch = collector.collect()
-    for i in range(5):
-        episode = batch[batch["collector", "traj_ids"] == i]
-        cubes = episode["next", "info", "cubes"][:, 0]
-        assert torch.equal(cubes, episode["next", "reward"][:, 0].cumsum(0).long())
-        assert (episode["next", "info", "end_reason"][:-1] == 0).all()
-        assert episode["next", "info", "end_reason"][-1] > 0
-
-
-def test_batches_require_no_grad(collector):
-    batch = collector.collect()
-    assert batch["logits"].numel() > 0
-    assert not any(value.requires_grad for value in batch.values(True, True))
-
-
-def test_each_action_belongs_to_its_frame(make_pipeline):
-    env, actor = make_pipeline(3, task=SHORT)
-    batch = EpisodeCollector(env, actor).collect()
-    logits = actor.get_dist(batch.select("pixels")).logits
-    torch.testing.assert_close(logits, batch["logits"].log_softmax(-1), atol=1e-5, rtol=1e-4)
-
-
-def test_no_frame_is_dropped_or_used_twice(make_pipeline):
-    env, actor = make_pipeline(4, task=SHORT)
-    moved = []
-    advance = env.base_env.worlds.advance
-    env.base_env.worlds.advance = lambda state, action: (
-        moved.append(len(state)) or advance(state, action)
-    )
-    collector = EpisodeCollector(env, actor)
-    total = sum(len(collector.collect()) for _ in range(3))
-    assert total == sum(moved) == collector.frames
-    assert collector.episodes == 12
 
 
 def test_finished_environments_are_not_rendered(make_pipeline):
@@ -204,13 +152,6 @@ def test_observations_are_optional(make_pipeline):
     assert "action" in batch
 
 
-def test_stops_at_total_frames(make_pipeline):
-    env, actor = make_pipeline(2, task=SHORT)
-    collector = EpisodeCollector(env, actor, total_frames=30)
-    frames = sum(len(batch) for batch in collector)
-    assert frames == collector.frames >= 30
-
-
 @pytest.fixture
 def seeing(make_pipeline):
     """Return a collector whose policy reads the true state; three environments, no rendering."""
@@ -228,20 +169,6 @@ def test_policy_inputs_are_available_and_kept(seeing):
     steps = drone.diff(dim=0).abs().sum(-1)[~first[1:]]
     torch.testing.assert_close(steps, torch.ones_like(steps))  # one meter per step
     assert after[~first.roll(-1)].max() < 2  # all cubes end an episode
-
-
-def test_no_batch_follows_enough_frames(seeing):
-    def batches(total_frames):
-        seeing.env.set_seed(0)
-        collector = EpisodeCollector(seeing.env, seeing.actor, total_frames=total_frames)
-        return [len(batch) for batch in itertools.islice(collector, 3)]
-
-    first, *_ = without_number = [len(batch) for batch in itertools.islice(seeing, 3)]
-    assert len(without_number) == 3  # without limit
-    assert batches(-1) == without_number
-    assert batches(0) == []
-    assert batches(1) == batches(first) == [first]
-    assert batches(first + 1) == without_number[:2]
 
 
 def test_episode_ids_continue_across_batches(seeing):
@@ -267,45 +194,68 @@ def test_steps_are_masked_once_an_episode_has_ended(seeing):
     assert all(masked[int(lengths.min()) :])
 
 
-def test_shutdown_closes_the_environment(seeing):
-    seeing.collect()
-    assert not seeing.env.is_closed
-    seeing.shutdown()
-    assert seeing.env.is_closed
-    seeing.shutdown()
-
-
-def test_unbatched_environment_raises(make_pipeline):
-    _, actor = make_pipeline(1)
-
-    class Unbatched:
-        batch_size = torch.Size([])
-
-    with pytest.raises(InputError, match="give one with one batch dimension"):
-        EpisodeCollector(Unbatched(), actor)
-
-
-def test_missing_entries_are_not_kept():
-    keep = (("next", "info", "end_reason"), ("next", "frame"))
-    batch = scripted(next_keys=keep).collect()
-    assert set(batch["next"].keys()) == {"reward", "done", "terminated", "frame"}
-
-
-def test_implements_the_torchrl_collector_interface(seeing):
-    assert isinstance(seeing, BaseCollector)
-    alone = DroneEnv(3, SHORT, pixels=False)
-    other = EpisodeCollector(alone, oracle_policy(SHORT), next_keys=TRUTH)
-    assert torch.equal(seeing.next()["action"], other.collect()["action"])
-    with pytest.raises(TypeError, match="not known beforehand"):
-        len(seeing)
-
-
-def test_list_returns_all_batches():
-    assert [len(batch) for batch in list(scripted(total_frames=7))] == [6, 7]
-
-
 def test_postproc_receives_each_batch():
     collector = scripted(postproc=RewardToGo(0.5), total_frames=7)
     for batch in collector:
         expected = RewardToGo(0.5)(batch.exclude("return_to_go"))["return_to_go"]
         assert torch.equal(batch["return_to_go"], expected)
+
+
+TASK = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
+KEPT = [("next", name) for name in ("reward", "done", "terminated", "truncated")]
+
+
+def make(num_envs=5, **settings):
+    env = with_transforms(DroneEnv(num_envs, TASK), [GrayPixels()])
+    generator = torch.Generator().manual_seed(0)
+    network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,), generator=generator)
+    actor = make_actor(network, env.action_spec, generator)
+    return SteppingCollector(env, actor, Reasons(["a reason"]), next_keys=KEPT, **settings), env
+
+
+def test_construction_starts_no_episode():
+    env = DroneEnv(5, TASK)
+    assert torch.equal(make()[0].collect(5)["pixels"][0], GrayPixels()(env.reset())["pixels"][0])
+
+
+def test_deleting_the_collector_keeps_the_environment_open():
+    collector, env = make()
+    collector.collect(5)
+    del collector
+    gc.collect()
+    assert not env.is_closed
+    env.reset()
+    env.close()
+
+
+@pytest.mark.parametrize("num_envs", [5, 2])
+def test_every_episode_is_complete_and_starts_once(num_envs):
+    collector, env = make()
+    started, start = [], env.base_env.start
+    env.base_env.start = lambda rows=None: started.append(len(rows)) or start(rows)
+    for _ in range(2):
+        batch = collector.collect(num_envs)
+        ids, done = batch["collector", "traj_ids"], batch["next", "done"][:, 0]
+        assert ids.unique().tolist() == list(range(num_envs))
+        assert torch.equal(done, ids != torch.cat([ids[1:], torch.tensor([-1])]))
+    assert started == [5, 5]
+
+
+def test_outer_exploration_type_is_respected():
+    collector, _ = make()
+    with set_exploration_type(ExplorationType.DETERMINISTIC):
+        batch = collector.collect(5)
+    assert torch.equal(batch["action"], batch["logits"].argmax(-1))
+    batch = collector.collect(5)
+    assert not torch.equal(batch["action"], batch["logits"].argmax(-1))
+
+
+def test_no_other_exploration_type_is_set_for_other_threads(monkeypatch):
+    collector, _ = make()
+    with set_exploration_type(ExplorationType.DETERMINISTIC):
+        kinds, set_mode = set(), probabilistic._interaction_type.set_mode
+        monkeypatch.setattr(
+            probabilistic._interaction_type, "set_mode", lambda k: (kinds.add(k), set_mode(k))
+        )
+        collector.collect(5)
+        assert kinds == {ExplorationType.DETERMINISTIC}

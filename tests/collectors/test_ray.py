@@ -8,7 +8,6 @@ import torch
 from drone_rl.config import TaskSettings
 from drone_rl.config.learning import Episodes, Ray
 from drone_rl.config.training import TrainSettings
-from drone_rl.training import variants
 from drone_rl.training.components import make_collector
 from drone_rl.training.trainer import episode_rewards
 from drone_rl.utils.errors import InputError
@@ -81,10 +80,3 @@ def test_more_workers_than_cores_raise(workers, cores, monkeypatch):
     with pytest.raises(InputError, match=message):
         build(Ray(num_envs=6, num_threads=workers, num_cpus=cores))
     assert ends == [ray]
-
-
-def test_a_worker_that_does_not_start_is_told_in_one_line(monkeypatch):
-    monkeypatch.setattr(variants, "IMPORTED", ["nowhere"])
-    message = r"did not start \(ModuleNotFoundError: No module named 'nowhere'\); its machine needs"
-    with pytest.raises(InputError, match=message):
-        build(Ray(num_envs=6))

@@ -1,16 +1,14 @@
 """Rollouts that continue across batches, compared with hand-computed ones and with TorchRL."""
 
 import copy
-import itertools
 
 import pytest
 import torch
 from tensordict import TensorDict
 from tensordict.nn import TensorDictModule
-from torchrl.collectors import BaseCollector
 from torchrl.envs import CatFrames, RewardSum, StepCounter
 
-from drone_rl.collectors import RolloutCollector, ThreadedCollector
+from drone_rl.collectors import RolloutCollector
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv, GrayPixels, with_transforms
 from drone_rl.policies import MLP, make_actor
@@ -68,19 +66,6 @@ def test_rollouts_do_not_depend_on_batch_boundaries(num_steps):
         assert torch.equal(whole[key], joined[key]), key
 
 
-def test_next_observation_is_the_following_one_within_an_episode():
-    batch = scripted(30).collect()
-    goes_on = ~batch["next", "done"][:, :-1]
-    following, after = batch["next", "frame"][:, :-1], batch["frame"][:, 1:]
-    assert torch.equal(following[goes_on], after[goes_on])
-    assert not (following == after)[~goes_on].any()
-
-
-def test_stops_at_total_frames():
-    assert [len(batch) for batch in scripted(total_frames=13)] == [3, 3]
-    assert len(list(itertools.islice(scripted(), 3))) == 3
-
-
 def pipeline(seed=0, num_envs=5):
     """Return an environment with stateful transforms: frame stack, reward sum and step counter."""
     steps = [GrayPixels(), CatFrames(2, -3, in_keys=["pixels"]), RewardSum(), StepCounter()]
@@ -110,15 +95,6 @@ def test_rollouts_equal_stepping_by_torchrl():
     other.close()
 
 
-def test_rollouts_contain_terminations_and_truncations():
-    env, actor, _ = pipeline()
-    batch = RolloutCollector(env, actor, 40).collect()
-    assert batch["next", "terminated"].any() and batch["next", "truncated"].any()
-    reasons = batch["next", "info", "end_reason"]
-    assert torch.equal(reasons != 0, batch["next", "done"])
-    env.close()
-
-
 def test_resuming_from_a_state_gives_the_same_rollouts():
     env, actor, actions = pipeline()
     first = RolloutCollector(env, actor, 6)
@@ -137,15 +113,6 @@ def test_resuming_from_a_state_gives_the_same_rollouts():
         found = second.collect()
         for key in batch.keys(True, True):
             assert torch.equal(found[key], batch[key]), key
-    env.close()
-    env2.close()
-
-
-def test_state_before_the_first_batch_resumes():
-    (env, actor, _), (env2, actor2, _) = pipeline(), pipeline()
-    first, second = RolloutCollector(env, actor, 6), RolloutCollector(env2, actor2, 6)
-    second.load_state_dict(copy.deepcopy(first.state_dict()))
-    assert torch.equal(first.collect()["pixels"], second.collect()["pixels"])
     env.close()
     env2.close()
 
@@ -174,15 +141,6 @@ def test_set_seed_restarts_all_episodes():
     assert torch.equal(again["pixels"][:, 0], first)
     assert again["next", "step_count"][:, 0].tolist() == [[1]] * 5
     env.close()
-
-
-def test_threaded_collector_concatenates_rows():
-    joined = ThreadedCollector([scripted(), scripted()])
-    assert isinstance(joined.collectors[0], BaseCollector)
-    batch = joined.collect()
-    assert batch.shape == (6, 4)
-    assert batch["frame"][5, :, 0].tolist() == [200, 201, 210, 211]
-    joined.shutdown()
 
 
 @pytest.mark.parametrize("num_steps", [0, -1])

@@ -1,14 +1,10 @@
 """Parallel collectors give deterministic batches."""
 
 import copy
-from types import SimpleNamespace
 
-import pytest
 import torch
-from torchrl.collectors import BaseCollector
 
 from drone_rl.collectors import EpisodeCollector, ThreadedCollector
-from drone_rl.objectives import RewardToGo
 from tests.collectors.test_episodes import SHORT, scripted
 
 
@@ -25,15 +21,6 @@ def test_threaded_batches_are_deterministic(make_pipeline):
         assert torch.equal(one["action"], two["action"])
     first.shutdown()
     second.shutdown()
-
-
-def test_batches_are_concatenated_in_order(make_pipeline):
-    joined = threaded(make_pipeline)
-    batch = joined.collect()
-    assert int(batch["next", "done"].sum()) == 4
-    alone = EpisodeCollector(*make_pipeline(2, task=SHORT, num_shards=1)).collect()
-    assert torch.equal(batch["pixels"][: len(alone)], alone["pixels"])
-    joined.shutdown()
 
 
 def test_rollouts_continue_in_every_collector():
@@ -65,18 +52,6 @@ def test_threaded_state_round_trip(make_pipeline):
     second.shutdown()
 
 
-def test_implements_the_torchrl_collector_interface():
-    joined = ThreadedCollector([scripted(), scripted()], postproc=RewardToGo(0.5))
-    assert isinstance(joined, BaseCollector)
-    assert len(joined.next()["return_to_go"]) == 12
-    with pytest.raises(TypeError, match="without end"):
-        len(joined)
-    for collector in joined.collectors:
-        collector.env.is_closed = False  # TorchRL's default is closed
-    joined.shutdown(close_env=False)
-    assert not any(c.env.is_closed for c in joined.collectors)
-
-
 def test_seed_and_weights_reach_every_collector(make_pipeline):
     joined = threaded(make_pipeline)
     first = joined.collect()
@@ -90,11 +65,3 @@ def test_seed_and_weights_reach_every_collector(make_pipeline):
     batch = joined.collect()
     assert not batch["logits"].any() and first["logits"].any()
     joined.shutdown()
-
-
-def test_activations_are_cached_by_a_single_collector_of_episodes(monkeypatch, make_pipeline):
-    one, *_ = threaded(make_pipeline).collectors
-    monkeypatch.setattr(type(one.source), "cache_activations", lambda source: source)
-    assert ThreadedCollector([one]).cache_activations() is one.source
-    assert ThreadedCollector([one, one]).cache_activations() is None
-    assert ThreadedCollector([SimpleNamespace()]).cache_activations() is None

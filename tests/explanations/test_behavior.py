@@ -1,11 +1,25 @@
-import dataclasses
+"""Verdict, robustness, statistics of the data set, contradictions and loops."""
+
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from drone_rl.explanations.behavior import Pair, find_pairs, median_frame_change, summarise_pairs
+from drone_rl.explanations.behavior import (
+    dataset_section,
+    evaluation_section,
+    find_loops,
+    find_pairs,
+    median_frame_change,
+    shifts_section,
+    summarise_loops,
+    summarise_pairs,
+)
 from drone_rl.explanations.rollouts import RolloutDataset
 from drone_rl.sim.actions import MOVES
+from drone_rl.trust.shifts_file import SavedShifts
+from tests.five_actions import FIVE
 
 F, L, R = 0, 1, 2
 
@@ -28,7 +42,7 @@ def pairs_of(data, alike):
 LEFT, RIGHT = [0.0, 0.9, 0.1], [0.0, 0.1, 0.9]
 
 
-def test_pairs_are_split_by_where_the_cube_is():
+def test_pairs_are_classified_by_the_place_of_the_target():
     # frames 0 and 1 look alike, so do 2 and 3, 4 and 5; only in the first pair the cube stands
     # alike (1 m away), in the second it is 6 m off, in the third there is none
     data = fake(
@@ -43,38 +57,16 @@ def test_pairs_are_split_by_where_the_cube_is():
     }  # fmt: skip
     assert pairs[0].opposition == pytest.approx(0.8)
     assert pairs[0].distance == pytest.approx(0.1 / np.sqrt(2))
-    summary = summarise_pairs(pairs, data, 0.1)
+    summary = summarise_pairs(pairs, data)
     assert (summary["contradictions"], summary["justified"], summary["unknown"]) == (1, 1, 1)
     assert summary["pairs"] == 3 and summary["worst_opposition"] == pytest.approx(0.8)
 
 
-def test_the_worst_is_the_most_opposed():
-    data = fake(
-        observations=[[0, 0], [0, 0.1], [5, 5], [5, 5.1]],
-        probabilities=[LEFT, RIGHT, [0.0, 0.7, 0.3], [0.0, 0.3, 0.7]],
-        offsets=[[5, 1]] * 4,
-    )
-    summary = summarise_pairs(pairs_of(data, alike=0.1), data, 0.1)
-    assert summary["contradictions"] == 2
-    assert summary["worst_opposition"] == pytest.approx(0.8)
-
-
-def test_pictures_farther_apart_are_not_alike():
-    data = fake([[0, 0], [0, 0.1]], [LEFT, RIGHT], [[5, 1], [5, 1]])
-    assert len(pairs_of(data, alike=0.0708)) == 1  # 0.1 / sqrt(2) = 0.07071
-    assert pairs_of(data, alike=0.0707) == []
-
-
-def test_wishes_less_opposed_are_no_pair():
+def test_the_least_opposition_of_a_pair():
     data = fake([[0, 0]] * 2, [[0.8, 0.2, 0.0], [0.8, 0.01, 0.19]], [[5, 1]] * 2)
     assert pairs_of(data, alike=1.0) == []  # opposed by 0.19
     data = fake([[0, 0]] * 2, [[0.8, 0.2, 0.0], [0.8, 0.0, 0.2]], [[5, 1]] * 2)
     assert len(pairs_of(data, alike=1.0)) == 1  # by just 0.2
-
-
-def test_of_equally_opposed_pairs_the_more_alike_comes_first():
-    data = fake([[0], [3], [2]], [LEFT, RIGHT, RIGHT], [[5, 1]] * 3)
-    assert [(p.left, p.right) for p in pairs_of(data, alike=9.0)] == [(0, 2)]
 
 
 def test_pairs_are_found_across_more_frames_than_are_compared_at_once():
@@ -87,14 +79,14 @@ def test_pairs_are_found_across_more_frames_than_are_compared_at_once():
     assert [(p.left, p.right, p.distance) for p in pairs] == [(700, 1202, 0.0)]
 
 
-def test_a_cube_stands_alike_up_to_one_metre():
+def test_targets_within_a_metre_are_at_the_same_place():
     data = fake([[0]] * 2, [LEFT, RIGHT], [[5, 1], [5, 2]])
     assert pairs_of(data, alike=1.0)[0].kind == "contradiction"
     data = fake([[0]] * 2, [LEFT, RIGHT], [[5, 1], [6.01, 1]])
     assert pairs_of(data, alike=1.0)[0].kind == "justified"
 
 
-def test_each_frame_is_in_one_pair_and_the_most_opposed_comes_first():
+def test_each_frame_is_in_one_pair():
     probs = [[0, 0.7, 0.3], [0, 0.9, 0.1], RIGHT]
     pairs = pairs_of(fake(np.zeros((3, 2)), probs, [[5, 1]] * 3), alike=1.0)
     assert [(p.left, p.right) for p in pairs] == [(1, 2)]
@@ -102,24 +94,12 @@ def test_each_frame_is_in_one_pair_and_the_most_opposed_comes_first():
 
 def test_all_pairs_are_counted_and_fifty_are_listed():
     data = fake(np.zeros((110, 2)), [LEFT, RIGHT] * 55, [[5, 1]] * 110)
-    summary = summarise_pairs(pairs_of(data, alike=1.0), data, 1.0)
+    summary = summarise_pairs(pairs_of(data, alike=1.0), data)
     assert summary["pairs"] == summary["contradictions"] == 55
     assert len(summary["list"]) == 50
 
 
-def test_a_pair_is_a_fact():
-    pair = Pair(0, 1, 0.5, 0.5, "unknown")
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        pair.kind = "contradiction"
-
-
-def test_one_action_makes_no_pairs():
-    data = fake(np.zeros((5, 2)), [[0, 1, 0]] * 5, [[5, 1]] * 5)
-    assert pairs_of(data, alike=1.0) == []
-    assert summarise_pairs([], data, 1.0)["worst_opposition"] is None
-
-
-def test_one_move_is_the_median_change_within_episodes():
+def test_the_median_change_is_within_episodes():
     # root mean squares of 6, 1, 3 and, in the second episode, 4 and 5; what lies between the two
     # episodes, 90, does not count
     pictures = [[0, 0], [6, 6], [7, 7], [10, 4], [100, 100], [104, 104], [99, 99]]
@@ -128,3 +108,103 @@ def test_one_move_is_the_median_change_within_episodes():
     data.arrays["episode"][4:] = [1, 2, 3]
     assert median_frame_change(data) == pytest.approx(3.0)
     assert median_frame_change(fake([[0]], np.zeros((1, 3)), np.zeros((1, 2)))) == 0.0
+
+
+class Frames(SimpleNamespace):
+    def __len__(self):
+        return len(self.episode)
+
+
+def test_statistics_of_the_data_set_by_hand():
+    certain, torn, toss = [1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [1 / 3] * 3
+    data = Frames(probabilities=np.array([certain, torn, toss], np.float32), episode=[0, 1, 1])
+    data.episode = np.array(data.episode)
+    flights = Frames(
+        episode=np.array([0, 0, 0, 1, 2]),
+        actions=np.array([0, 0, 0, 2, 0]),
+        event=np.array([0, 1, 1, 0, -1], np.int8),
+    )
+    numbers, arrays = dataset_section(SimpleNamespace(dataset=data, flights=flights))
+    found = numbers["dataset"]
+    assert arrays == {}
+    assert (found["frames"], found["episodes"], found["steps"]) == (3, 3, 5)
+    assert found["action_shares"] == [0.8, 0.0, 0.2]
+    assert found["goals_reached"] == 2
+    # an episode counts once: 0, and the mean of log 2 / log 3 and 1
+    assert found["entropy"]["mean"] == pytest.approx((0 + (np.log(2) / np.log(3) + 1) / 2) / 2)
+
+
+F, L, R = 0, 1, 2
+UP, DOWN, TO_LEFT, TO_RIGHT, STAY = range(5)
+
+
+def flights(actions, episode):
+    return RolloutDataset({"actions": np.array(actions, int), "episode": np.array(episode)}, {}, {})
+
+
+def test_loops_by_hand():
+    #         a loop of five    no loop     ends with the episode  two turns: a loop
+    actions = [F, L, R, L, R, L, F, L, L, R, F, L, R, R, L, R, F]
+    data = flights(actions, [0] * 12 + [1] * 5)
+    loops = find_loops(data, MOVES)
+    assert [tuple(loop.values()) for loop in loops] == [(1, 5, 4), (12, 4, 2)]
+    summary = summarise_loops(data, loops)
+    assert (summary["episodes"]["successes"], summary["episodes"]["trials"]) == (2, 2)
+    assert summary["longest"] == 5 and summary["frames_share"] == pytest.approx(9 / 17)
+
+
+def test_episodes_with_a_loop_are_counted_once():
+    data = flights([L, R, L, F, L, R, L, F, F, F], [0] * 8 + [1] * 2)
+    summary = summarise_loops(data, find_loops(data, MOVES))
+    assert summary["loops"] == 2 and summary["frames_share"] == pytest.approx(0.6)
+    assert (summary["episodes"]["successes"], summary["episodes"]["trials"]) == (1, 2)
+    assert summary["list"][1] == {"first": 4, "length": 3, "reversals": 2}
+
+
+def test_loops_with_other_actions():
+    """Up and down go nowhere; up and left is a way; staying is nothing that one can undo."""
+    moves = [
+        UP,
+        DOWN,
+        UP,
+        STAY,
+        UP,
+        TO_LEFT,
+        UP,
+        TO_LEFT,
+        STAY,
+        TO_LEFT,
+        TO_RIGHT,
+        TO_LEFT,
+        TO_RIGHT,
+    ]
+    loops = find_loops(flights(moves, [0] * len(moves)), FIVE)
+    assert [tuple(loop.values()) for loop in loops] == [(0, 3, 2), (9, 4, 3)]
+
+
+def test_a_robustness_evaluation_is_copied():
+    strip = [np.full((5, 16, 3), 7, np.uint8), None, *[np.zeros((5, 16, 3), np.uint8)] * 4]
+    measured = SavedShifts(Path("shifts.json"), {"axes": {"blur": {}}}, {"blur": strip})
+    numbers, arrays = shifts_section(SimpleNamespace(measured=measured))
+    assert numbers == {"shifts": {"axes": {"blur": {}}}}
+    assert arrays["shifts_blur"].shape == (6, 5, 16, 3)
+    assert arrays["shifts_blur"][0].min() == 7 and arrays["shifts_blur"][1].max() == 0
+
+
+def test_a_refused_robustness_evaluation_gives_its_reason():
+    refused = SavedShifts(Path("shifts.json"), None, refused="it is of another task")
+    assert shifts_section(SimpleNamespace(measured=refused)) == (
+        {"shifts": {"refused": "it is of another task"}},
+        {},
+    )
+    assert shifts_section(SimpleNamespace(measured=None)) == ({}, {})
+
+
+def test_the_verdict_does_not_depend_on_earlier_episodes(context):
+    numbers, arrays = evaluation_section(context)
+    again, _ = evaluation_section(context)
+    verdict = numbers["verdict"]
+    assert arrays == {}
+    assert verdict["greedy"]["episodes"] == 6
+    assert verdict["good_share"] == 0.7
+    assert numbers == again

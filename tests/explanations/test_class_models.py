@@ -1,19 +1,26 @@
+"""Observations optimized for each action: ascent, search, and the command."""
+
 import dataclasses
+from types import SimpleNamespace
 
 import pytest
 import torch
 
+import drone_rl
+from drone_rl.explanations.class_model_gallery import GALLERY
 from drone_rl.explanations.class_models import (
     Attempts,
-    ClassModel,
     ClassModelSettings,
     ImageStatistics,
     _Ascent,
     gaussian_blur,
     search,
+    section,
     visualise,
 )
+from drone_rl.explanations.context import LeftOutError
 from drone_rl.policies import MLP
+from drone_rl.utils.errors import InputError
 
 STATISTICS = ImageStatistics(mean=0.0, std=1.0, low=-2.0, high=2.0, roughness=0.5)
 
@@ -31,7 +38,7 @@ def halves():
 
 @pytest.mark.parametrize("parameterisation", ["pixel", "fourier"])
 @pytest.mark.parametrize("objective", ["probability", "logit"])
-def test_pictures_show_what_the_policy_waits_for(halves, parameterisation, objective):
+def test_images_show_what_the_policy_responds_to(halves, parameterisation, objective):
     settings = ClassModelSettings(
         maximize=objective, parameterisation=parameterisation, blur=0.5, steps=64, starts=2
     )
@@ -45,46 +52,13 @@ def test_pictures_show_what_the_policy_waits_for(halves, parameterisation, objec
         torch.testing.assert_close(found.probabilities[action], reached.detach())
 
 
-def test_the_same_seed_gives_the_same_picture_and_the_policy_is_left_alone(halves):
+def test_the_same_seed_gives_the_same_image_and_the_policy_is_unchanged(halves):
     before = {k: v.clone() for k, v in halves.state_dict().items()}
     settings = ClassModelSettings(steps=5, starts=2)
     images = [visualise(halves, STATISTICS, settings, seed=s).images for s in (1, 1, 2)]
     assert torch.equal(images[0], images[1]) and not torch.equal(images[0], images[2])
     assert all(torch.equal(before[k], v) for k, v in halves.state_dict().items())
     assert all(p.grad is None for p in halves.parameters())
-
-
-def test_pictures_keep_to_the_range_of_real_ones(halves):
-    found = visualise(halves, STATISTICS, ClassModelSettings(steps=20, starts=2))
-    assert found.images.min() >= STATISTICS.low and found.images.max() <= STATISTICS.high
-
-
-def made(probabilities, roughness, value):
-    """What a setting made of two starts, for two actions; the images' pixels number them."""
-    images = value + torch.arange(4.0).view(2, 2, 1, 1, 1)
-    settings = ClassModelSettings(starts=2)
-    return Attempts(images, torch.tensor(probabilities), torch.tensor(roughness), settings)
-
-
-def test_picture_is_the_best_starts_never_an_average():
-    tried = [
-        made([[0.2, 0.7], [0.1, 0.3]], [[0.1, 1.0], [1.0, 1.0]], 0),
-        made([[0.6, 0.1], [0.4, 0.2]], [[1.0, 1.0], [1.0, 2.0]], 10),
-    ]
-    found = ClassModel(tried)
-    assert found.images.flatten().tolist() == [1.0, 12.0]
-    summary = found.summary()
-    assert summary["probabilities"] == summary["highest"] == pytest.approx([0.7, 0.4])
-    assert summary["roughness"] == [1.0, 1.0]
-    assert (summary["starts"], summary["num_settings"]) == (2, 2)
-    assert summary["starts_above_half"] == [2, 0]  # of four attempts: 0.7 and 0.6; none
-    assert [row["chosen"] for row in summary["tried"]] == [[0], [1]]
-    assert summary["tried"][0]["probabilities"] == pytest.approx([0.7, 0.3])
-    assert summary["tried"][1]["roughness"] == [1.0, 1.0]
-    assert summary["tried"][1]["each_start"] == [
-        pytest.approx([0.6, 0.1]),
-        pytest.approx([0.4, 0.2]),
-    ]
 
 
 def test_best_start_is_the_most_probable_then_the_smoothest():
@@ -94,45 +68,17 @@ def test_best_start_is_the_most_probable_then_the_smoothest():
     assert found.best() == [1, 0, 1]  # within a hundredth: the smoother
 
 
-def test_a_search_that_fails_for_one_action_says_so():
+def test_an_action_that_no_image_reaches_has_a_low_probability():
     """Action 1 can't win: its logit is far below. Its picture is still the best there is."""
     network = MLP((1, 6, 12), 3, hidden=())
     with torch.no_grad():
         network.layers.logits.bias.copy_(torch.tensor([0.0, -20.0, 0.0]))
     summary = search(network, STATISTICS).summary()
-    assert summary["highest"][1] < 0.01 and summary["starts_above_half"][1] == 0
-    assert summary["highest"][0] > 0.5 and summary["starts_above_half"][0] > 0
+    assert summary["highest"][1] < 0.01 and summary["highest"][0] > 0.5
+    assert len(summary["tried"]) == summary["num_settings"] == 6
 
 
-def test_one_start_that_succeeds_is_not_drowned_by_those_that_fail():
-    """The mean of a picture and of its opposite is flat; the best of them is not."""
-    found = made([[0.9, 0.0], [0.0, 0.9]], [[1.0, 1.0], [1.0, 1.0]], 0)
-    assert found.best() == [0, 1]
-
-
-def test_a_search_notes_everything_it_tried(halves):
-    found = search(halves, STATISTICS, seed=4)
-    summary = found.summary()
-    assert len(summary["tried"]) == summary["num_settings"] == 6 and summary["starts"] == 8
-    assert {(r["parameterisation"], r["blur"]) for r in summary["tried"]} == {
-        (p, b) for p in ("pixel", "fourier") for b in (0.5, 0.9, 1.4)
-    }
-    assert sorted(a for row in summary["tried"] for a in row["chosen"]) == [0, 1, 2]
-    for action in range(3):
-        every = [p for row in summary["tried"] for p in row["each_start"][action]]
-        assert summary["highest"][action] == max(every)
-        assert summary["starts_above_half"][action] == sum(p > 0.5 for p in every)
-        assert max(every) - 0.01 <= summary["probabilities"][action] <= max(every)
-        row = next(row for row in summary["tried"] if action in row["chosen"])
-        assert row["probabilities"][action] == summary["probabilities"][action]
-        assert row["roughness"][action] == summary["roughness"][action]
-    reached = halves(found.images).softmax(-1).diagonal().tolist()
-    assert reached == pytest.approx(summary["probabilities"], abs=1e-5)
-    again = visualise(halves, STATISTICS, found.tried[0].settings, seed=4)
-    assert torch.equal(again.images, found.tried[0].images)
-
-
-def test_roughness_is_that_of_neighbours_over_the_data_sets():
+def test_statistics_by_hand():
     """Columns 0 1 0 1: neighbours across differ by 1, those down by 0; the data set's by 2."""
     stripes = torch.tensor([0.0, 1.0]).repeat(3).expand(1, 1, 4, 6)
     statistics = ImageStatistics.of(2 * stripes)
@@ -185,18 +131,9 @@ def test_a_step_on_the_pixels_by_hand(halves, unrefined):
     gradient[:, :6], gradient[:, 6:] = -0.2 + 0.2 / 3, 0.2 / 3
     expected = PLAIN.lr * WIDE.std / 10 * gradient / gradient.norm()
     torch.testing.assert_close(found[0, 0], expected)
-    twice = ClassModelSettings(steps=2, lr=5.0, jitter=0)
-    found = _Ascent(halves, torch.tensor([1]), WIDE, twice, torch.Generator()).pixels(start)
-    torch.testing.assert_close(found[0, 0], expected / 2)
-
-
-def test_fourier_starts_from_faint_noise_around_the_mean(unrefined):
-    start = torch.rand(2, 1, 6, 12, generator=torch.Generator().manual_seed(0))
-    still = dataclasses.replace(PLAIN, lr=1e-12)
-    network = constant(0.0, 0.0, 0.0)
-    ascent = _Ascent(network, torch.tensor([0, 1]), WIDE, still, torch.Generator())
-    found = ascent.fourier(start)
-    torch.testing.assert_close(found, WIDE.mean + 0.1 * (start - start.mean()))
+    plain = PLAIN.replace(step="plain", lr=3.0)
+    found = _Ascent(halves, torch.tensor([1]), WIDE, plain, torch.Generator()).pixels(start)
+    torch.testing.assert_close(found[0, 0], 3.0 * gradient)
 
 
 def test_a_step_on_fourier_coefficients_is_longer_where_the_frequency_is_low(unrefined):
@@ -236,24 +173,7 @@ def test_refined_images_have_the_data_sets_mean_deviation_and_range():
     torch.testing.assert_close(refined[0], 0.3 + 2 * deviation[0])
 
 
-def test_jitter_shifts_by_up_to_its_reach_with_edges_repeated():
-    images = torch.arange(30.0).view(1, 1, 5, 6)
-    rows, columns = torch.arange(5), torch.arange(6)
-    shifts = {
-        (down, across): images[..., (rows + down).clamp(0, 4), :][
-            ..., (columns + across).clamp(0, 5)
-        ]
-        for down in (-1, 0, 1)
-        for across in (-1, 0, 1)
-    }
-    generator, seen = torch.Generator().manual_seed(0), set()
-    for _ in range(80):
-        found = _Ascent(None, None, WIDE, ClassModelSettings(jitter=1), generator).jitter(images)
-        seen |= {shift for shift, picture in shifts.items() if torch.equal(picture, found)}
-    assert seen == set(shifts)
-
-
-def test_a_blur_keeps_flat_pictures_and_their_mean():
+def test_blur_by_hand():
     flat = torch.full((1, 2, 5, 5), 3.0)
     torch.testing.assert_close(gaussian_blur(flat, 1.0), flat)
     spot = torch.zeros(1, 1, 9, 9)
@@ -267,30 +187,6 @@ def test_a_blur_keeps_flat_pictures_and_their_mean():
     two = torch.cat([spot, 2 * spot], 1)
     torch.testing.assert_close(gaussian_blur(two, 0.8), torch.cat([blurred, 2 * blurred], 1))
     assert gaussian_blur(spot, 0.1)[0, 0, 4, 4] == pytest.approx(1.0)
-
-
-def test_starts_are_anywhere_between_the_darkest_and_the_brightest(unrefined):
-    statistics = ImageStatistics(mean=3.0, std=1.0, low=1.0, high=5.0, roughness=0.5)
-    still = dataclasses.replace(PLAIN, lr=1e-12, starts=8)
-    found = visualise(constant(0.0, 0.0, 0.0), statistics, still).images
-    assert 1.0 <= found.min() < 1.1 and 4.9 < found.max() <= 5.0
-    assert abs(float(found.mean()) - 3.0) < 0.2
-    assert torch.equal(found[0], found[1])  # the same for each action
-
-
-def test_of_pictures_without_any_difference_the_roughness_is_large_and_finite():
-    statistics = dataclasses.replace(WIDE, roughness=0.0)
-    found = visualise(constant(0.0, 0.0, 0.0), statistics, dataclasses.replace(PLAIN, starts=2))
-    assert torch.isfinite(found.roughness).all() and found.roughness.min() > 1e9
-
-
-def test_a_plain_step_is_the_rate_times_the_gradient(halves, unrefined):
-    plain = PLAIN.replace(step="plain", lr=3.0)
-    start = torch.zeros(1, 1, 6, 12)
-    found = _Ascent(halves, torch.tensor([1]), WIDE, plain, torch.Generator()).pixels(start)
-    gradient = torch.zeros(6, 12)
-    gradient[:, :6], gradient[:, 6:] = -0.2 + 0.2 / 3, 0.2 / 3
-    torch.testing.assert_close(found[0, 0], 3.0 * gradient)
 
 
 def test_squared_pixels_are_subtracted_from_the_objective():
@@ -323,3 +219,41 @@ def test_a_constant_start_is_the_mean_pixel():
     settings = settings.replace(normalize="none", blur=0.0, clamp=False)
     found = visualise(constant(0.0, 0.0, 0.0), WIDE, settings)
     torch.testing.assert_close(found.images, torch.full((3, 2, 1, 6, 12), WIDE.mean))
+
+
+def test_without_gradients_they_are_left_out():
+    network = SimpleNamespace(is_differentiable=False)
+    with pytest.raises(LeftOutError, match="this policy has none; give it as a PyTorch function"):
+        section(SimpleNamespace(network=network))
+
+
+@pytest.fixture(scope="module")
+def found():
+    return drone_rl.class_models("good", steps=4, starts=2, episodes=2, seed=0)
+
+
+def test_the_result_has_a_row_of_probabilities(found):
+    header, row = found.rows()
+    assert header == ["settings", "left", "forward", "right"]
+    assert row[0] == "given settings" and all(0 <= float(cell) <= 1 for cell in row[1:])
+    assert "left" in str(found) and "seed 0" in str(found)
+    assert "<img" in found._repr_html_()
+
+
+def test_gallery_shows_each_refinement():
+    found = drone_rl.class_models("poor", gallery=True, episodes=2, seed=0)
+    assert list(found.tried) == list(GALLERY)
+    first, *_, last = found.tried.values()
+    assert first.settings.maximize == "probability" and first.settings.blur == 0.0
+    assert last.settings == drone_rl.ClassModelsSettings().as_base(type(last.settings))
+    failed = "defaults: no image found makes forward or right more probable than not"
+    assert failed in str(found) and failed in found._repr_html_()
+    width, height = found.image().size
+    assert height > len(GALLERY) * 25 and width > 3 * 64
+
+
+def test_images_that_diverge_are_an_error():
+    with pytest.raises(InputError, match="lr=1e\\+09 the images diverge"):
+        drone_rl.class_models(
+            "good", step="plain", lr=1e9, clamp=False, normalize="none", l2=1.0, episodes=1, seed=0
+        )

@@ -1,14 +1,21 @@
+"""t-SNE and its measures of faithfulness."""
+
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from openTSNE.affinity import PerplexityBasedNN
 
 from drone_rl.explanations.context import LeftOutError
-from drone_rl.explanations.embedding import section
+from drone_rl.explanations.embedding import embed, faithfulness, section
+from drone_rl.explanations.report.embedding import snap_to_grid
 from drone_rl.explanations.settings import ExplainSettings
+from drone_rl.utils.errors import InputError
 
 
-def test_features_and_pixels_are_embedded_each_by_itself():
+def test_features_and_pixels_are_embedded():
     rng = np.random.default_rng(0)
     data = SimpleNamespace(
         features={"fc1": rng.normal(size=(40, 8)).astype(np.float32)},
@@ -36,3 +43,124 @@ def test_without_layers_it_is_left_out():
         LeftOutError, match="no layers of this policy are known; give it as a torch"
     ):
         section(SimpleNamespace(layer=None))
+
+
+@pytest.fixture(scope="module")
+def clusters():
+    rng = np.random.default_rng(0)
+    centres = rng.normal(0, 10, (3, 20))
+    return np.concatenate([c + rng.normal(0, 0.5, (40, 20)) for c in centres])
+
+
+@pytest.fixture(scope="module")
+def embedding(clusters):
+    return embed(clusters, perplexity=10, seed=1)
+
+
+def test_clusters_stay_together(embedding):
+    groups = embedding[0].reshape(3, 40, 2)
+    spread = max(group.std(0).max() for group in groups)
+    centres = groups.mean(1)
+    apart = min(np.linalg.norm(centres[i] - centres[j]) for i, j in ((0, 1), (0, 2), (1, 2)))
+    assert apart > 3 * spread
+    faithful = embedding[1]
+    assert faithful["trustworthiness"] > 0.9
+    assert faithful["neighbours_kept"] > 3 * faithful["neighbours_chance"]
+    assert faithful["neighbours_chance"] == pytest.approx(10 / 119)
+
+
+@pytest.mark.parametrize(("kernel", "other"), [("gaussian", "student"), ("student", "gaussian")])
+def test_each_kernel_ends_where_its_own_gradient_vanishes(kernel, other):
+    """The gradient of KL(P, Q), by Eq. 17's exp(-d²) and by t-SNE's 1 / (1 + d²)."""
+    rng = np.random.default_rng(0)
+    originals = rng.normal(size=(60, 4))
+    p = PerplexityBasedNN(originals, perplexity=10, method="exact").P.toarray()
+    points = embed(originals, perplexity=10, seed=1, kernel=kernel)[0]
+
+    def gradient(name):
+        offsets = points[:, None] - points[None]
+        squares = (offsets**2).sum(-1)
+        similar = np.exp(-squares) if name == "gaussian" else 1 / (1 + squares)
+        np.fill_diagonal(similar, 0.0)
+        pull = similar if name == "student" else 1.0
+        forces = (p - similar / similar.sum()) * pull
+        return np.abs((forces[..., None] * offsets).sum(1)).max()
+
+    assert gradient(kernel) < 0.1 * gradient(other)
+
+
+def test_the_same_seed_gives_the_same_map(clusters, embedding):
+    again = embed(clusters, perplexity=10, seed=1)
+    np.testing.assert_array_equal(again[0], embedding[0])
+
+
+def test_faithfulness_of_a_perfect_and_of_a_reversed_order():
+    line = np.arange(9.0)[:, None]
+    perfect = faithfulness(line, np.hstack([line, line]), k=2)
+    assert (perfect["trustworthiness"], perfect["neighbours_kept"]) == (1.0, 1.0)
+    shuffled = line[[0, 5, 1, 6, 2, 7, 3, 8, 4]]
+    found = faithfulness(line, np.hstack([shuffled, shuffled]), k=2)
+    assert found["trustworthiness"] < 0.75 and found["neighbours_kept"] < 0.2
+
+
+def test_faithfulness_by_hand():
+    """Points 0 1 3 7 15 are drawn at 0 10 1 13 15; k = 2, so every rank beyond 2 is a stranger's.
+
+    Ranks of the two drawn nearest: of 0, those of 3 and 1 (2, 1); of 1, those of 7 and 15 (3, 4);
+    of 3, those of 0 and 1 (2, 1); of 7, those of 15 and 1 (4, 2); of 15, those of 7 and 1 (1, 3).
+    (From 3, 0 and 1 and 7 are 3, 2 and 4 away; from 7, 3 is 4, 1 is 6, 0 is 7, 15 is 8 away.)
+    """
+    line = np.array([0.0, 1, 3, 7, 15])[:, None]
+    drawn = np.array([0.0, 10, 1, 13, 15])[:, None] * (1, 0)
+    found = faithfulness(line, drawn, k=2)
+    assert found["neighbours"] == 2 and found["neighbours_chance"] == pytest.approx(2 / 4)
+    assert found["neighbours_kept"] == pytest.approx(6 / 10)
+    # beyond 2: 1 + 2 of point 1, 2 of point 7, 1 of point 15; at worst 5 * 2 * (10 - 6 - 1) / 2
+    assert found["trustworthiness"] == pytest.approx(1 - 6 / 15)
+
+
+def test_equal_points_are_all_neighbours():
+    """A dead layer: whatever is drawn is faithful, and so is a random placement."""
+    rng = np.random.default_rng(0)
+    found = faithfulness(np.full((50, 7), 0.1), rng.normal(size=(50, 2)))
+    assert (found["trustworthiness"], found["neighbours_kept"], found["neighbours_chance"]) == (
+        1,
+        1,
+        1,
+    )
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(-100, 100), st.floats(0.01, 100))
+@settings(max_examples=25, deadline=None)
+def test_faithfulness_is_invariant_to_shift_and_scale(seed, shift, unit):
+    rng = np.random.default_rng(seed)
+    originals, points = rng.normal(size=(30, 3)), rng.normal(size=(30, 2))
+    plain = faithfulness(originals, points)
+    assert faithfulness(shift + unit * originals, shift - unit * points) == plain
+    assert 0 <= plain["trustworthiness"] <= 1
+
+
+def test_features_that_are_not_finite_are_refused():
+    with pytest.raises(InputError, match="not finite"):
+        embed(np.full((40, 3), np.nan), perplexity=5)
+
+
+def test_perplexity_that_does_not_fit_is_refused(clusters):
+    with pytest.raises(InputError, match=r"perplexity=50 does not fit 120 points; give 1 to 39"):
+        embed(clusters, perplexity=50)
+
+
+def test_cells_are_spread_over_all_rows_and_columns():
+    points = np.array([[0.0, 0.0], [0.0, 0.65], [1.0, 1.0]])
+    assert snap_to_grid(points, columns=2, rows=4).tolist() == [[0, 0], [0, 2], [1, 3]]
+    assert snap_to_grid(points[:, ::-1], columns=4, rows=2).tolist() == [
+        [0, 0],
+        [2, 0],
+        [3, 1],
+    ]
+
+
+def test_features_of_one_dimension_are_embedded():
+    points, found = embed(np.linspace(0.0, 1.0, 40)[:, None], perplexity=5)
+    assert points.shape == (40, 2)
+    assert found["neighbours_kept"] > 2 * found["neighbours_chance"]

@@ -1,31 +1,36 @@
-"""Explanations in Python; what they hold is tested in tests/explain."""
+"""Explanations from Python: policies, settings, sections, and the files."""
 
 import dataclasses
+import json
 from pathlib import Path
 
+import numpy as np
 import pytest
+import torch
 
 import drone_rl
+from drone_rl.config import TaskSettings
+from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
 from drone_rl.explanations import explain as explaining
-from drone_rl.explanations.explain import Explanations, _named
+from drone_rl.explanations.context import Context, LeftOutError
+from drone_rl.explanations.explain import Explanations, _named, explain_policy
+from drone_rl.explanations.settings import ExplainSettings
+from drone_rl.policies import MLP
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import RootSeed
+from tests.explanations.quick import ALL_SECTIONS, quick
+from tests.second_task import NUM_POSTS, Posts
 
 SEED = RootSeed(6, is_fixed=False)
 
 
-def test_policies_of_the_same_name_go_by_their_files():
+def test_policies_of_the_same_name_are_named_by_their_files():
     good = drone_rl.load_policy("good")
     other = dataclasses.replace(good, path=Path("elsewhere.safetensors"))
     assert list(_named([good, "poor"], "outputs")) == ["good", "poor"]
     assert list(_named(good, "outputs")) == ["good"]
     assert list(_named([good, other], "outputs")) == [str(good.path), "elsewhere.safetensors"]
-
-
-def test_trained_policies_are_found_in_the_folder_of_outputs(tmp_path):
-    with pytest.raises(InputError, match=f"{tmp_path}"):
-        _named("latest", tmp_path)
 
 
 @pytest.mark.parametrize("policies", [[], ["good", "good"]])
@@ -38,7 +43,7 @@ def test_each_policy_is_explained_once(policies):
     ("change", "message"),
     [
         ({"frames": 3}, "frames=3 is less than one for each episode"),
-        ({"frames": "x"}, "frames='x' is a text"),
+        ({"frames": "x"}, "frames='x'"),
         ({"perplexity": 500}, "perplexity=500 does not fit"),
         ({"num_envs": 0}, "num_envs=0"),
         ({"wind": 0}, "wind is unknown"),
@@ -70,18 +75,7 @@ def test_all_policies_are_explained_from_one_fresh_seed(tmp_path, monkeypatch):
     assert one[2] == again[2] != other[2]
 
 
-def test_each_report_has_a_folder_of_its_own_and_its_path_is_printed(tmp_path, monkeypatch):
-    verdict = {"kind": "good", "certain": True, "sentence": "It does."}
-    monkeypatch.setattr(explaining, "explain_policy", lambda *_, **__: {"verdict": verdict})
-    monkeypatch.setattr(explaining, "write_report", lambda _, folder: folder / "report.html")
-    how = {"outputs": tmp_path, "num_envs": 2, "progress": silent}
-    first, second = (drone_rl.explain("good", **how) for _ in range(2))
-    assert first.folder.parent == second.folder.parent == tmp_path / "explain" / "runs"
-    assert first.folder != second.folder
-    assert f"report: {first.folder}/report.html" in str(first).splitlines()
-
-
-def test_they_show_their_report(tmp_path):
+def test_the_result_prints_verdict_and_report(tmp_path):
     (tmp_path / "report.html").write_text("<h1>trusted?</h1>")
     verdict = {"kind": "good", "certain": False, "sentence": "It does."}
     shown = Explanations(tmp_path, tmp_path / "report.html", {"x": {"verdict": verdict}}, SEED)
@@ -94,3 +88,105 @@ def test_they_show_their_report(tmp_path):
     assert shown._repr_html_().startswith(
         '<iframe sandbox="allow-scripts" srcdoc="&lt;h1&gt;trusted?'
     )
+
+
+SMALL = ExplainSettings(frames=40, episodes=6, perplexity=5, seed=3)
+
+
+def explain(env, network, folder, settings=SMALL, **kwargs):
+    origin = {"policy": "a test", "trained": {}}
+    with quick():
+        return explain_policy(
+            env, network, folder, settings, name="test", provenance=origin, **kwargs
+        )
+
+
+def test_the_order_of_sections_changes_no_result(make_pipeline, tmp_path):
+    names, contents = ["dataset", "evaluation", "response", "flaws", "attribution"], []
+    for order in (names, names[::-1]):
+        env, actor = make_pipeline(num_envs=30, seed=2, task=TaskSettings(num_cubes=1))
+        network, folder = actor.module[0].module, tmp_path / order[0]
+        explain(env, network, folder, sections={name: ALL_SECTIONS[name] for name in order})
+        numbers = json.loads((folder / "explanation.json").read_text())
+        del numbers["seconds"], numbers["date"]
+        with np.load(folder / "arrays.npz") as arrays:
+            contents.append((numbers, dict(arrays)))
+        assert sum(len(m._forward_hooks) for m in network.modules()) == 0
+    (numbers, arrays), (again, same) = contents
+    assert numbers == again
+    assert arrays.keys() == same.keys()
+    assert all(np.array_equal(arrays[key], same[key], equal_nan=True) for key in arrays)
+    assert numbers["dataset"]["episodes"] == numbers["loops"]["episodes"]["trials"] == 30
+
+
+def test_a_section_that_fails_is_left_out_with_the_reason(make_pipeline, tmp_path):
+    env, actor = make_pipeline(num_envs=30, task=TaskSettings(num_cubes=1))
+
+    def fails(context):
+        raise LeftOutError("It has no eyes.")
+
+    sections = {"eyes": fails, "dataset": ALL_SECTIONS["dataset"]}
+    numbers = explain(env, actor.module[0].module, tmp_path, sections=sections)
+    assert numbers["left_out"] == {"eyes": "It has no eyes."}
+    assert numbers["dataset"]["frames"] == SMALL.frames and "eyes" not in numbers["seconds"]
+    del sections["eyes"]
+    assert "left_out" not in explain(env, actor.module[0].module, tmp_path, sections=sections)
+
+
+def test_sections_in_a_thread_get_a_copy_of_the_network(make_pipeline, tmp_path):
+    env, actor = make_pipeline(num_envs=6)
+    network, met = actor.module[0].module, {}
+
+    def meet(name):
+        def section(context):
+            met[name] = context.network
+            return {name: 1}, {}
+
+        return section
+
+    sections = {"flaws": meet("flaws"), "truth": meet("truth")}
+    written = explain(env, network, tmp_path, sections=sections)
+    assert met["truth"] is network and met["flaws"] is not network
+    assert [*written["seconds"]] == [k for k in written if k in sections] == [*sections]
+
+
+def test_an_unknown_layer_is_refused_before_any_work(make_pipeline, tmp_path):
+    env, actor = make_pipeline()
+    settings = ExplainSettings(frames=60, perplexity=5, layer="conv7")
+    with pytest.raises(InputError, match=r"layer=conv7 .* choose from: conv1"):
+        explain(env, actor.module[0].module, tmp_path / "x", settings)
+    assert not (tmp_path / "x").exists()
+
+
+@pytest.fixture
+def posts():
+    env = with_transforms(DroneEnv(6, Posts(), seed=2), [GrayPixels(), StandardizePixels()])
+    generator = torch.Generator().manual_seed(0)
+    network = MLP((1, 25, 64), 3, hidden=(8,), generator=generator)
+    with torch.no_grad():  # mostly forward, or no post is ever passed
+        network.layers.logits.bias.copy_(torch.tensor([2.0, 0.0, 0.0]))
+    yield Context(env, network, ExplainSettings(frames=40, episodes=12, perplexity=5))
+    env.close()
+
+
+def test_frames_of_another_task_are_recorded(posts):
+    data = posts.dataset
+    assert {"posts", "next_target"} < set(data.arrays) and "cubes" not in data.arrays
+    state = data.state(posts.scenes.task)
+    again = posts.scenes.frames(state).numpy()
+    np.testing.assert_array_equal(again, data.frames)  # the recalled worlds look as they did
+    assert data.offset(posts.scenes.task).shape == (40, 2)
+    assert data.next_target.max() <= NUM_POSTS
+
+
+def test_all_sections_work_with_another_task(posts, tmp_path):
+    """Nothing of an explanation needs cubes, only targets."""
+    with quick():
+        numbers = explain_policy(
+            posts.env, posts.network, tmp_path, posts.settings, name="posts", provenance={}
+        )
+    assert numbers["verdict"]["num_cubes"] == NUM_POSTS
+    assert [row["side"] for row in numbers["response"]["rows"]] == ["left", "right"]
+    assert set(numbers["truth"]["outcomes"]["collected"]) == {
+        "as it was", "moved left", "moved right",
+    }  # fmt: skip

@@ -1,9 +1,17 @@
-import math
+"""Heat maps, and the layers of networks."""
 
 import pytest
 import torch
+from torch import nn
 
 from drone_rl.explanations.heat_maps import Explainer
+from drone_rl.explanations.hooks import (
+    feature_layer,
+    features,
+    find_layer,
+    layers,
+    spatial_layers,
+)
 from drone_rl.policies import MLP, ExternalNetwork
 from drone_rl.sim.actions import MOVES
 from drone_rl.utils.errors import InputError
@@ -24,13 +32,6 @@ def frames(dataset):
     return dataset.tensor("observations")[:6], dataset.tensor("actions")[:6]
 
 
-def test_grad_cam_of_two_by_two_maps_by_hand():
-    activations = torch.tensor([[[[1.0, 2.0], [0.0, 4.0]], [[1.0, 1.0], [2.0, 0.0]]]])
-    gradients = torch.tensor([[[[1.0, 1.0], [1.0, 1.0]], [[-2.0, -2.0], [-2.0, -2.0]]]])
-    # weights 1 and -2: 1 - 2, 2 - 2, 0 - 4, 4 - 0, then ReLU
-    assert grad_cam(activations, gradients).tolist() == [[[0.0, 0.0], [0.0, 4.0]]]
-
-
 @pytest.mark.parametrize("objective", ["probability", "logit"])
 def test_grad_cam_against_written_out_derivatives(explainer, frames, objective):
     x, actions = frames
@@ -44,7 +45,7 @@ def test_grad_cam_against_written_out_derivatives(explainer, frames, objective):
     torch.testing.assert_close(explainer.grad_cam(x, actions, objective), expected)
 
 
-def test_all_methods_give_maps_of_the_pictures_size_and_leave_no_hook(explainer, frames):
+def test_maps_have_the_size_of_observations_and_leave_no_hook(explainer, frames):
     network = explainer.network
     for name, method in explainer.methods().items():
         maps = method(*frames)
@@ -54,7 +55,7 @@ def test_all_methods_give_maps_of_the_pictures_size_and_leave_no_hook(explainer,
     assert all(p.grad is None for p in network.parameters())
 
 
-def test_what_has_no_gradients_has_but_occlusion(explainer, frames):
+def test_without_gradients_only_occlusion_is_left(explainer, frames):
     network = ExternalNetwork(torch.no_grad()(explainer.network), (1, 25, 64), MOVES)
     other = Explainer(network, explainer.absent)
     assert list(other.methods()) == ["occlusion"]
@@ -68,7 +69,7 @@ def test_what_has_no_gradients_has_but_occlusion(explainer, frames):
         torch.testing.assert_close(method(*frames), explainer.methods()[name](*frames))
 
 
-def test_integrated_gradients_add_up_to_the_change_of_a_linear_policy():
+def test_integrated_gradients_of_a_linear_policy():
     network = MLP((1, 2, 2), 2, hidden=())
     explainer = Explainer(network, torch.zeros(1, 2, 2))
     explainer._forward = lambda *_: network  # a linear function: the sum is exact
@@ -78,48 +79,11 @@ def test_integrated_gradients_add_up_to_the_change_of_a_linear_policy():
     torch.testing.assert_close(maps[0], expected)
 
 
-def test_a_policy_without_convolutions_has_the_other_methods():
-    explainer = Explainer(MLP((1, 8, 8), 3), torch.zeros(1, 8, 8))
-    assert "grad_cam" not in explainer.methods()
-    assert explainer.methods()["occlusion"](torch.rand(2, 1, 8, 8), torch.tensor([0, 1])).any()
-    with pytest.raises(InputError, match="needs a convolution"):
-        explainer.grad_cam(torch.rand(2, 1, 8, 8), torch.tensor([0, 1]))
-
-
 def test_a_layer_without_a_feature_map_is_refused(world):
     with pytest.raises(InputError, match=r"layer=fc1 has no feature map; those that do: relu1"):
         Explainer(world[2], torch.zeros(1, 25, 64), "fc1")
     with pytest.raises(InputError, match=r"layer=nope is not in the policy"):
         Explainer(world[2], torch.zeros(1, 25, 64), "nope")
-
-
-def test_integrated_gradients_add_up_to_the_change_in_probability(explainer, frames):
-    assert explainer.completeness_error(*frames).max() < 1e-3
-
-
-def test_the_completeness_error_is_what_a_coarse_integral_misses(monkeypatch):
-    network = MLP((1, 1, 1), 2, hidden=())
-    with torch.no_grad():
-        network.layers.logits.weight.copy_(torch.tensor([[0.0], [8.0]]))
-        network.layers.logits.bias.copy_(torch.tensor([0.0, -4.0]))
-    explainer = Explainer(network, torch.zeros(1, 1, 1))
-    x, a = torch.ones(1, 1, 1, 1), torch.tensor([1])
-    assert explainer.completeness_error(x, a).item() < 1e-3
-    monkeypatch.setattr("drone_rl.explanations.heat_maps.INTEGRATION_STEPS", 2)
-    # two steps, at odds of e^-2 and e^2, where the derivative is 8 p (1 - p); all from e^-4 to e^4
-    p, all_of_it = 1 / (1 + math.exp(-2)), math.tanh(2)
-    expected = all_of_it - 8 * p * (1 - p)
-    assert explainer.completeness_error(x, a).item() == pytest.approx(expected, abs=1e-5)
-
-
-def test_channels_that_cancel_out_leave_no_integrated_gradient():
-    network = MLP((2, 1, 1), 2, hidden=())
-    with torch.no_grad():
-        network.layers.logits.weight.copy_(torch.tensor([[0.0, 0.0], [1.0, -1.0]]))
-    explainer = Explainer(network, torch.zeros(2, 1, 1))
-    x, a = torch.ones(1, 2, 1, 1), torch.tensor([1])
-    assert explainer.integrated_gradients(x, a).item() == pytest.approx(0.0, abs=1e-7)
-    assert explainer.saliency(x, a).item() == pytest.approx(0.5)  # two derivatives of 1/4
 
 
 def test_occlusion_by_hand():
@@ -135,3 +99,84 @@ def test_occlusion_by_hand():
     expected = change * torch.tensor([1, 1 / 2, 1 / 3, 0, 0, 0])
     torch.testing.assert_close(found, expected.expand(3, 6))
     assert explainer.occlusion(torch.zeros(1, 1, 3, 6), torch.tensor([1])).max() == 0
+
+
+def num_hooks(network):
+    return sum(len(m._forward_hooks) + len(m._backward_hooks) for m in network.modules())
+
+
+def test_features_are_outputs_of_layers(world):
+    network, x = world[2], torch.randn(5, 1, 25, 64)
+    found = features(network, x, "relu1")
+    torch.testing.assert_close(found, network.layers.conv1(x).relu())
+    assert num_hooks(network) == 0
+
+
+def test_unknown_layer_lists_those_that_exist(world):
+    with pytest.raises(InputError, match=r"layer=conv9 .* choose from: conv1, relu1, flatten"):
+        find_layer(world[2], "conv9")
+
+
+def test_layers_of_networks_with_and_without_convolutions(world):
+    assert spatial_layers(world[2]) == ["relu1"]
+    assert feature_layer(world[2]) == "fc_relu1"
+    mlp = MLP((1, 4, 4), 3, hidden=(5,))
+    assert spatial_layers(mlp) == []
+    assert [*layers(mlp)] == ["flatten", "fc1", "fc_relu1", "logits"]
+
+
+class ThirdParty(nn.Module):
+    """Layers in modules of modules, one twice, one never, and one whose output is no tensor."""
+
+    def __init__(self):
+        super().__init__()
+        self.head = nn.ModuleDict({"last": nn.Linear(6, 3), "before": nn.Linear(40, 6)})
+        self.body = nn.Sequential(nn.Conv2d(1, 2, 3, padding=1), nn.ReLU(), nn.Conv2d(2, 2, 2, 2))
+        self.nothing = nn.Sequential()
+        self.twice, self.never, self.memory = nn.Tanh(), nn.Linear(1, 1), nn.LSTM(1, 1)
+
+    def forward(self, x):
+        self.memory(x.new_zeros(1, 1))
+        x = self.nothing(self.twice(self.body(x)).flatten(1))
+        return self.twice(self.head["last"](self.head["before"](x)))
+
+
+@pytest.fixture
+def third_party():
+    return ExternalNetwork(ThirdParty(), (1, 8, 10), MOVES)
+
+
+def test_layers_of_third_party_networks_are_in_the_order_of_the_forward_pass(third_party):
+    assert [*layers(third_party)] == ["body.0", "body.1", "body.2", "head.before", "head.last"]
+    assert spatial_layers(third_party) == ["body.1", "body.2"]  # what follows the second acts twice
+    assert feature_layer(third_party) == "head.before"
+    assert num_hooks(third_party) == 0
+    x = torch.randn(5, 1, 8, 10)
+    body = third_party.parts.body
+    torch.testing.assert_close(features(third_party, x, "body.1"), body[1](body[0](x)))
+
+
+def test_a_function_has_no_layers():
+    network = ExternalNetwork(lambda x: x.flatten(1)[:, :3], (1, 8, 10), MOVES)
+    assert ([*layers(network)], spatial_layers(network), feature_layer(network)) == ([], [], None)
+    with pytest.raises(InputError, match="from: none"):
+        find_layer(network, "conv1")
+    one = ExternalNetwork(nn.Sequential(nn.Flatten(), nn.Linear(80, 3)), (1, 8, 10), MOVES)
+    assert feature_layer(one) == "0"
+
+
+class TwoConvolutions(nn.Module):
+    """Convolutions of one shape, with an activation that is a function."""
+
+    def __init__(self):
+        super().__init__()
+        self.a, self.b = nn.Conv2d(1, 2, 3, padding=1), nn.Conv2d(2, 2, 3, padding=1)
+        self.last = nn.Linear(160, 3)
+
+    def forward(self, x):
+        return self.last(self.b(self.a(x).relu()).relu().flatten(1))
+
+
+def test_successive_convolutions_are_separate_layers():
+    network = ExternalNetwork(TwoConvolutions(), (1, 8, 10), MOVES)
+    assert spatial_layers(network) == ["a", "b"]

@@ -18,7 +18,7 @@ from drone_rl.verification.prover.cube_images import camera_ahead
 from tests.five_actions import FIVE
 
 
-def test_a_map_of_near_places_is_that_of_the_policys_own_pictures(context, monkeypatch):
+def test_the_exact_map_is_that_of_rendered_observations(context, monkeypatch):
     small = PlacesSettings(farthest=3.5, sideways=3.0)
     monkeypatch.setattr(places_section, "PlacesSettings", lambda: small)
     numbers, arrays = places_section.places_section(context)
@@ -34,7 +34,7 @@ def test_a_map_of_near_places_is_that_of_the_policys_own_pictures(context, monke
     assert found.at(where).tolist() == taken.tolist()
 
 
-def test_why_there_is_none(context):
+def test_reasons_for_no_exact_map(context):
     scenes = context.scenes
 
     def refused(**changes):
@@ -62,7 +62,7 @@ def test_why_there_is_none(context):
         (AppearanceSettings(ground_color=((0.4,) * 3, (0.6,) * 3)), []),
     ],
 )
-def test_there_is_none_where_a_place_has_several_images(look, faults, monkeypatch):
+def test_there_is_no_exact_map_where_a_place_has_several_images(look, faults, monkeypatch):
     small = PlacesSettings(farthest=3.5, sideways=3.0)
     monkeypatch.setattr(places_section, "PlacesSettings", lambda: small)
     env = with_transforms(DroneEnv(1, appearance=look), [GrayPixels(), *faults])

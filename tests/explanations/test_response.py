@@ -1,6 +1,7 @@
-import inspect
+"""Maps over the place of one target: response, outcome, exact actions; asymmetry."""
 
 import numpy as np
+import pytest
 import torch
 from torch import nn
 
@@ -10,14 +11,17 @@ from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.response import (
     OutcomeMap,
     ResponseMap,
+    asymmetry,
     find_blind,
+    grid_asymmetry,
     outcome_map,
     response_map,
     shrink,
     summarise,
 )
 from drone_rl.explanations.scenes import Scenes, place_target
-from drone_rl.sim.actions import MOVES
+from drone_rl.policies import MLP
+from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.continuous_actions import ContinuousActions
 from tests.continuous import SETTINGS
 from tests.second_task import Posts
@@ -30,7 +34,7 @@ class Forward(nn.Module):
         return torch.tensor([9.0, 0.0, 0.0]).expand(len(pictures), 3)
 
 
-def test_a_place_on_the_grid_is_that_place_in_the_world(scenes, world):
+def test_places_of_the_grid_are_places_in_the_scene(scenes, world):
     found = response_map(scenes, world[2], num_lateral=5, num_forward=4)
     assert found.probabilities.shape == (1, 4, 5, 3)
     assert found.lateral.tolist() == [12, 6, 0, -6, -12] and found.forward[-1] == 15
@@ -39,15 +43,6 @@ def test_a_place_on_the_grid_is_that_place_in_the_world(scenes, world):
     at = place_target(scenes, torch.tensor([found.forward[1]]), torch.tensor([found.lateral[3]]))
     expected = probabilities(world[2], scenes.observe(at))[0].numpy()
     np.testing.assert_allclose(found.probabilities[0, 1, 3], expected, atol=1e-6)
-
-
-def test_grids_are_odd_sideways_so_that_straight_ahead_is_on_them():
-    defaults = [
-        {k: v.default for k, v in inspect.signature(f).parameters.items() if k.startswith("num")}
-        for f in (response_map, outcome_map)
-    ]
-    fine, coarse = {"num_lateral": 41, "num_forward": 31}, {"num_lateral": 21, "num_forward": 8}
-    assert defaults == [fine, coarse]
 
 
 def test_places_of_a_seed_cannot_be_known_beforehand(scenes):
@@ -75,7 +70,7 @@ def test_both_maps_use_places_of_their_seed(scenes, world):
         assert found.lateral.tolist() == expected.lateral.tolist()
 
 
-def test_heights_are_those_at_which_the_task_puts_cubes(make_pipeline):
+def test_heights_are_those_of_the_task(make_pipeline):
     env, actor = make_pipeline(num_envs=4, task=TaskSettings(vertical_bound=1.2))
     scenes, network = Scenes(env), actor.module[0].module
     found = response_map(scenes, network, num_lateral=3, num_forward=2)
@@ -87,14 +82,14 @@ def test_heights_are_those_at_which_the_task_puts_cubes(make_pipeline):
     assert not np.allclose(found.probabilities[0], found.probabilities[2], atol=1e-6)
 
 
-def test_an_outcome_is_flown_not_guessed(scenes):
+def test_outcomes_come_from_rollouts(scenes):
     found = outcome_map(scenes, Forward(), num_lateral=17, num_forward=2)  # 1.5 m apart
     straight = [False] * 7 + [True] * 3 + [False] * 7
     assert found.collected.tolist() == [[straight, straight]]
     assert (found.oracle == 0).tolist() == straight
 
 
-def test_blind_is_where_a_turn_is_called_for_and_nothing_changes():
+def test_blindness_by_hand():
     probs = np.array([[[IDLE, LEFT, IDLE, LEFT, [0.95, 0.0, 0.05]]]])
     needed = torch.tensor([1, 1, 0, 2, 2])
     blind = find_blind(MOVES, torch.tensor(probs), torch.tensor(IDLE), needed)
@@ -126,7 +121,7 @@ def test_blind_is_where_a_turn_is_called_for_and_nothing_changes():
     ]
 
 
-def test_who_turns_to_the_side_where_he_is_to_go_is_not_blind():
+def test_a_turn_to_the_needed_side_is_not_blind():
     actions = ContinuousActions.of(SETTINGS)
     turns_left, turns_right = np.eye(5)[3], np.eye(5)[4]
     for probs, is_blind in ((turns_left, False), (turns_right, True)):
@@ -134,12 +129,7 @@ def test_who_turns_to_the_side_where_he_is_to_go_is_not_blind():
         assert find_blind(actions, probs, probs[0, 0, 0], torch.tensor([1])).item() is is_blind
 
 
-def test_who_flies_straight_on_by_nature_is_blind_only_beyond_its_reach(scenes):
-    found = response_map(scenes, Forward(), num_lateral=17, num_forward=2)
-    assert found.blind[0, 0].tolist() == [True] * 7 + [False] * 3 + [True] * 7
-
-
-def test_an_outcome_is_that_of_the_placed_target_whatever_its_number():
+def test_outcomes_of_another_task():
     env = with_transforms(DroneEnv(1, Posts()), [GrayPixels()])
     found = outcome_map(Scenes(env), Forward(), num_lateral=7, num_forward=2)
     env.close()
@@ -147,13 +137,64 @@ def test_an_outcome_is_that_of_the_placed_target_whatever_its_number():
     assert found.collected.tolist() == [[past, past]]
 
 
-def test_who_is_blind_is_unknown_where_the_needed_action_is():
-    axes = {"height": np.zeros(1), "forward": np.ones(1), "lateral": np.array([3.0, -3.0])}
-    where = {"oracle": np.array([-1, -1]), "stratum": np.array([0, 1])}
-    probs = np.full((1, 1, 2, 3), 1 / 3)
-    never = np.zeros((1, 1, 2), bool)
-    response = ResponseMap(
-        **axes, **where, probabilities=probs, without_target=probs[0, 0, 0], blind=never
+def sides(bias):
+    """A policy that compares the halves of a one-row picture, and prefers right by `bias`."""
+    network = MLP((1, 1, 4), 3, hidden=())
+    with torch.no_grad():
+        network.layers.logits.weight.zero_()
+        network.layers.logits.weight[Move.LEFT, :2] = 1.0
+        network.layers.logits.weight[Move.RIGHT, 2:] = 1.0
+        network.layers.logits.bias.copy_(torch.tensor([0.0, 0.0, bias]))
+    return network
+
+
+def test_only_a_biased_policy_differs_from_its_mirror_image():
+    x, episode = torch.randn(40, 1, 1, 4), np.arange(40)
+    fair, biased = (asymmetry(sides(b), x, episode, MOVES) for b in (0.0, 2.0))
+    assert fair["absolute"]["mean"] < 1e-6
+    assert biased["absolute"]["mean"] > 0.1
+    assert biased["signed"]["upper95"] < 0  # right is preferred
+    assert biased["worst"][0]["distance"] >= biased["worst"][1]["distance"]
+
+
+def test_asymmetry_of_frames_by_hand():
+    rng = np.random.default_rng(0)
+    x, bias = rng.normal(size=(10, 4)), 0.7
+    left, right = x[:, :2].sum(1), x[:, 2:].sum(1)
+
+    def odds(left, right):
+        e = np.exp(np.stack([0 * left, left, right + bias], 1))
+        return e / e.sum(1, keepdims=True)
+
+    here, there = odds(left, right), odds(right, left)
+    distance = 0.5 * np.abs(here - there[:, [0, 2, 1]]).sum(1)
+    episode = np.arange(10) // 2
+    observed = torch.tensor(x, dtype=torch.float32)[:, None, None]
+    found = asymmetry(sides(bias), observed, episode, MOVES)
+    assert found["absolute"]["mean"] == pytest.approx(distance.mean(), abs=1e-5)
+    assert found["signed"]["mean"] == pytest.approx((here[:, 1] - there[:, 2]).mean(), abs=1e-5)
+    assert found["signed"]["lower95"] < -0.5  # few episodes tell little, down to -1
+    assert [w["frame"] for w in found["worst"]] == np.argsort(-distance)[:8].tolist()
+    worst = [w["distance"] for w in found["worst"]]
+    assert worst == pytest.approx(sorted(distance, reverse=True)[:8], abs=1e-5)
+
+
+def test_a_policy_that_turns_to_either_side_is_its_mirror_image():
+    turns = [[0.2, 0.8, 0.0], [1.0, 0.0, 0.0], [0.2, 0.0, 0.8]]
+    fair, place = np.tile(turns, (2, 2, 1, 1)), np.array([6.0, 0.0, -6.0])
+    found = ResponseMap(
+        height=np.array([-1.0, 1.0]),
+        forward=np.array([5.0, 9.0]),
+        lateral=place,
+        probabilities=fair,
+        without_target=fair[0, 0, 1],
+        oracle=np.array([1, 0, 2]),
+        stratum=np.array([0, 1, 2]),
+        blind=np.zeros((1, 1, 3), bool),
     )
-    rows = summarise(response, OutcomeMap(**axes, **where, collected=never), ("left", "right"))
-    assert [row["blind"] for row in rows["rows"]] == [None, None]
+    result = grid_asymmetry(found, MOVES)
+    assert result == {"signed": 0.0, "absolute": 0.0}
+    found.probabilities[1, 0, 2] = [0.5, 0.0, 0.5]  # high up, near, to the right: less sure
+    result = grid_asymmetry(found, MOVES)
+    assert result["signed"] == pytest.approx(0.3 / 12)
+    assert result["absolute"] == pytest.approx(2 * 0.3 / 12)  # the place and its mirror image

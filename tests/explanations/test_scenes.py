@@ -1,6 +1,8 @@
+"""Rendering of any state, and the labels of its pixels."""
+
 import torch
 
-from drone_rl.config import AppearanceSettings, CameraSettings
+from drone_rl.config import CameraSettings
 from drone_rl.envs import (
     ChromaticityPixels,
     CropRows,
@@ -10,12 +12,19 @@ from drone_rl.envs import (
     RgbPixels,
     with_transforms,
 )
-from drone_rl.explanations.scenes import Region, Scenes, empty_scene, place_target
-from tests.continuous import make_env
+from drone_rl.explanations.scenes import (
+    Region,
+    Scenes,
+    alternatives,
+    empty_scene,
+    place_target,
+)
+from drone_rl.sim.rendering import Appearance
+from drone_rl.sim.rendering.scene import SemanticClass
 from tests.second_dynamics import Turning
 
 
-def test_a_still_is_what_the_policy_saw(world, scenes):
+def test_observations_are_those_of_the_environment(world, scenes):
     state = world[0].reset()
     torch.testing.assert_close(scenes.observe(scenes.worlds.state), state["pixels"])
 
@@ -26,7 +35,7 @@ def test_a_cube_on_the_left_is_on_the_left_of_the_picture(scenes):
     assert len(columns) and columns.max() < 32
 
 
-def test_the_nearest_cube_is_next_and_the_horizon_lies_between(scenes, world):
+def test_regions_of_a_frame(scenes, world):
     world[0].reset()
     regions = scenes.regions(scenes.worlds.state)
     assert {Region.NEXT_TARGET, Region.HORIZON, Region.GROUND, Region.SKY} <= set(
@@ -36,18 +45,13 @@ def test_the_nearest_cube_is_next_and_the_horizon_lies_between(scenes, world):
     assert len(rows.unique()) == 2 and set(rows.tolist()) <= {11, 12, 13}  # the middle of 25 rows
 
 
-def test_an_empty_scene_has_no_cube(scenes):
-    regions = scenes.regions(empty_scene(scenes))
-    assert not ((regions == Region.NEXT_TARGET) | (regions == Region.OTHER_TARGET)).any()
-
-
 def test_depth_is_the_cubes_distance(scenes):
     state = place_target(scenes, torch.tensor([8.0]), torch.tensor([0.0]))
     # the camera sits 0.4 m ahead of the drone's middle, the cube's face 1.25 m before its own
     torch.testing.assert_close(scenes.depth(state)[0, 12, 32], torch.tensor(8 - 0.4 - 1.25))
 
 
-def test_maps_go_back_to_where_the_pipeline_took_the_picture_from():
+def test_maps_return_to_the_frame_of_the_camera():
     env = with_transforms(
         DroneEnv(1, camera=CameraSettings(width=64, height=36)),
         [GrayPixels(), CropRows(6, 30), Resize(height=12, width=32)],
@@ -59,7 +63,7 @@ def test_maps_go_back_to_where_the_pipeline_took_the_picture_from():
     env.close()
 
 
-def test_whether_the_channels_are_colors(scenes):
+def test_channels_by_transform(scenes):
     assert scenes.channels == "gray"
     for pipeline, channels in (
         ([RgbPixels()], "rgb"),
@@ -70,7 +74,7 @@ def test_whether_the_channels_are_colors(scenes):
         env.close()
 
 
-def test_what_is_needed_is_known_of_the_tasks_own_actions_alone(scenes):
+def test_the_needed_action_is_known_for_the_default_actions(scenes):
     left = torch.tensor([[9.0, 4.0, 0.0]])
     assert scenes.needed(left).tolist() == [1]
     env = with_transforms(DroneEnv(1, dynamics=Turning()), [GrayPixels()])
@@ -78,16 +82,47 @@ def test_what_is_needed_is_known_of_the_tasks_own_actions_alone(scenes):
     env.close()
 
 
-def test_what_is_needed_is_the_part_of_the_same_name():
-    env, places = make_env(1), torch.tensor([[6.0, y, 0.0] for y in (4.0, 0.0, -4.0)])
-    assert Scenes(env).needed(places).tolist() == [1, 0, 2]
-    env.close()
+def test_alternatives_of_a_scene(scenes, world):
+    state = world[0].base_env.worlds.state
+    world[0].reset()
+    state = scenes.worlds.state
+    before = state.passed.clone()
+    found = alternatives(scenes, state)
+    assert list(found) == [
+        "no targets", "targets elsewhere 0", "targets elsewhere 1", "targets elsewhere 2",
+        "darker", "brighter",
+    ]  # fmt: skip
+    x, empty = scenes.observe(state), scenes.observe(empty_scene(scenes))
+    torch.testing.assert_close(found["no targets"], empty.expand_as(x))
+    assert (found["darker"][:, 0, -1] < x[:, 0, -1]).all()  # the ground
+    assert (found["darker"][:, 0, 0] < x[:, 0, 0]).all()  # the sky
+    assert (found["brighter"][:, 0, -1] > x[:, 0, -1]).all()
+    assert not torch.equal(found["targets elsewhere 0"], found["targets elsewhere 1"])
+    assert torch.equal(state.passed, before)
+    torch.testing.assert_close(scenes.observe(state), x)  # the worlds are as they were
+    again = alternatives(scenes, state)
+    assert all(torch.equal(found[name], again[name]) for name in found)
 
 
-def test_distractors_are_no_targets():
-    look = AppearanceSettings(distractors=2, distractor_size=8.0, distractor_distance=2.0)
-    env = with_transforms(DroneEnv(1, appearance=look), [GrayPixels()])
-    scenes = Scenes(env)
-    regions = scenes.regions(empty_scene(scenes))
-    env.close()
-    assert not ((regions == Region.NEXT_TARGET) | (regions == Region.OTHER_TARGET)).any()
+def test_cubes_elsewhere_are_in_view(scenes):
+    state = place_target(scenes, torch.full((80,), 9.0), torch.zeros(80))
+    state = scenes.task.without_targets(state)
+    state.drone[:, 1] = 11.0
+    moved = scenes.task.elsewhere(state, scenes.worlds.camera, torch.Generator().manual_seed(0))
+    regions = scenes.regions(moved)
+    seen = (regions == Region.NEXT_TARGET) | (regions == Region.OTHER_TARGET)
+    assert seen.flatten(1).any(1).all()
+    columns = seen.any(1).float().mean(0)
+    assert (columns > 0.1).all()  # everywhere in the picture
+    assert moved.present.all() and state.passed.all()
+
+
+def test_only_the_named_colors_change(scenes):
+    state = place_target(scenes, torch.tensor([6.0]), torch.tensor([2.0]))
+    regions, before = scenes.regions(state), scenes.frames(state)
+    after = scenes.frames(state, Appearance(colors={SemanticClass.GROUND: (0.1, 0.1, 0.1)}))
+    changed = (before != after).any(-1)
+    ground = (regions == Region.GROUND) | (regions == Region.HORIZON)
+    assert changed[regions == Region.GROUND].all()
+    assert not changed[~ground].any()
+    assert torch.equal(scenes.frames(state), before)

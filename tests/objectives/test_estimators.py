@@ -4,7 +4,7 @@ from tensordict import TensorDict
 
 from drone_rl import objectives
 from drone_rl.config.learning import Gae, Returns
-from drone_rl.objectives import LeaveOneOut, ReturnEstimator, RewardToGo, TimeBaseline, returns
+from drone_rl.objectives import Advantages, LeaveOneOut, ReturnEstimator, TimeBaseline, returns
 from drone_rl.utils.errors import InputError
 
 
@@ -16,19 +16,6 @@ def batch(rewards, ends):
 
 BUILT_IN = (v for v in Returns.variants() if v.__module__ == Returns.__module__)
 NAMES = [variant.factory.__name__ for variant in BUILT_IN if variant is not Gae]
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_returns_have_the_shape_of_rewards(name):
-    data = getattr(objectives, name)()(batch([0.0, 1.0, 1.0], [0, 1, 1]))
-    assert data["return_to_go"].shape == (3, 1)
-    assert data["return_to_go"].isfinite().all()
-
-
-def test_keys_are_configurable():
-    estimator = RewardToGo(0.5, reward_key="r", done_key="d", out_key=("a", "b"))
-    data = TensorDict({"r": torch.ones(2, 1), "d": torch.tensor([[False], [True]])}, [2])
-    assert estimator(data)["a", "b"].flatten().tolist() == [1.5, 1.0]
 
 
 def test_scaled_returns_have_unit_mean_square():
@@ -65,13 +52,6 @@ def test_time_baseline_ignores_steps_beyond_max_steps():
     assert estimator(long)["return_to_go"].flatten().tolist() == [0.0, 0.0, 4.0]
 
 
-def test_time_baseline_stores_the_mean_over_episodes():
-    estimator = TimeBaseline(0.5, max_steps=3, scale=False)
-    estimator(batch([0.0, 2.0, 3.0], [0, 1, 1]))  # returns 1, 2 and 3: means 2 and 2
-    assert estimator.baseline.tolist() == [2.0, 2.0, 0.0]
-    assert estimator.seen.tolist() == [True, True, False]
-
-
 PURE = {
     "TotalReward": lambda r, d: returns.total_reward(r, d),
     "RewardToGo": lambda r, d: returns.reward_to_go(r, d, 0.7),
@@ -96,21 +76,6 @@ def test_estimator_equals_the_pure_function(name, scale):
     assert torch.equal(found, returns.scale_to_unit(expected) if scale else expected)
 
 
-def test_defaults():
-    assert (TimeBaseline().gamma, TimeBaseline().decay) == (0.99, 0.9)
-    assert TimeBaseline().baseline.shape == TimeBaseline().seen.shape == (300,)
-    success = objectives.SuccessScaled()
-    assert (success.gamma, success.max_reward, success.scale) == (0.99, 3.0, False)
-    assert RewardToGo(0.0).gamma == 0.0 and RewardToGo(1.0).gamma == 1.0
-    assert TimeBaseline(decay=0.0).decay == 0.0
-
-
-def test_returns_require_no_grad():
-    data = batch([0.0, 1.0], [0, 1])
-    data["next", "reward"].requires_grad_()
-    assert not RewardToGo(0.5)(data)["return_to_go"].requires_grad
-
-
 @pytest.mark.parametrize(
     ("result", "fault"),
     [
@@ -131,20 +96,51 @@ def test_wrong_returns_of_an_estimator_of_ones_own_are_named(result, fault):
         Own(scale=False)(batch([0.0, 1.0], [0, 1]))
 
 
-@pytest.mark.parametrize("gamma", [-0.1, 1.0001])
-def test_invalid_discount_raises(gamma):
-    with pytest.raises(InputError, match="rate from 0 to 1"):
-        RewardToGo(gamma)
+GAMMA, LMBDA = 0.5, 0.4
 
 
-@pytest.mark.parametrize("decay", [1.0, -0.1])
-def test_invalid_decay_raises(decay):
-    with pytest.raises(InputError, match=f"decay={decay}"):
-        TimeBaseline(decay=decay)
+def row(value, after, reward, done, terminated):
+    def column(values, dtype=torch.float32):
+        return torch.tensor(values, dtype=dtype)[None, :, None]
+
+    end = {"done": column(done, torch.bool), "terminated": column(terminated, torch.bool)}
+    following = {"state_value": column(after), "reward": column(reward), **end}
+    return TensorDict({"state_value": column(value), "next": following}, [1, len(value)])
 
 
-def test_small_decay_weights_recent_batches():
-    estimator = TimeBaseline(0.5, decay=0.25, max_steps=1, scale=False)
-    for reward in (4.0, 8.0):
-        estimator(batch([reward], [1]))
-    assert estimator.baseline.tolist() == [0.25 * 4 + 0.75 * 8]
+def test_advantages_match_hand_computed_values():
+    """Steps 0 and 1 terminate an episode, step 2 truncates another, 3 and 4 belong to a third.
+
+    With d = r + 0.5 V(next) - V and weight 0.2 of the next advantage within an episode:
+    step 4, the end of the batch: 0 + 0.5 * 8 - 3 = 1
+    step 3: 1 + 0.5 * 3 - 2 = 0.5, and 0.2 * 1 = 0.7
+    step 2, truncated: 0 + 0.5 * 6 - 1 = 2; independent of step 3
+    step 1, terminated: 2 - 4 = -2; the next value is 0, regardless of the critic
+    step 0: 0 + 0.5 * 4 - 1 = 1, and 0.2 * -2 = 0.6
+    """
+    batch = row(
+        value=[1.0, 4.0, 1.0, 2.0, 3.0],
+        after=[4.0, 100.0, 6.0, 3.0, 8.0],
+        reward=[0.0, 2.0, 0.0, 1.0, 0.0],
+        done=[0, 1, 1, 0, 0],
+        terminated=[0, 1, 0, 0, 0],
+    )
+    found = Advantages(GAMMA, LMBDA, scale=False)(batch)
+    assert found["advantage"].flatten().tolist() == pytest.approx([0.6, -2.0, 2.0, 0.7, 1.0])
+    wanted = [1.6, 2.0, 3.0, 2.7, 4.0]  # advantage and value
+    assert found["value_target"].flatten().tolist() == pytest.approx(wanted)
+
+
+def test_rows_are_independent():
+    one = row([1.0, 2.0], [2.0, 3.0], [0.0, 1.0], [0, 0], [0, 0])
+    two = row([5.0, 4.0], [4.0, 0.0], [1.0, 0.0], [0, 1], [0, 1])
+    both = Advantages(GAMMA, LMBDA, scale=False)(torch.cat([one, two]))["advantage"]
+    alone = [Advantages(GAMMA, LMBDA, scale=False)(r)["advantage"] for r in (one, two)]
+    torch.testing.assert_close(both, torch.cat(alone))
+
+
+def test_scaled_advantages_are_standardized():
+    batch = row([0.0, 0.0], [0.0, 0.0], [1.0, 3.0], [1, 1], [1, 1])
+    found = Advantages(GAMMA, LMBDA, scale=True)(batch)
+    assert found["advantage"].flatten().tolist() == pytest.approx([-(0.5**0.5), 0.5**0.5])
+    assert found["value_target"].flatten().tolist() == [1.0, 3.0]  # not scaled

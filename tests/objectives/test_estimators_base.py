@@ -60,12 +60,6 @@ def test_postproc_equals_torchrls_transform(how):
     assert cut > 0
 
 
-def test_compose_forwards_batches():
-    batch = rows(*WHOLE)
-    assert "return_to_go" not in Compose(RewardToGo())(batch)
-    assert "return_to_go" in Compose(RewardToGo()).inv(batch)
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_every_estimator_works_as_postproc(name):
     for batch in collector(getattr(objectives, name)()):
@@ -91,16 +85,6 @@ def test_unfinished_tail_is_masked_and_ignored():
     assert float(scaled.square().sum()) == pytest.approx(5.0)  # five steps are valid
 
 
-def test_padding_is_masked_and_a_stale_mask_ignored():
-    """Padding has no end; TorchRL's collectors return entries of their previous batch again."""
-    batch = rows(*CUT)
-    batch["collector", "mask"] = torch.tensor([[True, False, True], [True, True, True]])
-    mask = RewardToGo(0.5)(batch)["collector", "mask"]
-    assert mask.tolist() == [[True, True, False], [True, True, True]]
-    batch["next", "done"][0, 2] = True
-    assert RewardToGo(0.5)(batch)["collector", "mask"].all()
-
-
 def test_batch_without_episode_end_raises():
     with pytest.raises(InputError, match=r"no episode ends in a batch of shape \(1, 2\)"):
         RewardToGo()(rows([[1.0, 1.0]], [[0, 0]]))
@@ -117,13 +101,6 @@ def test_replay_buffer_estimates_on_extend_only():
     sample = buffer.sample()
     assert sample["return_to_go"].shape == (64, 1)
     assert buffer[:]["collector", "mask"].tolist() == [True] * 12
-
-
-def test_replay_buffer_masks_tails():
-    buffer = ReplayBuffer(storage=LazyTensorStorage(20), transform=RewardToGo(0.5), batch_size=4)
-    buffer.extend(rows([[1.0, 1.0]], [[0, 1]])[0])
-    buffer.extend(rows([[1.0, 1.0]], [[1, 0]])[0])
-    assert buffer[:]["collector", "mask"].tolist() == [True, True, True, False]
 
 
 def test_running_mean_includes_a_batch_once():

@@ -166,18 +166,6 @@ def test_episodes_are_independent(episodes):
         torch.testing.assert_close(ESTIMATORS[name](*whole), alone, atol=1e-5, rtol=1e-5)
 
 
-@given(EPISODES.flatmap(lambda e: st.tuples(st.just(e), st.permutations(range(len(e))))))
-@QUICK
-def test_order_of_episodes_is_irrelevant(drawn):
-    episodes, order = drawn
-    for estimate in ESTIMATORS.values():
-        before = split(estimate(*flat(episodes)), episodes)
-        shuffled = [episodes[i] for i in order]
-        after = split(estimate(*flat(shuffled)), shuffled)
-        for i, values in zip(order, after, strict=True):
-            assert values == pytest.approx(before[i], abs=1e-4)
-
-
 @given(EPISODES, st.sampled_from([0.25, 2.0, 8.0]))
 @QUICK
 def test_scaling_rewards_scales_returns_or_changes_nothing(episodes, factor):
@@ -188,49 +176,6 @@ def test_scaling_rewards_scales_returns_or_changes_nothing(episodes, factor):
     for name in ("standardized", "batch_normalized"):
         found, plain = ESTIMATORS[name](factor * reward, done), ESTIMATORS[name](reward, done)
         torch.testing.assert_close(found, plain, atol=1e-3, rtol=1e-3)
-
-
-@given(EPISODES, st.sampled_from([0.0, 0.5, 0.9, 1.0]))
-@QUICK
-def test_reward_to_go_satisfies_its_recursion(episodes, gamma):
-    for values, rewards in zip(
-        split(returns.reward_to_go(*flat(episodes), gamma), episodes), episodes, strict=True
-    ):
-        following = [*values[1:], 0.0]
-        assert values == pytest.approx(
-            [r + gamma * g for r, g in zip(rewards, following, strict=True)], rel=1e-5
-        )
-
-
-@given(EPISODES)
-@QUICK
-def test_leave_one_out_is_the_scaled_deviation_from_the_mean(episodes):
-    """g - (sum - g) / (n - 1) = (g - mean) n / (n - 1), so the sum at each step is 0."""
-    to_go = split(returns.reward_to_go(*flat(episodes), 0.9), episodes)
-    found = split(returns.leave_one_out(*flat(episodes), 0.9), episodes)
-    for t in range(max(len(e) for e in episodes)):
-        alive = [i for i, e in enumerate(episodes) if len(e) > t]
-        n, mean = len(alive), sum(to_go[i][t] for i in alive) / len(alive)
-        for i in alive:
-            wanted = (to_go[i][t] - mean) * n / (n - 1) if n > 1 else to_go[i][t]
-            assert found[i][t] == pytest.approx(wanted, abs=1e-4)
-
-
-@given(EPISODES)
-@QUICK
-def test_standardized_has_mean_0_and_deviation_1_or_is_zero(episodes):
-    for values in split(returns.standardized(*flat(episodes), 0.9), episodes):
-        square = sum(v * v for v in values) / len(values)
-        assert sum(values) == pytest.approx(0, abs=1e-3)
-        assert square == pytest.approx(1, abs=1e-3) or set(values) == {0.0}
-
-
-def test_episode_lengths():
-    done = torch.tensor([[0, 1, 1], [0, 0, 1]]).bool()[..., None]
-    assert returns.episode_lengths(done) == [2, 1, 3]
-    assert returns.episode_lengths(done[1]) == [3]
-    with pytest.raises(InputError):  # every row must end with an episode
-        returns.episode_lengths(done.flip(0, 1))
 
 
 @pytest.mark.parametrize("name", ESTIMATORS)
@@ -246,20 +191,6 @@ def test_invalid_shapes_raise():
     for count in (2, 4):
         with pytest.raises(ValueError, match="must both be"):
             returns.total_reward(torch.zeros(count, 1), torch.ones(3, 1, dtype=torch.bool))
-
-
-def test_long_batches_loop_over_steps_not_frames():
-    """64 episodes of 130 steps take 130 iterations, not 8,320."""
-    done = torch.zeros(64, 130, 1, dtype=torch.bool)
-    done[:, -1] = True
-    calls = []
-    original = returns._discount
-    returns._discount = lambda padded, gamma: calls.append(len(padded)) or original(padded, gamma)
-    try:
-        returns.reward_to_go(torch.zeros(64, 130, 1), done, 0.9)
-    finally:
-        returns._discount = original
-    assert calls == [130]
 
 
 def test_rounding_threshold_is_zero():

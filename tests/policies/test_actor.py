@@ -105,15 +105,6 @@ def test_continuous_actions_are_sampled_from_squashed_normals():
         torch.testing.assert_close(act(lean(), 2)[1].double(), expected.tanh(), atol=1e-6, rtol=0)
 
 
-@pytest.mark.parametrize("how", [ExplorationType.RANDOM, ExplorationType.DETERMINISTIC])
-def test_fast_path_equals_torchrls_actor_for_continuous_actions(how):
-    pixels = TensorDict({"pixels": torch.zeros(500, 1)}, [500])
-    fast_actor, around = lean(3), lean(3)
-    with set_exploration_type(how):
-        one, two = fast_actor(pixels.clone()), ProbabilisticActor.forward(around, pixels.clone())
-    assert all(torch.equal(one[key], two[key]) for key in ("logits", "action"))
-
-
 def test_distribution_follows_from_the_action_type():
     assert distribution_of(torch.int64) is SeededCategorical
     assert distribution_of(torch.float32) is SquashedNormal

@@ -6,10 +6,7 @@ import drone_rl
 from drone_rl.config.transforms import Gray
 from drone_rl.policies.zoo import certificate_path, describe, parse, policy_path
 from drone_rl.sim import worlds as worlds_module
-from drone_rl.sim.rendering import Raytracer
 from drone_rl.sim.tasks import Pillars
-from drone_rl.training.components import make_collector
-from drone_rl.trust.video import film
 from drone_rl.utils.errors import InputError
 from tests.fake_flight import floating
 from tests.second_dynamics import Turning
@@ -68,38 +65,6 @@ def test_seed_determines_the_environments():
         found.append(env.reset()["info", "cube_positions"])
         env.close()
     assert torch.equal(*found)
-
-
-@pytest.fixture
-def requested(monkeypatch):
-    """Record the names of requested renderers; the default renderer handles all of them."""
-    names = []
-
-    def find(which):
-        names.append(which)
-        return Raytracer
-
-    monkeypatch.setattr(worlds_module, "find_renderer", find)
-    return names
-
-
-def test_selected_renderer_is_used_everywhere(requested, tmp_path):
-    """This includes training, judging, inspection and Gymnasium environments."""
-    chosen = {"renderer": "mujoco_warp"}
-    drone_rl.make_env(1, **chosen).close()
-    assert requested == ["mujoco_warp"]
-    make_collector(drone_rl.TrainSettings(**chosen)).collector.shutdown()
-    assert set(requested) == {"mujoco_warp"}
-    requested.clear()
-    drone_rl.evaluate("good", episodes=1, baselines=False, **chosen)
-    assert requested == ["mujoco_warp"]
-    requested.clear()
-    film(drone_rl.load_policy("right_and_forward"), tmp_path, 1, **chosen)
-    drone_rl.DroneWorld(**chosen).close()
-    assert requested == ["mujoco_warp"] * 2
-    requested.clear()
-    drone_rl.judge("right_and_forward", episodes=1, **chosen)
-    assert requested[0] == "mujoco_warp"  # baselines and the oracle need no images
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 import drone_rl
 from drone_rl.config import MINIMAL, AppearanceSettings
-from drone_rl.policies.external_policy import policy_from
 from drone_rl.policies.policy import _name_of
 from drone_rl.policies.zoo import policy_path
 from drone_rl.utils.errors import InputError
@@ -53,13 +52,6 @@ def test_what_is_no_image_is_refused(image):
     for act in (drone_rl.load_policy("good").act, drone_rl.load_policy("good").act_batch):
         with pytest.raises(InputError, match="is no image; give an array of uint8, RGB"):
             act(image)
-
-
-def test_a_loaded_policy_is_returned():
-    policy = drone_rl.load_policy("good")
-    assert drone_rl.load_policy(policy) is policy
-    with pytest.raises(InputError, match="policy_from takes callables; give 'good' itself"):
-        policy_from("good")
 
 
 def test_environment_is_closed_at_the_end_or_on_failure():
@@ -157,20 +149,6 @@ def test_changed_dynamics_change_only_the_environment(monkeypatch):
         assert env.base_env.worlds.dynamics.settings == FLIGHT
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"mass": -1.0}, r"dynamics\.mass=-1\.0 is out of range"),
-        ({"masss": 1}, r"dynamics\.masss is unknown"),
-        ({"wind": [1, 0, 0]}, r"dynamics\.wind=\[1\.0, 0\.0, 0\.0\] moves nothing"),
-        ({"mass": 50.0}, r"dynamics\.rotor_thrust=4\.17945 is too small to control the drone"),
-    ],
-)
-def test_invalid_dynamics_changes_raise(changes, message):
-    with pytest.raises(InputError, match=f"^{message}"):
-        drone_rl.load_policy("good").in_dynamics(**changes)
-
-
 @pytest.mark.parametrize("name", ["good", "pillars_good", "flight_velocity"])
 def test_act_equals_the_actor_in_its_environment(name):
     """Over several steps, because the pillars' policy stacks two frames."""
@@ -216,7 +194,3 @@ def test_images_that_do_not_fit_the_camera_raise():
         policy.act_batch(three)
     policy.reset()
     assert policy.act_batch(three).shape == (3,)
-
-
-def test_a_loaded_network_is_in_evaluation_mode():
-    assert not drone_rl.load_policy("good").make_network().training

@@ -4,7 +4,6 @@ import math
 
 import pytest
 import torch
-from tensordict import TensorDict
 from torchrl.modules import set_recurrent_mode
 
 import drone_rl
@@ -255,12 +254,3 @@ REFUSED = {
 def test_analyses_of_single_frames_are_refused(what, trained, tmp_path):
     with pytest.raises(InputError, match=rf"{what}.*; give (another policy|domain=false)"):
         REFUSED[what](trained.policy, tmp_path)
-
-
-def test_actor_needs_the_state():
-    collector, network = make_collector()
-    collector.shutdown()
-    actor = make_actor(network, collector.env.action_spec)
-    entries = {"pixels": torch.zeros(2, 1, 8, 16), "is_init": torch.ones(2, 1, dtype=torch.bool)}
-    with pytest.raises(InputError, match="remembers earlier frames"):
-        actor(TensorDict(entries, [2]))

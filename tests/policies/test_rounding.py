@@ -6,7 +6,7 @@ from torch import nn
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN
 from drone_rl.policies.external_network import ExternalNetwork
 from drone_rl.policies.rounded_layers import layer_of
-from drone_rl.policies.rounding import TOLERANCE, Regrouped, RoundingBound, arithmetic_on, decider
+from drone_rl.policies.rounding import TOLERANCE, Regrouped, RoundingBound, decider
 from drone_rl.sim.actions import MOVES
 from tests.own_networks import Doubled, Mirrored
 
@@ -137,14 +137,6 @@ def test_unknown_module_is_compared_with_float64():
         network = ExternalNetwork(Cancelling(precision), (1, 1, 1), MOVES)
         found = decider(network)[0](torch.zeros(2, 1, 1, 1))
         assert found.is_fragile.tolist() == [is_fragile] * 2
-
-
-def test_tf32_convolutions_are_reported(monkeypatch):
-    for allowed in (True, False):
-        monkeypatch.setattr(torch.backends.cudnn, "allow_tf32", allowed)
-        name = "float32 (convolutions in TF32) on cuda" if allowed else "float32 on cuda"
-        assert arithmetic_on(torch.device("cuda")) == (name, False)
-        assert arithmetic_on(torch.device("cpu")) == ("float32 on cpu", True)
 
 
 def test_a_forward_pass_of_its_own_has_no_known_bound():

@@ -13,10 +13,8 @@ from tests.policies.sb3_models import (
     CAMERA,
     NAME,
     Playback,
-    batched,
     gymnasium,
     make_model,
-    of_floats,
     sb3,
     single,
 )
@@ -39,16 +37,6 @@ def test_model_and_random_numbers_stay_as_they_were(kind):
     assert (np.random.get_state()[1] == states[1]).all()
     if normalization is not None:
         assert (model.get_vec_normalize_env().obs_rms.mean == normalization.obs_rms.mean).all()
-
-
-def test_trained_models_are_copied():
-    env = batched(Gray())(gymnasium.make(NAME, camera=CAMERA))
-    model = sb3.PPO("MlpPolicy", env, n_steps=4, batch_size=4, **of_floats()).learn(4)
-    network = as_policy(model).make_network()
-    image = torch.rand(1, 1, 40, 48, generator=torch.Generator().manual_seed(0))
-    before = network(image.requires_grad_())
-    model.learn(4)
-    assert torch.equal(copy.deepcopy(network)(image), before)
 
 
 def test_a_normalization_that_is_missing_is_refused(tmp_path):

@@ -1,16 +1,14 @@
 """A sweep that was finished by hand, and a program that stands in for a training."""
 
-import functools
 import json
 import sys
 
-import numpy as np
 import pytest
 
 from drone_rl.sweeps import executors
 from drone_rl.sweeps.manifest import Run, open_sweep
-from drone_rl.trust.rule import BLIND_BASELINES, Kind, Rule
-from drone_rl.utils.intervals import mean_bounds, proportion
+from drone_rl.trust.rule import Rule
+from drone_rl.utils.intervals import proportion
 
 FAKE = """
 import json, pathlib, sys, time
@@ -47,50 +45,20 @@ def make_runs(tmp_path):
 
 @pytest.fixture
 def make_verdict():
-    """A verdict by the present rule; a share of None is of cubes that were never offered."""
+    """A verdict by the current rule; a share of None is of a side without goals."""
     return _verdict
 
 
-def _verdict(
-    kind="good", left=1.0, ahead=1.0, right=1.0, *, whole=1.0, certain=True, strata=None, **others
-):
-    shares = {"left": left, "ahead": ahead, "right": right}
-    shares = {"all": whole, **(dict.fromkeys(strata, 1.0) if strata else shares)}
-    greedy = _flights(shares, success=round(EPISODES * (whole or 0)))
-    blind = {name: _flights(dict.fromkeys(shares, 0.0), success=0) for name in BLIND_BASELINES}
-    if kind == "poor":  # nearly as many cubes as blind, which gets as many as the policy
-        blind["forward"] = _flights(shares, success=round(EPISODES * (whole or 0)))
-    oracle = _flights(dict.fromkeys(shares, 1.0), success=EPISODES)
-    evidence = {
-        "kind": kind,
-        "certain": certain,
-        "exit_code": Kind(kind).exit_code if certain is True and kind in [*Kind] else 13,
-        "rule": Rule().text,
-        "error_rate": 0.05,
-        "good_share": 0.9,
-        "num_cubes": 3,
-        "greedy": greedy,
-        "baselines": {**blind, "oracle": oracle},
+def _verdict(kind="good", left=1.0, ahead=1.0, right=1.0, *, whole=1.0, certain=True, strata=None):
+    sides = {"left": left, "ahead": ahead, "right": right}
+    shares = {"all": whole, **(dict.fromkeys(strata, 1.0) if strata else sides)}
+    greedy = {
+        "episodes": 200,
+        "success": proportion(round(200 * whole), 200),
+        "shares": {name: {"mean": share} for name, share in shares.items()},
     }
-    return {**evidence, **others}
-
-
-EPISODES = 200
-
-
-def _flights(shares, success):
-    """An evaluation in which each episode has the mean share."""
-    means = {
-        name: {**_constant_bounds(0 if share is None else EPISODES, share or 0.0), "goals": 3}
-        for name, share in shares.items()
-    }
-    return {"episodes": EPISODES, "success": proportion(success, EPISODES), "shares": means}
-
-
-@functools.cache
-def _constant_bounds(count, value, *others):
-    """The interval of the mean of equal values, of which tests need the same ones many times."""
-    return mean_bounds(np.full(count, value), *others)
+    verdict = {"kind": kind, "certain": certain, "rule": Rule().text, "error_rate": 0.05}
+    return {**verdict, "greedy": greedy}
 
 
 CURVE = (

@@ -1,18 +1,27 @@
-"""Runs are begun, gone on with, left alone or given up, each without harm to the others."""
+"""Executors of runs, and the process of one run."""
 
 import contextlib
 import json
 import logging
+import signal
 import sys
+import threading
 import time
 import types
 
 import pytest
 
 from drone_rl.sweeps import executors
-from drone_rl.sweeps.executors import LocalExecutor, RayExecutor, SlurmExecutor, finish_run
-from drone_rl.sweeps.manifest import quoted, read_failure
+from drone_rl.sweeps.executors import (
+    LocalExecutor,
+    RayExecutor,
+    RunProcess,
+    SlurmExecutor,
+    finish_run,
+)
+from drone_rl.sweeps.manifest import read_failure
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import folder_lock
 from drone_rl.utils.provenance import num_cores
 from drone_rl.utils.readers import read_result
 
@@ -47,16 +56,6 @@ def test_finished_runs_are_left_alone_and_half_finished_ones_resumed(make_runs):
     (runs[2].folder / "result.json").write_text("{cut sho")
     list(LocalExecutor(2).finish(runs))
     assert [starts(run) for run in runs] == [["begun"], ["resumed"], ["begun"]]
-
-
-def test_interrupting_a_sweep_stops_its_runs(make_runs):
-    runs = make_runs("sleep=0", "sleep=60")
-    ends = LocalExecutor(2).finish(runs)
-    begin = time.perf_counter()
-    assert next(ends)[0] == runs[0]
-    ends.close()
-    assert time.perf_counter() - begin < 20
-    assert read_result(runs[1].folder) is None
 
 
 MEET = """
@@ -108,24 +107,24 @@ def ray(folder):
 @pytest.mark.parametrize("cluster", [slurm, ray])
 def test_clusters_of_this_machine(make_runs, tmp_path, cluster):
     executor = cluster(tmp_path)
-    done, lost = make_runs("seed=0", "seed=1")
-    done.folder.mkdir()
-    (done.folder / "result.json").write_text(json.dumps({"reason": "solved"}))
+    finished, lost = make_runs("seed=0", "seed=1")
+    finished.folder.mkdir()
+    (finished.folder / "result.json").write_text(json.dumps({"reason": "solved"}))
     (lost.folder / "output.log").mkdir(parents=True)  # where nothing can be started
-    assert dict(executor.finish([done, lost])) == {done: 0, lost: 1}
+    assert dict(executor.finish([finished, lost])) == {finished: 0, lost: 1}
     assert "was lost" in read_failure(lost)
     assert "output.log" in read_failure(lost)
 
 
 @pytest.mark.parametrize("setting", [{"partitio": "gpu"}, {"timeout_min": 2.5}])
-def test_a_setting_that_submitit_refuses_is_told_in_one_line(tmp_path, setting):
+def test_settings_that_submitit_refuses(tmp_path, setting):
     pytest.importorskip("submitit", reason="pip install -e '.[slurm]'")
     (name,) = setting
     with pytest.raises(InputError, match=rf"submitit refuses .*{name}.*\+hydra.launcher.slurm_"):
         SlurmExecutor(tmp_path, cluster="local", num_jobs=2, **setting)
 
 
-def test_what_slurm_refuses_is_told_in_one_line(make_runs, tmp_path):
+def test_jobs_that_slurm_refuses(make_runs, tmp_path):
     executor = slurm(tmp_path)
 
     @contextlib.contextmanager
@@ -138,8 +137,8 @@ def test_what_slurm_refuses_is_told_in_one_line(make_runs, tmp_path):
         list(executor.finish(make_runs("seed=0")))
 
 
-def fake_ray(given):
-    task = types.SimpleNamespace(remote=lambda *args: given.append(args) or len(given))
+def fake_ray(calls):
+    task = types.SimpleNamespace(remote=lambda *args: calls.append(args) or len(calls))
     return types.SimpleNamespace(
         is_initialized=lambda: True,
         init=lambda **_: None,
@@ -151,12 +150,12 @@ def fake_ray(given):
 
 
 def test_runs_on_ray_work_in_the_folder_of_the_sweep(make_runs, monkeypatch, tmp_path):
-    given = []
-    monkeypatch.setitem(sys.modules, "ray", fake_ray(given))
+    calls = []
+    monkeypatch.setitem(sys.modules, "ray", fake_ray(calls))
     monkeypatch.chdir(tmp_path)
     (run,) = make_runs("seed=0")
     assert dict(RayExecutor(address=None, num_cpus=1, num_gpus=0).finish([run])) == {run: 0}
-    assert given == [(run, tmp_path.resolve())]
+    assert calls == [(run, tmp_path.resolve())]
 
 
 def test_runs_that_fit_on_no_machine_are_warned_about(monkeypatch, caplog):
@@ -169,13 +168,6 @@ def test_runs_that_fit_on_no_machine_are_warned_about(monkeypatch, caplog):
     assert "num_gpus=1, but no machine has more than 0; runs wait" in caplog.text
 
 
-def test_an_unknown_cluster_is_refused(tmp_path):
-    with pytest.raises(
-        InputError, match=r"hydra\.launcher\.cluster='Slurm' is unknown; give slurm, local"
-    ):
-        SlurmExecutor(tmp_path, cluster="Slurm", num_jobs=2)
-
-
 def test_at_least_one_job():
     with pytest.raises(InputError, match="num_jobs=0"):
         LocalExecutor(0)
@@ -183,5 +175,91 @@ def test_at_least_one_job():
     assert LocalExecutor().num_jobs == num_cores()
 
 
-def test_folders_with_odd_names_reach_the_program_whole(make_runs):
-    assert quoted("a'b,c=d") == "'a\\'b,c=d'"
+def test_a_run_works_in_the_given_folder(make_runs, monkeypatch, tmp_path):
+    code = "import os, sys; sys.exit('error: ' + os.getcwd())"
+    monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-c", code))
+    (run,) = make_runs("seed=0")
+    (tmp_path / "project").mkdir()
+    assert finish_run(run, tmp_path / "project") != 0
+    assert read_failure(run) == str((tmp_path / "project").resolve())
+
+
+def test_a_run_that_another_process_works_on_is_waited_for(make_runs):
+    (run,) = make_runs("seed=0")
+    run.folder.mkdir()
+    statuses = []
+    with folder_lock(run.folder):
+        thread = threading.Thread(target=lambda: statuses.append(finish_run(run)))
+        thread.start()
+        time.sleep(0.5)
+        assert not statuses
+        result = {"reason": "solved", "running_reward": 2.0}
+        (run.folder / "result.json").write_text(json.dumps(result))
+    thread.join(10)
+    assert statuses == [0]
+    assert not (run.folder / "starts").exists()
+
+
+def test_a_process_that_came_too_late_is_no_failure(make_runs):
+    (run,) = make_runs("fail=true")
+    process = RunProcess(run)
+    assert process.poll() is None
+    result = {"reason": "solved", "running_reward": 2.0}
+    (run.folder / "result.json").write_text(json.dumps(result))  # by an earlier sweep's process
+    assert process.wait() == 0
+    assert read_failure(run) is None
+
+
+@pytest.mark.parametrize(
+    ("program", "error"),
+    [
+        ("print('error: first'); print('note'); sys.exit('error: second')", "second"),
+        ("print('only words'); print(' '); sys.exit(3)", "only words"),
+        ("sys.exit(3)", "ended with status 3"),
+        ("os.kill(os.getpid(), signal.SIGKILL)", "ended by signal SIGKILL"),
+    ],
+)
+def test_the_reason_of_a_failure(make_runs, monkeypatch, program, error):
+    code = f"import os, signal, sys; {program}"
+    monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-u", "-c", code))
+    (run,) = make_runs("seed=0")
+    assert finish_run(run) != 0
+    assert read_failure(run) == error
+
+
+def test_a_run_that_is_stopped_ends_by_sigterm(make_runs):
+    (run,) = make_runs("sleep=60")
+    started = RunProcess(run)
+    started.stop()  # nothing to stop yet
+    assert started.poll() is None
+    while not (run.folder / "starts").exists():
+        time.sleep(0.02)
+    started.stop()
+    started.join()
+    assert started.poll() == -signal.SIGTERM
+    assert read_result(run.folder) is None
+
+
+def test_a_run_has_one_thread_and_no_input(make_runs, monkeypatch):
+    code = "import os, sys; sys.exit('error: ' + os.environ['OMP_NUM_THREADS'] + sys.stdin.read())"
+    monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-c", code))
+    (run,) = make_runs("seed=0")
+    finish_run(run)
+    assert read_failure(run) == "1"
+
+
+def test_a_later_attempt_replaces_the_failure(make_runs, monkeypatch):
+    (run,) = make_runs("seed=0")
+    for program, error in (
+        ("sys.exit('error: disk full')", "disk full"),
+        ("sys.exit(3)", "ended with status 3"),
+    ):
+        code = f"import sys; {program}"
+        monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-c", code))
+        assert finish_run(run) != 0
+        assert read_failure(run) == error
+    result = "{'reason': 'solved'}"
+    code = f"import json; json.dump({result}, open({str(run.folder / 'result.json')!r}, 'w'))"
+    monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-c", code))
+    assert finish_run(run) == 0
+    assert read_failure(run) is None

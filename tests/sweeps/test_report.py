@@ -1,19 +1,36 @@
-"""The page of a sweep, and the picture of its outcome."""
+"""Page, chart, terminal lines and verdicts of a sweep."""
 
 import json
+import os
+import shutil
+import subprocess
+import sys
 
 import pytest
 
-from drone_rl.sweeps.report import _code, _figure, write_picture, write_sweep_report
+import drone_rl
+from drone_rl.sweeps.manifest import Run, Sweep
+from drone_rl.sweeps.report import (
+    _code,
+    _figure,
+    find_sweep,
+    judge_run,
+    terminal_lines,
+    write_picture,
+    write_sweep_report,
+)
 from drone_rl.sweeps.summary import median_of_runs, share_of_runs
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import silent
+from drone_rl.utils.seeding import RootSeed
+from tests.training.test_train import TINY
 
 
 def test_report_has_every_sentence_and_escapes_what_it_shows(sweep):
     page = write_sweep_report(sweep)[0].read_text()
     assert "<b>NaN</b>" not in page
     assert "&lt;b&gt;NaN" in page
-    assert "panels are shown" not in page
+    assert "are left out." not in page
     assert page.count("data:image/png;base64,") == 10  # five figures, light and dark
     assert "drone-rl train optimizer.lr=1e-3 seed=0" in page
     assert 'href="./2/"' in page
@@ -46,7 +63,7 @@ def test_a_sweep_that_has_hardly_begun_has_a_page(begin_sweep):
 def test_panels_that_are_not_plotted_are_counted(begin_sweep):
     choices = [f"objective={i} optimizer.lr={lr}" for i in range(8) for lr in ("1e-3", "1e-2")]
     page = write_sweep_report(begin_sweep({choice: {} for choice in choices}))[0].read_text()
-    assert page.count("Only the first 6 of 8 panels are shown.") == 2  # curves and costs
+    assert page.count("2 further panels are left out.") == 2  # curves and costs
 
 
 def test_cells():
@@ -63,5 +80,83 @@ def test_cells():
     assert _figure({**share_of_runs(2, 0, 2), "certain": 1}) == "2/2, 1 certain [0.16, 1.00]"
 
 
-def test_a_command_stands_out_and_nothing_else_is_markup():
-    assert _code("see `a <b>` & c") == "see <code>a &lt;b&gt;</code> &amp; c"
+def begun(folder):
+    folder.mkdir(parents=True)
+    Sweep(folder, "drone-rl train -m seed=0", {}, [Run(0, ("seed=0",), folder / "0")]).save()
+    return folder
+
+
+def test_the_latest_is_the_newest(tmp_path):
+    sweeps = [begun(tmp_path / "train" / "multiruns" / name) for name in ("b", "a")]
+    for number, sweep in enumerate(sweeps):
+        os.utime(sweep / "sweep.json", (number, number))
+    assert find_sweep("latest", tmp_path).folder == sweeps[1]
+    assert find_sweep(sweeps[0]).folder == sweeps[0]
+
+
+def test_no_sweep(tmp_path):
+    with pytest.raises(InputError, match="drone-rl train -m first"):
+        find_sweep("latest", tmp_path)
+
+
+def test_the_sentences_in_order():
+    figures = {
+        "sentences": {
+            "runs.all": "3 runs.",
+            "best.run": "Run 2.",
+            "x.y": "no",
+            "verdicts.a": "All.",
+        },
+        "groups": [{"lr": "0.1", "runs": 3, "sentences": {"a": "one", "b": "two"}}],
+        "runs": [{"run": 1, "state": "failed", "error": "no memory"}, {"run": 2, "error": None}],
+        "best": {"command": "drone-rl train seed=2"},
+    }
+    lines = terminal_lines(figures).splitlines()
+    assert lines[:2] == ["3 runs.", "All."]
+    assert lines[2].split(maxsplit=1) == ["lr=0.1", "one; two"]
+    assert lines[3:] == [
+        *("run 1 failed: no memory", "best run: Run 2."),
+        "to repeat it: drone-rl train seed=2",
+    ]
+
+
+def test_a_report_and_the_plugins_of_hydra_need_no_torch():
+    modules = "drone_rl.sweeps.report, drone_rl.cli.train, hydra_plugins.drone_rl"
+    code = f"import sys, {modules}; assert 'torch' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.fixture(scope="module")
+def training(tmp_path_factory):
+    return drone_rl.train(TINY, folder=tmp_path_factory.mktemp("run"), progress=silent).folder
+
+
+@pytest.fixture
+def trained(training, tmp_path):
+    """The folder of a training that was not judged."""
+    return shutil.copytree(training, tmp_path / "run")
+
+
+def test_a_run_keeps_its_verdict_beside_its_result(trained):
+    before = json.loads((trained / "result.json").read_text())
+    assert "verdict" not in before
+    seed = RootSeed(4, is_fixed=False)
+    verdict = judge_run(trained, 12, "cpu", seed=seed)
+    assert (verdict["seed"], verdict["seed_is_fixed"]) == (4, False)
+    after = json.loads((trained / "result.json").read_text())
+    assert after == {**before, "verdict": json.loads(json.dumps(verdict))}
+    assert verdict["greedy"]["episodes"] == verdict["sampled"]["episodes"] == 12
+    assert judge_run(trained, 12, "cpu", seed=seed) == verdict  # once more, to the last bit
+
+
+def test_a_checkpoint_that_is_not_that_of_the_result_is_refused(trained):
+    result = json.loads((trained / "result.json").read_text())
+    (trained / "result.json").write_text(json.dumps({**result, "frames": 7}))
+    with pytest.raises(InputError, match=r"frame 7; resume with"):
+        judge_run(trained, 4, "cpu")
+    (trained / "result.json").write_text(json.dumps({**result, "frames": 10**6}))
+    with pytest.raises(InputError, match=r"frame 1000000; resume with"):
+        judge_run(trained, 4, "cpu")
+    (trained / "result.json").unlink()
+    with pytest.raises(InputError, match=r"no result\.json"):
+        judge_run(trained, 4, "cpu")

@@ -1,6 +1,4 @@
 import csv
-import logging
-import subprocess
 import types
 
 import pytest
@@ -10,10 +8,9 @@ from drone_rl.training import (
     CheckpointCallback,
     CsvCallback,
     LoggerCallback,
-    ProgressCallback,
     callbacks,
 )
-from drone_rl.training.callbacks import CollapseCheck, ForwardProgress, Progress, with_progress
+from drone_rl.training.callbacks import CollapseCheck, Progress
 from drone_rl.utils.checkpoint import load_checkpoint, save_checkpoint
 from drone_rl.utils.errors import InputError
 from tests.training_loop import run
@@ -51,36 +48,6 @@ def test_a_best_state_that_was_not_saved_is_not_noted_in_the_last(
         callback.on_update(trainer, {})
     last, best = (load_checkpoint(tmp_path / name) for name in ("last.pt", "best.pt"))
     assert last["best"] == best["progress"]["running_reward"]
-
-
-def test_first_checkpoint_precedes_the_first_update(make_trainer, tmp_path):
-    callback = CheckpointCallback(tmp_path / "deep" / "folder")
-    callback.on_start(make_trainer())
-    assert load_checkpoint(callback.last_path)["progress"]["updates"] == 0
-
-
-def test_temporary_files_of_killed_runs_are_deleted(make_trainer, tmp_path):
-    dead = subprocess.Popen(["true"])
-    dead.wait()
-    left = {f".last.pt.{dead.pid}", ".best.pt.ab12cd_3"}
-    kept = {".last.pt.1", ".mine", "mine.pt"}  # process 1 is running
-    for name in left | kept:
-        (tmp_path / name).touch()
-    CheckpointCallback(tmp_path).on_start(make_trainer())
-    assert {path.name for path in tmp_path.iterdir()} == {*kept, "last.pt", "best.pt"}
-
-
-@pytest.mark.parametrize("row", ["x", "-1", "9" * 30, "1.5"])
-def test_damaged_metrics_raise(make_trainer, tmp_path, row):
-    (tmp_path / "metrics.csv").write_text(f"update,frames\n{row},2\n")
-    with pytest.raises(InputError, match="no number of an update"):
-        CsvCallback(tmp_path / "metrics.csv").on_start(make_trainer())
-
-
-def test_uncreatable_folder_raises(make_trainer, tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="can't be made"):
-        CheckpointCallback(tmp_path / "file" / "sub").on_start(make_trainer())
 
 
 def test_metrics_have_one_row_per_update(make_trainer, tmp_path):
@@ -135,33 +102,6 @@ def test_passes_over_demonstrations_have_rows_of_their_own(tmp_path):
     assert not (tmp_path / "metrics.csv").exists()
 
 
-def test_passes_are_logged_by_torchrl_and_forwarded(tmp_path):
-    logger, messages = CSVLogger("run", log_dir=str(tmp_path)), []
-    LoggerCallback([logger]).on_clone(3, 9, METRICS)
-    (path,) = tmp_path.glob("run/scalars/**/*loss*.csv")
-    assert path.read_text().strip() == "3,0.25"
-    late = LoggerCallback(lambda: [CSVLogger("late", log_dir=str(tmp_path))])
-    late.on_clone(3, 9, METRICS)
-    (path,) = tmp_path.glob("late/scalars/**/*loss*.csv")
-    assert path.read_text().strip() == "3,0.25"
-    ForwardProgress(lambda *message: messages.append(message)).on_clone(
-        3, 9, {"cloning/accuracy": 0.5}
-    )
-    assert messages == [("cloning: accuracy 0.500", 3, 9)]
-
-
-def test_passes_are_logged_as_lines_now_and_then_and_the_last_one(monkeypatch, caplog):
-    caplog.set_level(logging.INFO)
-    clock, callback = Clock(monkeypatch), ProgressCallback(interval_s=5.0)
-    for now, epoch in ((1000.0, 1), (1004.9, 2), (1005.0, 3), (1005.1, 4)):
-        clock.now = now
-        callback.on_clone(epoch, 4, METRICS)
-    lines = [record.getMessage() for record in caplog.records]
-    assert lines == [
-        f"cloning: epoch {epoch} of 4, loss 0.250, held out accuracy 0.500" for epoch in (1, 3, 4)
-    ]
-
-
 def collapse(updates, episodes=10, target=3.0):
     """A check after updates of (entropy, running reward), with so many episodes each."""
     check, progress = CollapseCheck(target), Progress()
@@ -201,68 +141,7 @@ def test_a_deterministic_policy_that_does_not_improve_has_collapsed(caplog, upda
     assert check.result == ({} if collapsed_at is None else {"collapsed_at_frames": collapsed_at})
 
 
-def test_a_few_large_batches_are_not_yet_a_collapse():
-    assert collapse(LEARNING + STUCK * 19, episodes=1000).collapsed_at is None
-    assert collapse(LEARNING + STUCK * 20, episodes=1000).collapsed_at == 2200
-
-
 def test_torchrl_loggers_are_supported(make_trainer, tmp_path):
     logger = CSVLogger("run", log_dir=str(tmp_path))
     run(make_trainer(callbacks=[LoggerCallback([logger])]))
     assert list(tmp_path.glob("run/scalars/**/*reward*.csv"))
-
-
-def test_progress_is_logged_as_lines_without_a_terminal(make_trainer, caplog):
-    caplog.set_level(logging.INFO)
-    run(make_trainer(callbacks=[ProgressCallback(interval_s=0.0)]))
-    lines = [r.getMessage() for r in caplog.records]
-    assert any("running reward" in line and "frames/s" in line for line in lines)
-    assert "stopped (frames)" in lines[-1]
-
-
-class Clock:
-    """A clock that advances only when set."""
-
-    def __init__(self, monkeypatch):
-        self.now = 1000.0
-        monkeypatch.setattr(callbacks.time, "monotonic", lambda: self.now)
-
-
-def test_progress_line_estimates_the_remaining_time(monkeypatch, caplog):
-    """70 of 100 frames remain at 10 frames/s; the estimate is never negative."""
-    caplog.set_level(logging.INFO)
-    clock, callback = Clock(monkeypatch), ProgressCallback(interval_s=5.0)
-    progress = types.SimpleNamespace(frames=30, episodes=2, running_reward=1.5)
-    training = types.SimpleNamespace(total_frames=100, progress=progress)
-    callback.on_start(training)
-    for now, frames in ((1004.9, 30), (1005.0, 30), (1009.9, 60), (1010.0, 130)):
-        clock.now, progress.frames = now, frames
-        callback.on_update(training, {"time/frames_per_second": 10.0})
-    lines = [record.getMessage() for record in caplog.records]
-    assert [line.rpartition(", ")[2] for line in lines] == [
-        "at most 7 s left",
-        "at most 0 s left",
-    ]
-    assert lines[0].startswith("frames 30, episodes 2, running reward 1.50, 10 frames/s")
-
-
-def test_checkpoints_are_saved_at_intervals(make_trainer, monkeypatch, tmp_path):
-    clock, trainer = Clock(monkeypatch), make_trainer()
-    callback, saved = CheckpointCallback(tmp_path, interval_s=60.0), []
-    callback.on_start(trainer)
-    monkeypatch.setattr(callback, "_save", lambda training: saved.append(clock.now))
-    for now in (1000.0, 1059.0, 1060.0, 1100.0):
-        clock.now = now
-        callback.on_update(trainer, {})
-    assert saved == [1060.0, 1100.0]  # the time of each save
-
-
-def test_progress_is_forwarded_after_the_callbacks():
-    mine, seen = CsvCallback("metrics.csv"), []
-    found = with_progress([mine], lambda *given: seen.append(given))
-    assert found[0] is mine and isinstance(found[1], ForwardProgress) and len(found) == 2
-    for wrong in ([print], print, [CsvCallback]):
-        with pytest.raises(InputError, match=r"^callbacks"):
-            with_progress(wrong, None)  # pyright: ignore[reportArgumentType]
-    with pytest.raises(InputError, match=r"^progress=5"):
-        with_progress([mine], 5)  # pyright: ignore[reportArgumentType]

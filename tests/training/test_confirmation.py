@@ -39,17 +39,6 @@ def test_confirmation_uses_the_most_probable_action():
     assert confirmation.result == dict(zip(names, (2, 40, 0), strict=True))
 
 
-def test_success_rate_is_that_of_complete_episodes():
-    straight = Confirmation(SETTINGS, always(1.0, 0.0, 0.0))
-    assert not straight(1)
-    reached = straight.succeeded
-    assert 0 < reached < 40  # flying straight ahead touches cubes within 1.65 m
-    for share, is_enough in ((reached / 40, True), (reached / 40 + 0.01, False)):
-        trainer = SETTINGS.trainer.replace(confirm_share=share)
-        again = Confirmation(SETTINGS.replace(trainer=trainer), always(1.0, 0.0, 0.0))
-        assert again(1) is is_enough and again.succeeded == reached
-
-
 def test_each_update_confirms_in_new_environments(monkeypatch):
     calls, fly = [], confirming.run_episodes
 

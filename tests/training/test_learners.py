@@ -134,15 +134,6 @@ def test_batch_without_learner_inputs_raises(trainer):
         check_batch(batch, trainer.learner.in_keys, "CriticLearner")
 
 
-def test_partial_episodes_need_reward_sums(trainer):
-    batch = next(iter(trainer.collector))
-    del batch["next", "episode_reward"]
-    trainer.collector = type("One", (list,), {"state_dict": dict})([batch])
-    batch["next", "done"][:, -1] = False
-    with pytest.raises(InputError, match="RewardSum"):
-        run(trainer)
-
-
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
 def test_nan_or_infinite_values_raise(value):
     check_finite(torch.zeros(2), "loss")

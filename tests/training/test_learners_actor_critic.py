@@ -102,13 +102,6 @@ def gradient(learner, steps, name="loss_objective"):
     return learner.network.layers[-1].weight.grad.clone()
 
 
-def test_metrics_are_means_over_minibatches(make_learner, batch):
-    learner = make_learner(A2CLoss)
-    steps = learner.estimate(batch)
-    loss = float(learner._losses(steps.reshape(-1).copy())["loss_critic"])
-    assert learner.update(steps)["loss/loss_critic"] == pytest.approx(loss)
-
-
 @pytest.mark.parametrize("kind", [A2CLoss, ClipPPOLoss])
 def test_gradient_before_the_first_step_is_the_policy_gradient(make_learner, batch, kind):
     """It is -mean(A grad log p), as all ratios are 1; for linear logits, x (onehot - p)."""
@@ -131,15 +124,6 @@ def test_clipped_ratios_have_no_gradient(make_learner, batch, ratio, is_clipped)
     assert gradient(learner, steps).abs().max() > 1e-3
 
 
-def test_values_can_be_clipped(make_learner, batch):
-    """TorchRL's loss clips relative to the values at the beginning of the update."""
-    terms = []
-    for most in (None, 0.01):
-        learner = make_learner(loss={"clip_value": most}, epochs=4, lr=1.0)
-        terms.append(learner.update(learner.estimate(batch))["loss/loss_critic"])
-    assert terms[0] != pytest.approx(terms[1])
-
-
 def record_chunks(learner):
     """Record the chunks that the loss receives, in order."""
     seen, losses = [], learner._losses
@@ -150,14 +134,6 @@ def record_chunks(learner):
 
     learner._losses = spy
     return seen
-
-
-def test_a2c_takes_one_step_on_the_whole_batch(make_learner, batch):
-    learner = make_learner(A2CLoss)
-    seen = record_chunks(learner)
-    learner.update(learner.estimate(batch))
-    everything = sorted(batch["pixels"].reshape(6, 2).tolist())
-    assert [sorted(pass_) for pass_ in seen] == [everything]
 
 
 def test_every_epoch_visits_every_step_once_in_a_new_order(make_learner, batch):
@@ -171,14 +147,6 @@ def test_every_epoch_visits_every_step_once_in_a_new_order(make_learner, batch):
     assert orders[0] != orders[1] != orders[2]
 
 
-@pytest.mark.parametrize(("frames", "sizes"), [(4, [3, 3]), (5, [6]), (1, [1] * 6), (99, [6])])
-def test_minibatches_have_similar_sizes(make_learner, batch, frames, sizes):
-    learner = make_learner(minibatch_size=frames)
-    seen = record_chunks(learner)
-    learner.update(learner.estimate(batch))
-    assert [len(minibatch) for minibatch in seen] == sizes
-
-
 @pytest.mark.parametrize("kind", [A2CLoss, ClipPPOLoss])
 def test_chunk_size_does_not_change_the_update(make_learner, batch, kind):
     learners = [make_learner(kind, chunk_frames=chunk) for chunk in (100, 2)]
@@ -186,18 +154,6 @@ def test_chunk_size_does_not_change_the_update(make_learner, batch, kind):
     assert metrics[0] == pytest.approx(metrics[1], rel=1e-4, abs=1e-6)
     weights = [learner.network.layers[-1].weight for learner in learners]
     torch.testing.assert_close(*weights)
-
-
-@pytest.mark.parametrize("kind", [A2CLoss, ClipPPOLoss])
-def test_update_returns_metrics(make_learner, batch, kind):
-    learner = make_learner(kind, max_grad_norm=1e-3)
-    metrics = learner.update(learner.estimate(batch))
-    names = {"loss/loss_objective", "loss/loss_critic", "loss/loss_entropy", "loss/entropy"}
-    assert names | {"loss/grad_norm", "train/learning_rate"} <= set(metrics)
-    assert ("loss/clip_fraction" in metrics) is (kind is ClipPPOLoss)
-    assert metrics["train/learning_rate"] == 0.05  # rate of the next step
-    assert metrics["loss/grad_norm"] > 1e-3  # before clipping
-    assert set(learner.update(learner.estimate(batch))) == set(metrics)
 
 
 @pytest.mark.parametrize("kind", [A2CLoss, ClipPPOLoss])
@@ -252,40 +208,6 @@ def assert_same(one, two):
             assert_same(a, b)
     else:
         assert one == two
-
-
-def test_state_dict_restores_the_learner(make_learner, batch):
-    first, second = (make_learner(epochs=2, minibatch_size=2) for _ in range(2))
-    first.update(first.estimate(batch))
-    state = copy.deepcopy(first.state_dict())
-    second.generator.manual_seed(99)
-    second.check_state(state)
-    second.load_state_dict(state)
-    metrics = [learner.update(learner.estimate(batch)) for learner in (first, second)]
-    assert metrics[0] == metrics[1]
-    assert_same(first.state_dict(), second.state_dict())
-
-
-@pytest.mark.parametrize(
-    ("part", "value", "message"),
-    [
-        ("policy", {"weight": torch.zeros(3, 2)}, "policy has other names"),
-        ("critic", {"weight": torch.zeros(1, 2)}, "critic has other names"),
-        (
-            "critic",
-            {"module.weight": torch.zeros(1, 3), "module.bias": torch.zeros(1)},
-            r"critic\.module",
-        ),
-        ("optimizer", {}, "optimizer has other names"),
-        ("scheduler", None, "scheduler has other names"),
-        ("minibatches", torch.zeros(3), "minibatches is not of shape"),
-    ],
-)
-def test_state_of_another_learner_raises(make_learner, part, value, message):
-    learner = make_learner()
-    with pytest.raises(InputError, match=message):
-        learner.check_state({**learner.state_dict(), part: value})
-    learner.check_state(learner.state_dict())
 
 
 def test_missing_entries_raise(make_learner, batch):

@@ -3,7 +3,6 @@
 from unittest.mock import patch
 
 import pytest
-import yaml
 
 import drone_rl
 from drone_rl.config import TASKS, DynamicsSettings
@@ -12,21 +11,13 @@ from drone_rl.config.training import TrainSettings
 from drone_rl.sim.tasks.task import MAKERS, as_settings
 from drone_rl.training.run_folder import (
     RunFolder,
-    _read_best,
     possible_ends,
     settings_of,
     target_of,
 )
 from drone_rl.training.train import train
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import last_of
 from tests.second_task import Posts
-
-
-@pytest.mark.parametrize("best", [float("nan"), float("inf"), 1e16, "high", None])
-def test_invalid_best_mean_raises(best):
-    with pytest.raises(InputError, match=r"^the checkpoint's best="):
-        _read_best(best)
 
 
 def test_checkpoint_settings_are_restored_and_validated():
@@ -35,26 +26,6 @@ def test_checkpoint_settings_are_restored_and_validated():
     foreign = {**as_config(settings), "network": {"_target_": "os.system"}}
     with pytest.raises(InputError, match=r"the checkpoint uses os\.system"):
         settings_of(foreign)
-
-
-def test_new_run_writes_its_description(tmp_path):
-    folder, state = RunFolder.open(tmp_path, resume=False)
-    assert folder.path == tmp_path and state is None
-    (folder.path / "run.yaml.1-0.tmp").touch()
-    folder.prepare(TrainSettings(), None)
-    folder.resume(None, folder.checkpoints(TrainSettings()), None)
-    assert yaml.safe_load((folder.path / "run.yaml").read_text())["config"]["seed"] == 0
-    assert last_of(folder.path) == folder.path / "checkpoints" / "last.pt"
-
-
-@pytest.mark.parametrize(
-    ("file", "kind"), [("result.json", "a finished"), ("checkpoints/last.pt", "an unfinished")]
-)
-def test_a_run_is_not_replaced(tmp_path, file, kind):
-    (tmp_path / "checkpoints").mkdir()
-    (tmp_path / file).touch()
-    with pytest.raises(InputError, match=f"holds {kind} run, which a new one would replace; res"):
-        RunFolder.open(tmp_path, resume=False)
 
 
 def test_changed_settings_prevent_resuming(tmp_path):
@@ -69,12 +40,6 @@ def test_lost_control_is_possible_only_with_dynamics():
     assert "LOST_CONTROL" not in names[0] and names[1] == [*names[0], "LOST_CONTROL"]
 
 
-def test_a_checkpoint_is_no_folder_to_resume(tmp_path):
-    path = tmp_path / "checkpoints" / "last.pt"
-    with pytest.raises(InputError, match=r"last\.pt is a checkpoint; give the folder of its run"):
-        RunFolder.open(path, resume=True)
-
-
 def test_a_task_of_costs_has_no_target():
     class Costs(Posts):
         name, largest_reward = "costs", 0.0
@@ -84,10 +49,6 @@ def test_a_task_of_costs_has_no_target():
         with pytest.raises(InputError, match="task=costs has largest_reward=0, of which no fract"):
             target_of(settings)
     assert target_of(TrainSettings()) == pytest.approx(2.97)  # 0.99 of three cubes
-
-
-def test_a_large_negative_mean_is_read():
-    assert _read_best(-3e6) == -3e6
 
 
 def test_a_task_that_no_verdict_accepts_is_refused_before_the_training(tmp_path):

@@ -53,15 +53,6 @@ def test_training_writes_the_same_files_as_the_command(trained):
     assert done.policy.name == "mine"
 
 
-def test_result_has_an_html_representation(trained):
-    done, _ = trained
-    assert done.metrics()["frames"][-1] == done.result["frames"]
-    assert done.running_reward == done.result["running_reward"]
-    shown = done._repr_html_()
-    assert "<td>reason</td><td>frames</td>" in shown
-    assert "data:image/png;base64," in shown
-
-
 def test_resumed_training_equals_an_uninterrupted_one(trained, tmp_path):
     longer = TINY.trainer.replace(total_frames=900)
     whole = drone_rl.train(TINY, folder=tmp_path / "whole", trainer=longer, progress=silent)
@@ -186,28 +177,12 @@ def test_signal_takes_effect_after_the_state_is_saved(
     assert_resumes(tmp_path, trained)
 
 
-def test_second_ctrl_c_stops_without_saving(trained, tmp_path, handlers):
-    with pytest.raises(KeyboardInterrupt) as stopped:
-        drone_rl.train(TINY, folder=tmp_path, callbacks=[Stop(signal.SIGINT, signal.SIGINT)])
-    assert not hasattr(stopped.value, "training")
-    assert not (tmp_path / "result.json").exists()
-    assert_resumes(tmp_path, trained)
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_custom_signal_handler_is_called(tmp_path, handlers, number):
     got = []
     handlers(number, lambda n, frame: got.append(n))
     done = drone_rl.train(TINY, folder=tmp_path, callbacks=[Stop(number)], progress=silent)
     assert got == [number] and done.reason == number.name
-
-
-def test_ignored_signal_stops_training(tmp_path, handlers):
-    """A background process of a shell script ignores Ctrl-C."""
-    handlers(signal.SIGINT, signal.SIG_IGN)
-    with pytest.raises(KeyboardInterrupt):
-        drone_rl.train(TINY, folder=tmp_path, callbacks=[Stop(signal.SIGINT)], progress=silent)
-    assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
 
 
 def test_stopped_confirmation_is_repeated_on_resume(tmp_path, handlers, monkeypatch):
@@ -256,25 +231,6 @@ def test_signal_ends_a_loop_of_trainings(tmp_path, number, statuses):
     assert state["updates"] == len(rows) - 1
 
 
-def contents(folder):
-    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-
-def test_rejected_resume_changes_no_file(trained, tmp_path):
-    folder = shutil.copytree(trained[0].folder, tmp_path / "run")
-    before = contents(folder)
-    with pytest.raises(InputError, match="can't resume with seed=9"):
-        drone_rl.train(folder=folder, resume=True, seed=9)
-    assert contents(folder) == before
-    state = torch.load(folder / "checkpoints" / "last.pt", weights_only=False)
-    torch.save({**state, "optimizer": {}}, folder / "checkpoints" / "last.pt")
-    before = contents(folder)
-    longer = TINY.trainer.replace(total_frames=900)
-    with pytest.raises(InputError):
-        drone_rl.train(folder=folder, resume=True, trainer=longer)
-    assert contents(folder) == before
-
-
 def test_a_finished_run_is_not_replaced(tmp_path):
     (tmp_path / "result.json").write_text("{}")
     with pytest.raises(InputError, match=r"holds a finished run, .*resume=True.*another folder"):
@@ -282,33 +238,10 @@ def test_a_finished_run_is_not_replaced(tmp_path):
     assert (tmp_path / "result.json").read_text() == "{}"
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"resume": True}, "resume=True needs the run to resume; give folder=RUN"),
-        ({"resume": "RUN"}, "resume='RUN' is neither true nor false; give folder=RUN, resume=True"),
-        ({"folder": 5}, "folder=5 is no path"),
-        ({"folder": ""}, "folder='' is no path"),
-        ({"folder": "/dev/null/x"}, "folder=/dev/null/x can't be made .*give another folder"),
-    ],
-)
-def test_folders_that_do_not_work_are_named(given, message):
-    with pytest.raises(InputError, match=message):
-        drone_rl.train(TINY, progress=silent, **given)
-
-
-def test_plugins_are_imported_in_python():
+def test_names_of_other_projects():
     for name, meant in (("learning_rate", r"Adam\(lr"), ("n_envs", r"Episodes\(num_envs")):
         with pytest.raises(InputError, match=rf"^{name} is unknown; .*did you mean .*{meant}="):
             drone_rl.train(**{name: 1})
-    with pytest.raises(InputError, match=r"^plugins belongs to the command .*import the"):
-        drone_rl.train(plugins=["mine"], progress=silent)
-
-
-def test_settings_of_another_kind_are_named():
-    for wrong in ({"seed": 1}, "latest", drone_rl.TaskSettings()):
-        with pytest.raises(InputError, match=r"^settings=.* is no TrainSettings"):
-            drone_rl.train(wrong, progress=silent)  # pyright: ignore[reportArgumentType]
 
 
 def test_a_result_is_forgotten_once_the_run_goes_on(trained, tmp_path):

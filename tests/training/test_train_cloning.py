@@ -9,14 +9,10 @@ import torch
 import drone_rl
 from drone_rl.config import TaskSettings
 from drone_rl.config.learning import Episodes, Ppo
-from drone_rl.config.networks import Lstm
 from drone_rl.config.training import CloningSettings, TrainerSettings, TrainSettings
-from drone_rl.policies.zoo import describe
-from drone_rl.training.cloning import clone
-from drone_rl.training.demonstrations import read_demonstrations, record_oracle
+from drone_rl.training.demonstrations import record_oracle
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
-from drone_rl.utils.seeding import Stream, torch_generator
 
 TINY = TrainSettings(
     task=TaskSettings(num_cubes=1, first_distance=6.0, step_limit=40),
@@ -73,14 +69,6 @@ def test_a_run_may_only_clone(cloned, flights):
     assert float(rows[-1].split(",")[1]) == pytest.approx(written["cloning"]["loss"], rel=1e-5)
 
 
-def test_the_first_weights_are_those_of_the_clone(cloned, flights):
-    settings = TINY.replace(trainer=NOTHING)
-    generator = torch_generator(0, Stream.POLICY_INIT)
-    network = describe(settings).build_network(generator)
-    clone(settings, network, read_demonstrations(flights))
-    assert_same(weights(cloned[0].folder), network.state_dict())
-
-
 def test_reinforce_continues_from_the_clone_and_resumes_bit_for_bit(cloned, flights, tmp_path):
     """A run of the clone that is resumed, and one stopped in between, equal one without a stop."""
     path, longer = str(flights), TINY.trainer.replace(total_frames=300)
@@ -108,48 +96,6 @@ def test_a_resumed_run_needs_no_demonstrations(cloned, tmp_path):
         assert done.result["cloning"] == cloned[0].result["cloning"]
     with pytest.raises(InputError, match=r"^can't resume with cloning\.epochs=9: .*epochs=3"):
         drone_rl.train(folder=folder, resume=True, cloning=CloningSettings(epochs=9))
-
-
-def test_a_run_without_a_clone_is_resumed_without_demonstrations(flights, tmp_path):
-    drone_rl.train(TINY, folder=tmp_path, trainer=NOTHING, progress=silent)
-    with pytest.raises(InputError, match=f"^can't resume with demonstrations={flights}: the run"):
-        drone_rl.train(folder=tmp_path, resume=True, demonstrations=str(flights))
-    assert "cloning" not in drone_rl.train(folder=tmp_path, resume=True, progress=silent).result
-
-
-@pytest.mark.parametrize(("epochs", "warned"), [(3, True), (30, False)])
-def test_settings_without_demonstrations_are_warned_about(tmp_path, caplog, epochs, warned):
-    settings = TINY.replace(cloning=CloningSettings(epochs=epochs))
-    drone_rl.train(settings, folder=tmp_path, trainer=NOTHING, progress=silent)
-    assert ("no effect without demonstrations=FOLDER" in caplog.text) == warned
-    caplog.clear()
-    drone_rl.train(folder=tmp_path, resume=True, progress=silent)
-    assert "no effect" not in caplog.text
-
-
-def test_recurrent_policies_are_not_cloned(flights, tmp_path):
-    with pytest.raises(InputError, match=r"remembers earlier frames .* cloning .* set another"):
-        drone_rl.train(TINY, network=Lstm(), demonstrations=str(flights), folder=tmp_path)
-
-
-def test_a_damaged_result_of_cloning_is_refused(cloned, tmp_path):
-    folder = shutil.copytree(cloned[0].folder, tmp_path / "run")
-    last = folder / "checkpoints" / "last.pt"
-    state = torch.load(last, weights_only=False)
-    for value, message in (({"accuracy": 2.0}, "accuracy=2.0 is out of range"), ({"x": 1}, "x")):
-        torch.save({**state, "cloning": {**state["cloning"], **value}}, last)
-        with pytest.raises(InputError, match=f"^the checkpoint's cloning.*{message}"):
-            drone_rl.train(folder=folder, resume=True, progress=silent)
-
-
-def test_unusable_demonstrations_are_refused_at_once(flights, tmp_path, monkeypatch):
-    monkeypatch.setattr("drone_rl.training.components.make_collector", pytest.fail)
-    larger = TINY.task.replace(num_cubes=2)
-    with pytest.raises(InputError, match=r"task.num_cubes=1, but this training has .*=2; give"):
-        drone_rl.train(TINY, folder=tmp_path, task=larger, demonstrations=str(flights))
-    with pytest.raises(InputError, match=r"^demonstrations=missing can't be read"):
-        drone_rl.train(TINY, folder=tmp_path, demonstrations="missing")
-    assert not (tmp_path / "checkpoints").exists()
 
 
 def test_a_critic_continues_from_the_clone(flights, tmp_path):

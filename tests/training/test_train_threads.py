@@ -106,11 +106,3 @@ def test_two_trainings_with_dropout_at_once_equal_each_alone(registered, tmp_pat
             super().__init__(in_shape, layers, orthogonal(generator))
 
     check_two_at_once(TINY.replace(network=WithDropout.Settings()), tmp_path)
-
-
-@pytest.mark.parametrize("mode", [torch.no_grad, torch.inference_mode])
-def test_a_training_learns_in_any_gradient_mode_of_its_caller(mode, tmp_path):
-    plain = weights(TINY, tmp_path / "plain", 0)
-    with mode():
-        within = weights(TINY, tmp_path / "within", 0)
-    assert all(torch.equal(plain[name], within[name]) for name in plain)

@@ -1,13 +1,14 @@
 import enum
 import signal
-import threading
 
 import pytest
 import torch
+from tensordict import TensorDict
 
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.training import Callback, CheckpointCallback, NotANumberError
 from drone_rl.training import trainer as trainer_module
-from drone_rl.training.trainer import episode_rewards, running_mean
+from drone_rl.training.trainer import batch_metrics, episode_rewards, running_mean
 from drone_rl.utils.checkpoint import load_checkpoint
 from drone_rl.utils.errors import InputError
 from tests.training_loop import run
@@ -86,34 +87,6 @@ def test_signal_during_confirmation_stops_after_it(make_trainer):
     assert calls == [0]
 
 
-def test_signal_during_the_last_save_is_returned(make_trainer):
-    class Late(Callback):
-        def on_end(self, training, reason):
-            assert reason == "frames"
-            signal.raise_signal(signal.SIGTERM)
-
-    assert run(make_trainer(callbacks=[Late()])) == "SIGTERM"
-
-
-def test_other_threads_install_no_signal_handlers(make_trainer):
-    before = signal.getsignal(signal.SIGTERM)
-    seen = []
-    look = At(1, lambda _: seen.append(signal.getsignal(signal.SIGTERM)))
-    trainer = make_trainer(callbacks=[look])
-    thread = threading.Thread(target=run, args=(trainer,))
-    thread.start()
-    thread.join()
-    assert seen == [before] and trainer.progress.frames >= trainer.total_frames
-
-
-def test_handler_from_outside_python_is_kept(make_trainer, monkeypatch):
-    installed = []
-    monkeypatch.setattr(signal, "getsignal", lambda number: None)
-    monkeypatch.setattr(signal, "signal", lambda *args: installed.append(args))
-    assert run(make_trainer()) == "frames"
-    assert installed == []
-
-
 class Terminated(BaseException):
     """Raised by the handler of SIGTERM that the caller of a training had set."""
 
@@ -185,20 +158,6 @@ def test_nan_stops_and_keeps_the_last_good_checkpoint(make_trainer, tmp_path, wh
     assert load_checkpoint(tmp_path / "last.pt")["progress"]["updates"] == 2
 
 
-@pytest.mark.parametrize("metrics", [None, 0.5, {"loss/x": None}, {"loss/x": torch.zeros(2)}])
-def test_wrong_metrics_of_a_learner_are_named(make_trainer, metrics):
-    trainer = make_trainer()
-    trainer.learner.update = lambda batch: metrics
-    with pytest.raises(InputError, match=r"update of ReinforceLearner of .* returns .*by name"):
-        run(trainer)
-
-
-def test_stops_when_solved(make_trainer):
-    trainer = make_trainer(target=0.5, running_decay=0.9, total_frames=100_000)
-    assert run(trainer) == "solved"
-    assert trainer.progress.running_reward >= 0.5
-
-
 def test_training_is_solved_only_after_confirmation(make_trainer):
     calls = []
 
@@ -214,16 +173,6 @@ def test_training_is_solved_only_after_confirmation(make_trainer):
     assert run(trainer) == "solved"
     assert calls[0] == first and calls[2] == trainer.progress.updates
     assert calls == sorted(set(calls)) and trainer.progress.running_reward >= 0.5
-
-
-def test_memory_is_released_periodically(make_trainer, monkeypatch):
-    given, trainer = [], make_trainer(total_frames=100_000)
-    monkeypatch.setattr(
-        trainer_module, "return_freed_memory", lambda: given.append(trainer.progress.updates)
-    )
-    trainer.callbacks.append(At(40, lambda t: setattr(t, "stop_request", "enough")))
-    run(trainer)
-    assert given == [16, 32]
 
 
 def test_stops_at_episodes(make_trainer):
@@ -248,36 +197,6 @@ def test_progress_counts_frames_and_episodes(make_trainer):
     assert progress.seconds > 0
 
 
-class Parity(enum.IntEnum):
-    NONE = 0
-    ODD = 1
-
-
-def test_end_metrics_use_the_given_names(make_trainer):
-    at, trainer = At(-1, None), make_trainer(ends=Parity)
-    collect, trainer.callbacks = trainer.collector.collect, [at]
-
-    def with_ends():
-        batch = collect()
-        batch["next", "info"] = {"end_reason": batch["next", "done"].long()}
-        return batch
-
-    trainer.collector.collect = with_ends
-    run(trainer)
-    assert {metrics["end/odd"] for metrics in at.metrics} == {1.0}
-
-
-def test_update_has_the_expected_metrics(make_trainer):
-    at = At(-1, None)
-    run(make_trainer(callbacks=[at], max_grad_norm=1e-3))
-    names = {"train/reward", "train/running_reward", "train/length", "loss/loss_actor"}
-    assert names | {"loss/entropy", "loss/grad_norm"} <= set(at.metrics[0])
-    for metrics in at.metrics:
-        seconds = metrics["time/collect_s"] + metrics["time/learn_s"]
-        frames = metrics["time/frames_per_second"] * seconds
-        assert frames == pytest.approx(round(frames), abs=1e-6) and frames > 1
-
-
 @pytest.mark.parametrize("reward", [torch.nan, 3e38])
 def test_rewards_that_overflow_end_the_training(make_trainer, reward):
     trainer = make_trainer()
@@ -288,3 +207,95 @@ def test_rewards_that_overflow_end_the_training(make_trainer, reward):
     with pytest.raises(InputError, match="the reward of an episode is NaN or infinite"):
         run(trainer)
     assert trainer.progress.updates == 0
+
+
+def test_running_mean_matches_hand_computed_value():
+    assert running_mean(0.0, torch.tensor([1.0, 2.0]), 0.9) == pytest.approx(0.29)
+
+
+def test_episode_rewards_and_batch_metrics_match_hand_computed_values():
+    batch = TensorDict(
+        {
+            "next": {
+                "reward": torch.tensor([0.0, 1.0, 1.0])[:, None],
+                "done": torch.tensor([0, 1, 1]).bool()[:, None],
+                "info": {"end_reason": torch.tensor([0, 2, 1])[:, None]},
+            }
+        },
+        [3],
+    )
+    assert episode_rewards(batch).tolist() == [1.0, 1.0]
+    assert batch_metrics(batch, EndReason) == {
+        "train/reward": 1.0,
+        "train/length": 1.5,
+        "end/all_cubes": 0.5,
+        "end/front_boundary": 0.5,
+        "end/side_boundary": 0.0,
+        "end/step_limit": 0.0,
+        "end/lost_control": 0.0,
+    }
+
+
+def make_batch(episodes):
+    reward = torch.tensor([float(r) for episode in episodes for r in episode])[:, None]
+    done = torch.zeros(len(reward), 1, dtype=torch.bool)
+    done[torch.tensor([len(e) for e in episodes]).cumsum(0) - 1] = True
+    return TensorDict({"next": {"reward": reward, "done": done}}, [len(reward)])
+
+
+class End(enum.IntEnum):
+    FLYING = 0
+    THROUGH = 2
+    LOST = 3
+
+
+def test_end_metrics_are_those_of_the_task():
+    """Three episodes: two end for one reason, one for the other."""
+    batch = make_batch([[0, 1], [1], [0]])
+    batch["next", "info"] = TensorDict({"end_reason": torch.tensor([0, 2, 3, 2])[:, None]}, [4])
+    metrics = batch_metrics(batch, End)
+    shares = {k: v for k, v in metrics.items() if k.startswith("end/")}
+    assert shares == {"end/through": pytest.approx(2 / 3), "end/lost": pytest.approx(1 / 3)}
+    assert not any(name.startswith("end/") for name in batch_metrics(batch))
+
+
+def test_partial_episodes_use_reward_sums():
+    """Two environments, three steps: one episode began earlier, and one continues later."""
+    batch = TensorDict(
+        {
+            "next": {
+                "reward": torch.tensor([[1.0, 0.0, 1.0], [0.0, 1.0, 0.0]])[..., None],
+                "episode_reward": torch.tensor([[3.0, 3.0, 1.0], [0.0, 1.0, 1.0]])[..., None],
+                "done": torch.tensor([[0, 1, 0], [0, 0, 1]]).bool()[..., None],
+                "info": {"end_reason": torch.tensor([[0, 3, 0], [0, 0, 4]])[..., None]},
+            }
+        },
+        [2, 3],
+    )
+    assert episode_rewards(batch).tolist() == [3.0, 1.0]
+    metrics = batch_metrics(batch, EndReason)
+    assert (metrics["train/reward"], metrics["train/length"]) == (2.0, 3.0)
+    assert (metrics["end/side_boundary"], metrics["end/all_cubes"]) == (0.5, 0.0)
+    del batch["next", "episode_reward"]
+    with pytest.raises(InputError, match="RewardSum"):
+        episode_rewards(batch)
+
+
+def test_lengths_use_the_step_count():
+    """In a batch of 4 frames, episodes of 7 and 2 steps end."""
+    batch = make_batch([[0.0, 1.0], [0.0, 1.0]])
+    batch["next", "episode_reward"] = torch.tensor([1.0, 2.0, 0.0, 1.0])[:, None]
+    batch["next", "step_count"] = torch.tensor([6, 7, 1, 2])[:, None]
+    assert batch_metrics(batch) == {"train/reward": 1.5, "train/length": 4.5}
+    batch["next", "done"][:] = False
+    assert all(value != value for value in batch_metrics(batch).values())  # NaN
+
+
+def test_end_reason_is_read_at_the_last_frame():
+    batch = make_batch([[0, 1], [1, 1, 0], [0]])
+    reasons = torch.tensor([4, 1, 4, 4, 2, 3])[:, None]
+    batch["next", "info"] = TensorDict({"end_reason": reasons}, [6])
+    metrics = batch_metrics(batch, EndReason)
+    assert [metrics[f"end/{end.name.lower()}"] for end in EndReason if end] == pytest.approx(
+        [1 / 3] * 3 + [0, 0]
+    )

@@ -10,17 +10,13 @@ from torchrl.collectors import Collector
 from torchrl.objectives.value import GAE
 
 import drone_rl
-from drone_rl.acceleration.fused_collector import FusedCollector
-from drone_rl.acceleration.fused_network import ActivationCache, FusedNetwork
+from drone_rl.acceleration.fused_network import FusedNetwork
 from drone_rl.config import TaskSettings
-from drone_rl.config.commands import HeldOutSettings
-from drone_rl.config.learning import A2c, Episodes, Gae, Ppo, Rollouts, Sgd
-from drone_rl.config.networks import SmallCnn
+from drone_rl.config.learning import A2c, Episodes, Ppo, Rollouts, Sgd
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.config.transforms import EpisodeReward, Gray, Stack
 from drone_rl.training import ActorCriticLearner, ReinforceLearner
 from drone_rl.training.components import make_collector
-from drone_rl.trust.export import export
 from drone_rl.utils.checkpoint import load_checkpoint, save_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
@@ -77,52 +73,6 @@ def test_kernel_gradients_give_the_same_updates_as_torch():
     for by_kernel, by_torch in zip(learned[True], learned[False], strict=True):
         assert by_torch.any()
         assert (by_kernel - by_torch).norm() < 0.01 * by_torch.norm()  # ReLU inputs near 0
-
-
-@pytest.mark.parametrize(
-    ("settings", "is_kept"),
-    [
-        ({}, True),
-        ({"trainer": TrainerSettings(compiled=False)}, False),
-        ({"collector": Episodes(num_envs=4, num_threads=2)}, False),
-        ({"collector": Episodes(compiled=False)}, False),
-        ({"network": SmallCnn(hidden=(600,))}, False),  # too many weights for the kernel
-        ({"objective": Ppo(), "collector": Rollouts(), "returns": Gae()}, False),
-    ],
-)
-def test_activations_are_cached_if_the_learner_uses_them(settings, is_kept):
-    settings = TrainSettings(task=TASK).replace(**settings)
-    made = make_collector(settings)
-    learner = settings.objective.make(settings, made)
-    sources = [getattr(part, "source", None) for part in made.collector.collectors]
-    kept = [s._cache for s in sources if isinstance(s, FusedCollector) and s._cache is not None]
-    assert (len(kept) == 1) is is_kept and bool(kept) is is_kept
-    assert ("activations" in learner.in_keys) is is_kept
-    if is_kept:
-        assert kept[0] is learner.loss.actor_network.module[0].module._cache
-    made.collector.shutdown()
-
-
-def test_cached_activations_are_used_and_give_the_same_update(monkeypatch):
-    learned, taken = [], []
-    for is_known in (True, False):
-        find = ActivationCache.find
-
-        def note(self, *given, find=find, is_known=is_known):
-            taken.append(find(self, *given))
-            return taken[-1] if is_known else None
-
-        monkeypatch.setattr(ActivationCache, "find", note)
-        settings = TrainSettings(task=TASK, trainer=TrainerSettings(chunk_frames=40))
-        made = make_collector(settings)
-        learner, batches = settings.objective.make(settings, made), iter(made.collector)
-        for _ in range(3):
-            learner.update(next(batches))
-        made.collector.shutdown()
-        learned.append([p.detach().clone() for p in made.network.parameters()])
-        monkeypatch.undo()
-    assert len(taken) > 12 and all(rows is not None for rows in taken)
-    assert all(torch.equal(*pair) for pair in zip(*learned, strict=True))
 
 
 @pytest.mark.parametrize("shares", [True, False])
@@ -193,37 +143,6 @@ def test_episodes_are_counted_once_when_complete(trained):
     parts = checkpoint(trained)["collector"]["collectors"]
     under_way = sum(int(part["step_count"].sum()) for part in parts)
     assert sum(ended) + under_way == pytest.approx(trained.result["frames"])
-
-
-def test_policy_can_be_judged_and_exported(trained, tmp_path):
-    state = checkpoint(trained)
-    assert set(state["policy"]) == set(trained.policy.description.expected_weights())
-    judged = drone_rl.judge(trained.policy, episodes=4, progress=silent)
-    assert judged.verdict.sentence
-    export(trained.policy, tmp_path / "mine.safetensors", HeldOutSettings(episodes=4))
-    there = drone_rl.load_policy(tmp_path / "mine.safetensors").state["policy"]
-    assert_same(dict(there), dict(state["policy"]))
-
-
-HOSTILE = {
-    "body.position": (torch.full((3, 3), torch.nan).double(), "holds NaN or infinity"),
-    "cubes": (torch.zeros(3, 7, 3).double(), "is not of shape"),
-    "steps": (torch.zeros(3), "is not of shape"),
-    "lateral": (torch.full((3, 2), torch.inf).double(), "holds NaN or infinity"),
-    "side": ("none", "is not of shape"),
-}
-
-
-@pytest.mark.parametrize("where", HOSTILE)
-def test_invalid_environment_states_raise(trained, tmp_path, where):
-    value, message = HOSTILE[where]
-    state = checkpoint(trained)
-    part = state["collector"]["collectors"][0]["worlds"]["worlds"]
-    *path, name = where.split(".")
-    for key in path:
-        part = part[key]
-    part[name] = value
-    refused(trained, tmp_path, state, rf"worlds\.{where}.* {message}.*; resume from the checkpoint")
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from drone_rl.collectors.complete_episodes import Episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes import CubeGoals, EndReason, Side
 from drone_rl.trust.baselines import BASELINES
@@ -20,7 +20,7 @@ def make_episodes():
         metres = torch.tensor([METRES[s] for s in Side], dtype=torch.float64)
         lateral = torch.where(side < 0, torch.nan, metres[side.clamp(min=0)])
         missed = torch.tensor(EndReason.FRONT_BOUNDARY if end is None else end)
-        return Episodes(
+        return CompleteEpisodes(
             task=task or CollectCubes(),
             goals=CubeGoals(
                 reached=hit,

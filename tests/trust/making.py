@@ -11,7 +11,7 @@ from drone_rl.policies.zoo import fingerprint
 from drone_rl.sim.tasks import as_task
 from drone_rl.trust.axes import AXES
 from drone_rl.trust.domain import walk
-from drone_rl.trust.perturbations import Mode
+from drone_rl.trust.perturbations import PerturbationMode
 from drone_rl.trust.suite import finite, mcnemar, success_area
 from drone_rl.utils.intervals import mean_bounds, proportion
 
@@ -56,7 +56,7 @@ def along(axis, of, last=None):
     ]
     neutral = finite(axis.value(axis.neutral, of))
     about = {"group": axis.group, "unit": axis.unit, "neutral": neutral}
-    area = success_area(levels, 1.0, Mode.CONSTANT)
+    area = success_area(levels, 1.0, PerturbationMode.CONSTANT)
     return {**about, "areas": {"constant": area}, "levels": levels}
 
 

@@ -1,16 +1,21 @@
+import pytest
 import torch
 from torchrl.envs import CatFrames
 
-from drone_rl.config import CameraSettings
-from drone_rl.envs import GrayPixels, RgbPixels
+from drone_rl.config import CameraSettings, PillarsSettings, TaskSettings
+from drone_rl.envs import GrayPixels
+from drone_rl.envs.fault_models import dead_rows, noise
 from drone_rl.envs.transforms import PixelTransform
 from drone_rl.policies import ImageNetwork
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.continuous_actions import ContinuousActions
+from drone_rl.sim.tasks import as_task
 from drone_rl.sim.worlds import Worlds
-from drone_rl.trust.agents import BaselineAgent, PolicyAgent, StepContext
+from drone_rl.trust.agents import BaselineAgent, OracleAgent, PolicyAgent, StepContext, has_oracle
+from drone_rl.trust.paired_evaluation import PairedEvaluator
+from drone_rl.trust.perturbations import Condition
 from tests.continuous import SETTINGS
-from tests.trust.subjects import TASK
+from tests.trust.subjects import TASK, subject
 
 
 class Looking(ImageNetwork):
@@ -34,7 +39,7 @@ def make_env():
     return Worlds(3, TASK, CameraSettings(width=16, height=5), num_shards=1)
 
 
-def test_a_policy_sees_what_its_transforms_make_of_spoilt_pictures():
+def test_policy_observes_transformed_images_with_faults():
     worlds, network = make_env(), Looking()
     flying = torch.tensor([0, 2])
     agent = PolicyAgent(network, [GrayPixels()], 3)
@@ -46,14 +51,7 @@ def test_a_policy_sees_what_its_transforms_make_of_spoilt_pictures():
     assert seen is network.shown[0]
 
 
-def test_colors_are_drawn_for_who_sees_colors():
-    worlds, network = make_env(), Looking()
-    PolicyAgent(network, [RgbPixels()], 3).act(sight(worlds, torch.arange(3)))
-    worlds.close()
-    assert network.shown[0].shape == (3, 3, 5, 16)
-
-
-def test_a_stack_of_frames_holds_those_of_the_worlds_that_still_fly():
+def test_frame_stack_of_the_active_environments():
     worlds, network = make_env(), Looking()
     agent = PolicyAgent(network, [GrayPixels(), CatFrames(N=2, dim=-3, in_keys=["pixels"])], 3)
     step = iter((0.25, 0.5))
@@ -78,7 +76,7 @@ class Tied(ImageNetwork):
         return torch.stack([lead, torch.zeros_like(lead), torch.full_like(lead, -1.0)], -1)
 
 
-def test_episodes_with_a_frame_on_which_rounding_decides_are_noted():
+def test_fragile_episodes_are_recorded():
     worlds = make_env()
     bright = torch.tensor([1.0, 0.0, 0.0])
     for examines in (True, False):
@@ -89,7 +87,7 @@ def test_episodes_with_a_frame_on_which_rounding_decides_are_noted():
     worlds.close()
 
 
-def test_who_looks_at_nothing_does_the_same_always_or_anything_alike():
+def test_baseline_agents():
     worlds = make_env()
     where = sight(worlds, torch.arange(3))
     generator = torch.Generator().manual_seed(0)
@@ -101,7 +99,7 @@ def test_who_looks_at_nothing_does_the_same_always_or_anything_alike():
     assert (drawn.bincount() / 600 - 1 / 3).abs().max() < 0.08
 
 
-def test_who_looks_at_nothing_may_have_speeds_to_choose():
+def test_baseline_agents_with_continuous_actions():
     worlds, actions = make_env(), ContinuousActions.of(SETTINGS)
     where, generator = sight(worlds, torch.arange(2)), torch.Generator().manual_seed(0)
     action, _ = BaselineAgent("forward", actions, generator).act(where)
@@ -117,10 +115,44 @@ class Signed(PixelTransform):
         return 2 * GrayPixels()._apply_transform(obs) - 1
 
 
-def test_faults_come_before_a_first_transform_of_the_users_own():
+def test_faults_come_before_a_users_first_transform():
     worlds, network = make_env(), Looking()
     agent = PolicyAgent(network, [Signed()], 3)
     agent.act(sight(worlds, torch.arange(3), lambda p, f, nothing=0.0: p.clamp(0, 1)))
     wanted = Signed()._apply_transform(worlds.render(worlds.state))
     worlds.close()
     torch.testing.assert_close(network.shown[0], wanted)
+
+
+@pytest.fixture
+def evaluator():
+    made = PairedEvaluator(subject(task=TaskSettings(num_cubes=2), camera=CameraSettings()), 30)
+    yield made
+    made.close()
+
+
+def success(evaluator, condition, **kwargs):
+    return float(evaluator.run(condition, agent=OracleAgent(**kwargs)).episodes.success.mean())
+
+
+def test_oracle_collects_what_is_visible_and_compensates_delay(evaluator):
+    assert success(evaluator, Condition()) == 1.0
+    assert success(evaluator, Condition(delay=5)) == 1.0
+    assert success(evaluator, Condition(faults=(noise(1.0),))) == 1.0
+
+
+def test_oracle_without_visible_cubes(evaluator):
+    hidden = Condition(faults=(dead_rows(25),))  # of 25
+    forward = float(evaluator.run_baselines(Condition())["forward"].success.mean())
+    assert success(evaluator, hidden) == forward < 0.5
+    assert success(evaluator, hidden, only_visible=False) == 1.0
+
+
+def test_oracle_with_a_narrow_field_of_view(evaluator):
+    narrow = success(evaluator, Condition(camera={"horizontal_fov": 10.0}))
+    assert narrow < success(evaluator, Condition(camera={"horizontal_fov": 60.0}))
+
+
+def test_oracles_limited_to_visible_cubes():
+    assert has_oracle(as_task(TaskSettings()))
+    assert not has_oracle(as_task(PillarsSettings()))

@@ -1,18 +1,20 @@
 import itertools
+import math
 
 import pytest
 import torch
 
+import drone_rl
 from drone_rl.config import BaseTaskSettings, PillarsSettings
 from drone_rl.sim.rendering.appearance import Appearance
-from drone_rl.trust.axes import AXES, GROUPS, check_axes, find_axes
-from drone_rl.trust.shifts_text import NAMES
+from drone_rl.trust.axes import AXES, FACTORS, GROUPS, INVERSE, LINEAR, Axis, check_axes, find_axes
+from drone_rl.trust.perturbations import Condition
 from drone_rl.utils.errors import InputError
 from tests.trust.subjects import subject
 
 
 @pytest.mark.parametrize("axis", AXES.values(), ids=AXES)
-def test_strengths_grow_from_no_difference(axis):
+def test_strengths_increase(axis):
     away = [abs(axis.position(strength)) for strength in axis.strengths]
     assert all(later >= earlier * 0.75 for earlier, later in itertools.pairwise(away))
     assert min(away) > 0 and away[-1] == max(away)
@@ -23,11 +25,7 @@ def test_strengths_grow_from_no_difference(axis):
         assert one_way == sorted(one_way)
 
 
-def test_people_have_words_for_every_axis():
-    assert set(NAMES) == set(AXES)
-
-
-def test_values_are_in_the_tasks_own_units():
+def test_values_are_in_units_of_the_task():
     of = subject()
     assert AXES["object_size"].value(1.5, of) == 3.75
     assert AXES["object_size"].make(1.5, of).task == {"cube_size": 3.75}
@@ -46,7 +44,7 @@ def test_axes_are_found_by_name_and_by_group():
     assert len(GROUPS) == 10  # as many kinds of shift as were to be tried
 
 
-def test_there_is_no_such_axis():
+def test_unknown_axes():
     with pytest.raises(InputError, match=r"axes=sunn is unknown.*did you mean sun\?"):
         check_axes(["sunn"])
     with pytest.raises(InputError, match="axes=wind is unknown; give some of: color"):
@@ -55,7 +53,7 @@ def test_there_is_no_such_axis():
         find_axes(["blur", "wind"], subject())
 
 
-def test_a_task_of_which_no_size_is_known():
+def test_task_without_a_size():
     class Other(PillarsSettings):
         name = "other"
 
@@ -65,7 +63,7 @@ def test_a_task_of_which_no_size_is_known():
     assert "object_size" not in [a.name for a in find_axes(None, other)]
 
 
-def test_a_task_without_steps_of_its_own():
+def test_task_without_steps():
     class Plain(BaseTaskSettings):
         name = "plain"
 
@@ -78,8 +76,55 @@ def test_a_task_without_steps_of_its_own():
 @pytest.mark.parametrize(
     ("name", "offset"), [("camera_height", [0.0, 0.0, 0.5]), ("camera_sideways", [0.0, 0.5, 0.0])]
 )
-def test_a_moved_camera_moves_along_one_axis(name, offset):
+def test_camera_offsets(name, offset):
     (mount,) = AXES[name].make(0.5, subject()).mounts
     camera = mount.change(Appearance(), torch.ones(1, 1, dtype=torch.float64)).camera
     assert camera.offset.tolist() == [offset]
     assert camera.turn.tolist() == [[1.0, 0.0, 0.0, 0.0]]
+
+
+def axis(scale=LINEAR, neutral=0.0, **kwargs):
+    strengths = (1.0, 2.0, 3.0, 4.0, 5.0)
+    return Axis("a", "b", "m", neutral, strengths, lambda s, _: Condition(), scale=scale, **kwargs)
+
+
+def test_positions_on_a_scale_of_factors():
+    of_factors = axis(FACTORS, 1.0)
+    assert of_factors.position(2.0) == -of_factors.position(0.5) == pytest.approx(math.log(2))
+    assert of_factors.between(1.0, 0.25) == pytest.approx(0.5)
+    assert of_factors.position(1.0) == 0
+
+
+def test_positions_on_an_inverse_scale():
+    of_visibility = axis(INVERSE, math.inf)
+    assert of_visibility.position(50.0) == pytest.approx(0.02)
+    assert of_visibility.between(math.inf, 50.0) == pytest.approx(100.0)
+    assert INVERSE.inverse(0.0) == math.inf
+
+
+def test_strengths_between_whole_numbers():
+    steps = axis(whole=True)
+    assert [steps.between(4.0, 8.0, share) for share in (0.0, 0.5, 0.9999)] == [5.0, 6.0, 7.0]
+    assert [steps.between(8.0, 4.0, share) for share in (0.0, 0.9999)] == [7.0, 5.0]
+    assert steps.between(1.0, 2.0) is None
+    assert axis().between(1.0, 2.0) == 1.5
+    assert axis().between(2.0, 1.0, 0.25) == 1.75
+
+
+def test_strength_at_a_position():
+    for one in (axis(), axis(FACTORS, 1.0), axis(INVERSE, math.inf)):
+        assert one.at(one.position(4.0)) == pytest.approx(4.0)
+        assert one.at(0.0) == pytest.approx(one.neutral)
+
+
+@pytest.mark.parametrize("name", list(AXES))
+def test_strength_of_a_value(name):
+    of, one = drone_rl.load_policy("good").description, AXES[name]
+    for strength in one.strengths:
+        assert one.strength(one.value(strength, of), of) == pytest.approx(strength)
+    assert one.strength(math.inf, of) == math.inf
+
+
+def test_signs_of_the_ends():
+    assert axis(INVERSE, math.inf).signs == {"low": 1, "high": -1}
+    assert axis().signs == axis(FACTORS, 1.0).signs == {"low": -1, "high": 1}

@@ -3,13 +3,23 @@
 import json
 
 import pytest
+from matplotlib.colors import to_hex
+from matplotlib.patches import Rectangle
 
 import drone_rl
 from drone_rl.config import DynamicsSettings
-from drone_rl.config.commands import BODIES
-from drone_rl.trust.bodies import changes_of
+from drone_rl.trust.bodies import (
+    LOOPED,
+    changes_of,
+    chart,
+    left_out,
+    rows,
+)
+from drone_rl.utils import palette
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.intervals import proportion
 from drone_rl.utils.progress import silent
+from tests.evidence import VERDICT, changed
 
 TWO = ["computer vision", "wind 8 m/s"]
 STILL = {"wind": [0.0, 0.0, 0.0], "gusts": 0.0}
@@ -33,24 +43,18 @@ def done():
         ("camera on the body", {**FLYING, **STILL, "camera_mount": "body"}),
     ],
 )
-def test_what_a_body_changes(body, changes):
+def test_changes_of_named_dynamics(body, changes):
     assert changes_of(body, DynamicsSettings(rotor_time_constant=0.01)) == changes
 
 
-def test_every_body_can_be_flown():
-    own = DynamicsSettings()
-    for body in BODIES:
-        own.replace(**changes_of(body, own))
-
-
-def test_a_verdict_for_each_body(done):
+def test_a_verdict_for_each_dynamics(done):
     flown = done.numbers["policies"]["good"]
     assert done.numbers["bodies"] == [*flown] == TWO
     assert all(verdict["greedy"]["episodes"] == 4 for verdict in flown.values())
     assert flown["computer vision"]["greedy"]["success"]["share"] == 1.0
 
 
-def test_it_shows_and_saves_itself(done, tmp_path):
+def test_text_and_files(done, tmp_path):
     assert str(done).splitlines()[0].split() == ["computer", "vision", "wind", "8", "m/s"]
     assert "<td>good</td>" in done._repr_html_() and "<img" in done._repr_html_()
     done.save(tmp_path)
@@ -58,17 +62,6 @@ def test_it_shows_and_saves_itself(done, tmp_path):
     assert kept["policies"].keys() == {"good"} and "versions" in kept
     assert (tmp_path / "bodies.png").read_bytes().startswith(b"\x89PNG")
     assert "<svg" in (tmp_path / "bodies.svg").read_text()
-
-
-def test_it_tells_what_is_being_flown():
-    said = []
-
-    def note(text, done=0, total=0):
-        said.append((text, done, total))
-
-    near = drone_rl.load_policy("good").in_task(num_cubes=1)
-    drone_rl.bodies(near, episodes=1, bodies=["computer vision"], progress=note)
-    assert said == [("good: computer vision", 0, 1), ("flown", 1, 1)]
 
 
 @pytest.mark.parametrize(
@@ -85,6 +78,54 @@ def test_mistakes(policies, told, message):
         drone_rl.bodies(policies, progress=silent, **told)
 
 
-def test_settings_of_another_class_are_refused():
-    with pytest.raises(InputError, match=r"^settings=\(dict\) is no BodiesSettings"):
-        drone_rl.bodies("good", {"episodes": 2}, progress=silent)
+GOOD = changed(
+    VERDICT,
+    {
+        "kind": "good",
+        "certain": True,
+        "greedy.success": {"share": 0.975, "lower95": 0.954, "upper95": 0.988},
+        "failures.largest": None,
+    },
+)
+BAD = changed(
+    VERDICT,
+    {
+        "kind": "poor",
+        "certain": False,
+        "greedy.success": {"share": 0.1, "lower95": 0.07, "upper95": 0.14},
+        "failures.largest": {"by": "end", "value": "step_limit", "failed": 9, "lower95": 0.1},
+    },
+)
+NUMBERS = {
+    "bodies": ["computer vision", "wind 8 m/s"],
+    "policies": {"one": {"computer vision": GOOD, "wind 8 m/s": BAD}},
+}
+
+
+def test_table_has_a_row_per_policy():
+    assert rows(NUMBERS) == [
+        ["", "computer vision", "wind 8 m/s"],
+        ["one", "good 97.5% (95.4 to 98.8)", "poor? 10.0% (7.0 to 14.0)"],
+    ]
+
+
+def cells(figure):
+    return [patch for patch in figure.axes[0].patches if isinstance(patch, Rectangle)]
+
+
+def test_chart_cells_have_the_color_of_their_verdict():
+    boxes = cells(chart(NUMBERS))
+    assert [box.get_xy() for box in boxes] == [(0, 0), (1, 0)]
+    assert [box.get_hatch() for box in boxes] == [None, "//"]  # the second is not certain
+    green, red = (to_hex(box.get_facecolor()) for box in boxes)
+    assert (green, red) == (*(palette.css(palette.light(c)) for c in (palette.GOOD, palette.BAD)),)
+
+
+def test_column_of_episodes_with_software_in_the_loop():
+    flights = {"success": proportion(4, 5)}
+    assert rows({**NUMBERS, LOOPED: {"one": flights}})[1][-1] == (
+        "no verdict: 4 of 5 (28.4 to 99.5%)"
+    )
+    missing = {**NUMBERS, LOOPED: {"one": {"left_out": "no rotor turned"}}}
+    assert rows(missing)[1][-1] == "left out"
+    assert left_out(missing) == ["one, software in the loop: no rotor turned"]

@@ -1,17 +1,30 @@
 """Which flights under other conditions are found, and which are not believed."""
 
 import json
+import math
 import os
 import shutil
 
+import numpy as np
 import pytest
 
 import drone_rl
+from drone_rl.config.commands import JudgeSettings
 from drone_rl.policies.zoo import shifts_path
-from drone_rl.trust.coverage import compare_with_required, find_domain
+from drone_rl.trust.axes import AXES
+from drone_rl.trust.coverage import (
+    _strengths,
+    compare_with_required,
+    find_domain,
+    read_requirements,
+    recheck_domain,
+)
+from drone_rl.trust.domain import Prober
+from drone_rl.trust.shifts import ranges_of
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
-from tests.evidence import changed
+from drone_rl.utils.seeding import RootSeed
+from tests.evidence import SHIFTS, changed
 from tests.trust.making import shifts_of
 
 
@@ -31,11 +44,11 @@ def leave(folder, made, when=0):
     return path
 
 
-def test_none_where_there_is_none(good, tmp_path):
+def test_no_domain(good, tmp_path):
     assert find_domain(good, outputs=tmp_path) is None
 
 
-def test_what_lies_with_the_policy_comes_first(good, tmp_path):
+def test_file_next_to_the_policy_comes_first(good, tmp_path):
     made = shifts_of(good)
     leave(tmp_path / "shifts" / "runs" / "a", made)
     shifts_path(good.path).write_text(json.dumps(made))
@@ -44,7 +57,7 @@ def test_what_lies_with_the_policy_comes_first(good, tmp_path):
     assert other.numbers is None and "of another task" in other.refused
 
 
-def test_the_newest_of_this_policy_with_ranges(good, tmp_path):
+def test_newest_file_of_the_policy_with_ranges(good, tmp_path):
     runs, made = tmp_path / "shifts" / "runs", shifts_of(good)
     leave(runs / "old", made, when=1)
     wanted = leave(runs / "newer", made, when=2)
@@ -55,7 +68,7 @@ def test_the_newest_of_this_policy_with_ranges(good, tmp_path):
     assert find_domain(drone_rl.load_policy("poor"), outputs=tmp_path) is None
 
 
-def test_what_is_given_must_be_believed(good, tmp_path):
+def test_given_file_must_be_of_the_policy(good, tmp_path):
     path = leave(tmp_path / "a", shifts_of(good))
     assert find_domain(good, path).path == path == find_domain(good, path.parent).path
     with pytest.raises(InputError, match="of another task"):
@@ -70,7 +83,7 @@ def test_what_is_given_must_be_believed(good, tmp_path):
     ("needs", "lacks"),
     [("blur: {high: 1.0, unit: pixels}", []), ("blur: {high: 1.1, unit: pixels}", ["blur"])],
 )
-def test_what_is_required_is_held_against_what_was_found(good, tmp_path, needs, lacks):
+def test_required_range_is_compared_with_the_domain(good, tmp_path, needs, lacks):
     (tmp_path / "needs.yaml").write_text(needs)
     measured = find_domain(good, leave(tmp_path / "a", shifts_of(good)))
     found = compare_with_required(good, tmp_path / "needs.yaml", measured)
@@ -80,7 +93,7 @@ def test_what_is_required_is_held_against_what_was_found(good, tmp_path, needs, 
     assert str(found).startswith(f"not covered: {said}")
 
 
-def test_a_verdict_tells_the_domain_and_may_speak_against_it(good, tmp_path):
+def test_verdict_with_a_required_domain(good, tmp_path):
     """With few flights it is not certain, and lets it stand; a stricter one does not."""
     good = good.in_task(num_cubes=1)  # short episodes
     path = leave(tmp_path / "a", shifts_of(good))
@@ -101,7 +114,7 @@ def test_a_verdict_tells_the_domain_and_may_speak_against_it(good, tmp_path):
     assert "not covered: it requires 0.9" in str(strict)
 
 
-def test_no_domain_and_no_network_are_told_before_anything_is_flown(good, tmp_path, monkeypatch):
+def test_missing_domain_is_refused_before_any_episode(good, tmp_path, monkeypatch):
     monkeypatch.setattr("drone_rl.sim.worlds.Worlds.render", None)
     needs = tmp_path / "needs.yaml"
     needs.write_text("blur: {high: 1.0, unit: pixels}")
@@ -116,3 +129,136 @@ def test_no_domain_and_no_network_are_told_before_anything_is_flown(good, tmp_pa
         drone_rl.judge(good, **told)
     with pytest.raises(InputError, match="policy=left has no network"):
         drone_rl.judge("left", **told)
+
+
+FEW = JudgeSettings(domain_flights=60)
+SEED = RootSeed(3, True)
+
+
+@pytest.fixture(scope="module")
+def near():
+    return drone_rl.load_policy("good").in_task(num_cubes=1)
+
+
+def need(**ends):
+    return {"low": None, "high": None, **ends}
+
+
+def test_true_range_is_not_contradicted(near):
+    found = recheck_domain(near, {"blur": need(high=0.5)}, shifts_of(near), FEW, SEED)
+    assert found.contradictions == ()
+    assert found.strengths["blur"][0] == 0.5 and found.count == 3
+    assert all(0 < value < 0.5 for value in found.strengths["blur"][1:])
+    assert "(fixed seed 3, to which a policy could have been fitted)" in str(found)
+    assert "60 episodes at each of 3 strengths" in str(found)
+
+
+def test_invented_range_is_contradicted(near):
+    """Good, says the file, with twelve of 25 rows dead."""
+    numbers = shifts_of(near, axes=("dead_rows",))
+    found = recheck_domain(near, {"dead_rows": need(low=12.0, high=12.0)}, numbers, FEW, SEED)
+    assert found.contradictions and all(
+        line.startswith("dead rows at 12 rows: ") and "certainly not good there" in line
+        for line in found.contradictions
+    )
+
+
+def test_poor_policy_is_contradicted_without_perturbation():
+    poor = drone_rl.load_policy("poor").in_task(num_cubes=1)
+    found = recheck_domain(poor, {"blur": need(high=0.5)}, shifts_of(poor), FEW, SEED)
+    assert found.contradictions[0].startswith("without perturbation: 0% of new episodes")
+
+
+def test_all_strengths_share_the_error_probability(near, monkeypatch):
+    parts = []
+
+    class Noted(Prober):
+        def probe(self, condition, part):
+            parts.append(part)
+            return super().probe(condition, part)
+
+    monkeypatch.setattr("drone_rl.trust.coverage.Prober", Noted)
+    few = FEW.replace(domain_flights=2)
+    recheck_domain(near, {"blur": need(high=0.5)}, shifts_of(near), few, SEED)
+    assert parts == [0.25] * 4  # without perturbation, at the end, and at two random strengths
+
+
+@pytest.mark.parametrize("name", list(AXES))
+def test_rechecked_strengths_are_within_the_required_range(near, name):
+    of, axis = near.description, AXES[name]
+    value = axis.value(axis.strengths[1], of)
+    numbers = shifts_of(near, axes=(name,))
+    neutral = numbers["axes"][name]["neutral"]
+    neutral = math.inf if neutral is None else neutral
+    wanted = need(low=value) if value < neutral else need(high=value)
+    found = [*_strengths(axis, of, wanted, numbers, np.random.default_rng(0))]
+    values = [axis.value(strength, of) for strength in found]
+    assert any(math.isclose(one, value) for one in values)
+    low, high = sorted((value, neutral))
+    assert all(low - 1e-9 <= one <= high + 1e-9 for one in values)
+    assert len(found) == 3 or axis.whole
+
+
+@pytest.fixture
+def read(tmp_path):
+    def build(text, name="needs.yaml"):
+        (tmp_path / name).write_text(text)
+        return read_requirements(tmp_path / name)
+
+    return build
+
+
+def test_requirements_in_yaml_and_json(read):
+    needs = {"fog": {"low": 60.0, "high": None}, "sun": {"low": 5.0, "high": 50.0}}
+    text = "fog: {low: 60, unit: m of sight}\nsun: {low: 5, high: 50, unit: degrees}\n"
+    assert read(text) == needs
+    data = {"fog": {"low": 60, "unit": "m of sight"}}
+    data["sun"] = {"low": 5, "high": 50, "unit": "degrees"}
+    assert read(json.dumps(data), "needs.json") == needs
+
+
+def test_domain_files_are_valid_requirements(read):
+    ranges = ranges_of(SHIFTS)
+    assert ranges["sun"] == {"low": 21.07, "high": 60.0, "unit": "degrees"}
+    read(json.dumps(ranges), "domain.json")
+    bad = {"domain.ranges.sun.positions": None, "axes.blur.levels.1.modes.constant.unchanged": True}
+    assert [*ranges_of(changed(SHIFTS, bad))] == ["brightness"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "is empty; the file was damaged"),
+        ("{}", "is empty; give axes"),
+        ("[1, 2]", "must be a mapping"),
+        ("fog: [", "line 1 of .* is no YAML .*; correct it"),
+        ("fog:\n\tlow: 1", "line 2 of .* is no YAML .*; indent with spaces, not tabs"),
+        (
+            "fog: {low: 1}\nfog: {low: 2}",
+            r"line 2 of .* is no YAML \(fog occurs twice\); correct it",
+        ),
+        ("a: !!python/object/apply:os.getcwd []", "no plain YAML"),
+        ("wind: {low: 1, unit: m/s}", "'wind' is not an axis; give one or more of: object_color"),
+        ("fog: 60", "fog=60 must be a mapping; give low, high or both, and unit: m of sight"),
+        ("fog: {low: 60, unit: km}", "fog.unit='km' is wrong; give .* unit: m of sight"),
+        ("fog: {low: 60}", "fog.unit=None is wrong"),
+        ("fog: {least: 60, unit: m of sight}", "fog.'least' is unknown"),
+        ("fog: {unit: m of sight}", "neither low nor high"),
+        ("fog: {low: 60, high: 40, unit: m of sight}", "from 60 to 40, which is less"),
+        ("fog: {low: sixty, unit: m of sight}", "fog.low='sixty' is a text"),
+        ("fog: {high: .inf, unit: m of sight}", "fog.high=inf is out of range"),
+        (
+            "camera_yaw: {low: -5, high: 5, unit: degrees}",
+            "camera_yaw: limits must be 0 or more because .*, got -5; give low",
+        ),
+    ],
+)
+def test_wrong_requirements(read, text, message):
+    with pytest.raises(InputError, match=message) as error:
+        read(text)
+    assert "\n" not in str(error.value) and "needs.yaml: " in str(error.value)
+
+
+def test_missing_requirements(tmp_path):
+    with pytest.raises(InputError, match=r"require_domain=.*none\.yaml can't be read"):
+        read_requirements(tmp_path / "none.yaml")

@@ -21,7 +21,7 @@ def good():
     return drone_rl.load_policy("good")
 
 
-def test_an_evaluation_in_python(good):
+def test_evaluation_in_python(good):
     said = []
 
     def note(text, done=0, total=0):
@@ -45,12 +45,12 @@ def test_an_evaluation_in_python(good):
     assert "<td>success rate</td>" in done._repr_html_()
 
 
-def test_without_baselines_there_are_none(good):
+def test_evaluation_without_baselines(good):
     done = drone_rl.evaluate(good, episodes=2, baselines=False, progress=silent)
     assert set(done.figures) == {"greedy", "sampled"}
 
 
-def test_the_table_of_an_evaluation(good):
+def test_table_of_an_evaluation(good):
     def flown(success, left):
         return {
             "success": proportion(*success),
@@ -77,7 +77,7 @@ def test_the_table_of_an_evaluation(good):
     assert all(len(re.split(" {2,}", row)) == 3 for row in whole)  # no two columns touch
 
 
-def test_in_another_appearance_it_is_said_so(good):
+def test_another_appearance_is_named(good):
     good = good.in_task(num_cubes=1)  # short episodes
     few, fog = (
         {"episodes": 4, "sampled": False, "progress": silent},
@@ -98,7 +98,7 @@ def test_in_another_appearance_it_is_said_so(good):
         drone_rl.judge("forward", appearance=fog, **few)
 
 
-def test_in_another_body_it_is_said_so(good, monkeypatch):
+def test_other_dynamics_are_named(good, monkeypatch):
     floating(monkeypatch)
     good = good.in_task(num_cubes=1)  # short episodes
     few = {"episodes": 4, "sampled": False, "progress": silent}
@@ -120,23 +120,7 @@ def test_in_another_body_it_is_said_so(good, monkeypatch):
     assert steps > drone_rl.evaluate(good, **few).figures["forward"]["mean_length"]
 
 
-def test_an_evaluation_says_what_its_seed_is(good):
-    good = good.in_task(num_cubes=1)
-    how = {"episodes": 2, "baselines": False, "progress": silent}
-    fresh, fixed = drone_rl.evaluate(good, **how), drone_rl.evaluate(good, seed=3, **how)
-    assert (fixed.as_dict()["seed"], fixed.as_dict()["seed_is_fixed"]) == (3, True)
-    assert not fresh.as_dict()["seed_is_fixed"]
-    assert "Fixed seed 3: a policy could" in str(fixed)
-    assert "Fixed seed" not in str(fresh)
-    assert f"environments: seed {fresh.seed.value} (fresh)" in fresh._repr_html_()
-
-
-def test_settings_of_another_class_are_refused(good):
-    with pytest.raises(InputError, match=r"^settings=\(dict\) is no EvaluateSettings"):
-        drone_rl.evaluate(good, {"episodes": 2}, progress=silent)
-
-
-def test_an_oracle_of_other_actions_is_refused_before_any_episode(good, monkeypatch):
+def test_oracle_of_other_actions_is_refused(good, monkeypatch):
     rule = OracleRule(("drone",), lambda drone: drone[..., 0].long(), MOVES_3D)
     monkeypatch.setattr(CollectCubes, "oracle", property(lambda _: rule, lambda _, value: None))
     monkeypatch.setattr("drone_rl.trust.evaluate.run_compared", None)

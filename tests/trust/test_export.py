@@ -11,10 +11,11 @@ from drone_rl.policies.zoo import certificate_path
 from drone_rl.sweeps.manifest import Run, Sweep
 from drone_rl.sweeps.rows import choice_in_sweep
 from drone_rl.trust.coverage import find_domain
-from drone_rl.trust.export import export, recorded_origin
+from drone_rl.trust.export import export, recorded_origin, write_card
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.claim import find_claim
 from tests.sweeps.conftest import _verdict
+from tests.trust.cards import CARD, VERDICT
 from tests.trust.making import shifts_of
 from tests.verification.checker.making import of_every_place
 
@@ -41,26 +42,26 @@ def judged(checkpoint, **verdict):
     (checkpoint.parents[1] / "result.json").write_text(json.dumps(result))
 
 
-def test_a_run_of_a_sweep_names_the_run_and_not_the_sweep(checkpoint):
+def test_origin_of_a_run_of_a_sweep(checkpoint):
     judged(checkpoint)
     command, chosen = choice_in_sweep(checkpoint)
     assert command == "drone-rl train seed=1 sweep=seeds hydra.mode=RUN"
     assert chosen == {"runs": 3, "episodes": 200}
 
 
-def test_a_run_that_no_present_rule_has_judged_was_not_chosen_by_episodes(checkpoint):
+def test_origin_of_a_run_without_a_current_verdict(checkpoint):
     assert choice_in_sweep(checkpoint)[1] == {"runs": 3, "episodes": None}
     judged(checkpoint, rule="of yore")
     assert choice_in_sweep(checkpoint)[1] == {"runs": 3, "episodes": None}
 
 
-def test_a_run_alone_is_named_by_its_own_settings(checkpoint):
+def test_origin_of_a_single_run(checkpoint):
     (checkpoint.parents[2] / "sweep.json").unlink()
     assert choice_in_sweep(checkpoint) is None
     assert recorded_origin(checkpoint, {}) == ("drone-rl train seed=1", None)
 
 
-def test_what_an_exported_file_says_of_its_origin_goes_on(checkpoint):
+def test_origin_of_an_exported_file_is_kept(checkpoint):
     said = {"command": "drone-rl train seed=9", "chosen": {"runs": 7, "episodes": 20}}
     found = recorded_origin(checkpoint.with_suffix(".safetensors"), said)
     assert found == (said["command"], said["chosen"])
@@ -71,7 +72,7 @@ ONE = {"num_cubes": 1}
 """A task with short episodes."""
 
 
-def test_a_card_quotes_a_certificate_that_then_travels_with_the_policy(tmp_path):
+def test_card_quotes_and_copies_a_certificate(tmp_path):
     policy = drone_rl.load_policy("proved")
     made = certificate_path(policy.path)
     target = tmp_path / "mine.safetensors"
@@ -86,7 +87,7 @@ def test_a_card_quotes_a_certificate_that_then_travels_with_the_policy(tmp_path)
     assert find_claim(again, flights=20).flights == 20
 
 
-def test_a_card_quotes_no_certificate_that_rollouts_refute(tmp_path):
+def test_card_refuses_a_certificate_that_rollouts_contradict(tmp_path):
     policy, made = drone_rl.load_policy("poor").in_task(**ONE), tmp_path / "made.json"
     made.write_text(json.dumps(of_every_place(policy)))
     target = tmp_path / "mine.safetensors"
@@ -95,7 +96,7 @@ def test_a_card_quotes_no_certificate_that_rollouts_refute(tmp_path):
     assert not target.exists()
 
 
-def test_a_certificate_of_another_is_no_word_of_a_card(tmp_path):
+def test_card_refuses_a_certificate_of_another_policy(tmp_path):
     poor, good = (drone_rl.load_policy(name).in_task(**ONE) for name in ("poor", "good"))
     policy, target = poor, tmp_path / "mine.safetensors"
     beside = tmp_path / "mine.certificate.json"
@@ -109,7 +110,7 @@ def test_a_certificate_of_another_is_no_word_of_a_card(tmp_path):
 
 
 @pytest.mark.parametrize(("name", "is_good"), [("good", True), ("right_and_forward", False)])
-def test_a_card_quotes_conditions_that_then_travel_with_the_policy(tmp_path, name, is_good):
+def test_card_quotes_and_copies_a_robustness_evaluation(tmp_path, name, is_good):
     """Those of one whom the card's verdict surely finds to be something else are not believed."""
     policy, made = drone_rl.load_policy(name).in_task(**ONE), tmp_path / "made.json"
     made.write_text(json.dumps(shifts_of(policy)))
@@ -127,19 +128,19 @@ def test_a_card_quotes_conditions_that_then_travel_with_the_policy(tmp_path, nam
         assert "Read from mine.shifts.json, dated" in card  # and no path of this machine
 
 
-def test_a_run_from_python_names_no_command(checkpoint):
+def test_origin_of_a_run_from_python_is_unknown(checkpoint):
     (checkpoint.parents[2] / "sweep.json").unlink()
     (checkpoint.parents[1] / ".hydra" / "overrides.yaml").unlink()
     assert recorded_origin(checkpoint, {}) == (None, None)
 
 
-def test_a_checkpoint_is_not_believed_about_its_origin(checkpoint):
+def test_origin_in_a_checkpoint_is_ignored(checkpoint):
     (checkpoint.parents[2] / "sweep.json").unlink()
     lie = {"command": "drone-rl train seed=9", "chosen": {"runs": 1, "episodes": None}}
     assert recorded_origin(checkpoint, lie) == ("drone-rl train seed=1", None)
 
 
-def test_the_command_of_a_resumed_run_repeats_all_of_it(checkpoint):
+def test_command_of_a_resumed_run(checkpoint):
     (checkpoint.parents[2] / "sweep.json").unlink()
     noted = checkpoint.parents[1] / ".hydra" / "overrides.yaml"
     noted.write_text("[seed=1, resume=outputs/a, trainer.total_frames=9]")
@@ -147,10 +148,49 @@ def test_the_command_of_a_resumed_run_repeats_all_of_it(checkpoint):
     assert command == "drone-rl train seed=1 trainer.total_frames=9"
 
 
-def test_a_wrong_command_is_refused_before_any_episode(tmp_path, monkeypatch):
+def test_wrong_command_is_refused_before_any_episode(tmp_path, monkeypatch):
     monkeypatch.setattr("drone_rl.trust.export.judge_policy", lambda *_, **__: 1 / 0)
     settings = HeldOutSettings(episodes=2)
     with pytest.raises(InputError, match="command="):
         export(
             drone_rl.load_policy("good"), tmp_path / "a.safetensors", settings, command="rm -rf /"
         )
+
+
+def lines(**changed):
+    return write_card("mine", "0123", {**CARD, **changed}).splitlines()
+
+
+def test_card_names_policy_verdict_origin_and_digest():
+    found = lines()
+    assert found[0] == "# mine"
+    assert found[2].startswith("**poor** (certain")
+    assert any("`drone-rl train seed=7` for 12,345 frames" in line for line in found)
+    assert "- SHA-256 of `mine.safetensors`: `0123`" in found
+    assert "- revision abc; torch 1, torchrl 2, mujoco-warp 3" in found
+
+
+def test_card_compares_with_the_best_baseline_and_the_oracle():
+    found = lines()
+    head = "|  | most probable actions | sampled actions | best blind baseline (forward) | oracle |"
+    assert head in found
+    row = found[found.index(head) + 3]
+    assert row.startswith("| cubes collected | 90.0% (80.0 to 100.0) | 60.0% (")
+    assert "| 30.0% (" in row and "| 100.0% (" in row
+
+
+def test_card_lists_the_largest_failure_first():
+    found = lines()
+    at = found.index("| fails first at | episodes | of | rate |")
+    assert found[at + 2] == "| cube: first | 31 | 400 | 75.0% (70.0 to 80.0) |"
+    assert found[at + 3].startswith("| end: step_limit | 4 | 400 |")
+    assert found[at + 4] == ""
+
+
+def test_card_of_a_policy_that_never_failed_has_a_bound():
+    bound = {"share": 0.0, "lower95": 0.0, "upper95": 0.009, "trials": 400}
+    failures = {"rows": [], "largest": None, "bound": bound}
+    found = "\n".join(lines(verdict={**VERDICT, "failures": failures}))
+    assert "| fails | never |" in found
+    assert "less than 1%" not in found
+    assert "| upper bound | 0.9% of episodes |" in found

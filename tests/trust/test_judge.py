@@ -2,11 +2,14 @@
 
 import json
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import drone_rl
+from drone_rl.trust.judge import Judgements
+from drone_rl.trust.rule import VerdictKind
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import RootSeed
@@ -18,7 +21,7 @@ def good():
     return drone_rl.load_policy("good")
 
 
-def test_a_verdict_in_python(good):
+def test_verdict_in_python(good):
     few = drone_rl.judge(good, episodes=8, sampled=False, progress=silent)
     assert (few.verdict.kind, few.verdict.certain) == ("good", False)
     assert str(few).startswith("good (not certain): ")
@@ -35,7 +38,7 @@ def refused(*_):
     raise AssertionError("episodes were flown")
 
 
-def test_several_at_once(good):
+def test_several_policies(good):
     done = drone_rl.judge(["oracle", "left"], episodes=150, progress=silent)
     assert [one.name for one in done] == ["oracle", "left"] and len(done) == 2
     assert done[1].verdict.kind == "poor" and done[:1][0] is done[0]
@@ -59,7 +62,7 @@ def test_several_at_once(good):
             drone_rl.judge(policies, {"episodes": 2}, progress=refused)
 
 
-def test_a_verdict_with_proof(good, tmp_path):
+def test_verdict_with_a_certificate(good, tmp_path):
     path = tmp_path / "certificate.json"
     path.write_text(json.dumps(of_every_place(good.in_task(num_cubes=1))))
     how = {"certificate": path, "episodes": 8, "sampled": False, "progress": silent}
@@ -80,7 +83,7 @@ def test_a_verdict_with_proof(good, tmp_path):
         drone_rl.judge("oracle", **how)
 
 
-def test_a_certificate_that_flights_refute_proves_nothing(tmp_path):
+def test_contradicted_certificate_proves_nothing(tmp_path):
     poor = drone_rl.load_policy("poor").in_task(num_cubes=1)
     path = tmp_path / "certificate.json"
     path.write_text(json.dumps(of_every_place(poor)))
@@ -93,13 +96,7 @@ def test_a_certificate_that_flights_refute_proves_nothing(tmp_path):
         drone_rl.judge(poor, certificate=path, certificate_flights=100, **few)
 
 
-def test_without_a_certificate_nothing_is_proved(good):
-    done = drone_rl.judge(good, episodes=2, sampled=False, progress=silent)
-    assert not done.verdict.is_proved
-    assert (done.as_dict()["certificate"], done.as_dict()["proof"]) == (None, None)
-
-
-def test_a_verdict_on_luck_in_another_task():
+def test_verdict_on_a_baseline_in_another_task():
     done = drone_rl.judge("left", task={"num_cubes": 1}, episodes=200, progress=silent)
     assert done.verdict.kind == "poor"
     assert done.as_dict()["num_cubes"] == 1
@@ -115,12 +112,12 @@ def test_a_verdict_on_luck_in_another_task():
         ({"wind": 1}, r"^wind is a setting of dynamics; give dynamics=\{'wind': 1\}$"),
     ],
 )
-def test_mistakes_name_the_argument(change, message):
+def test_wrong_arguments(change, message):
     with pytest.raises(InputError, match=f"^{message}"):
         drone_rl.judge("random", progress=silent, **change)
 
 
-def test_two_verdicts_differ_in_seed_and_a_printed_seed_reproduces_one(good):
+def test_seeds_are_fresh_and_reproduce_a_verdict(good):
     how = {"episodes": 12, "sampled": True, "task": {"num_cubes": 1}, "progress": silent}
     one, other = (drone_rl.judge(good, **how) for _ in range(2))
     first, second = one.verdict.evidence, other.verdict.evidence
@@ -133,22 +130,38 @@ def test_two_verdicts_differ_in_seed_and_a_printed_seed_reproduces_one(good):
     assert one.settings.seed == first["seed"]
 
 
-def test_a_baseline_is_judged_from_a_fresh_seed_too():
-    how = {"episodes": 2, "progress": silent}
-    seeds = {drone_rl.judge("oracle", **how).verdict.evidence["seed"] for _ in range(2)}
-    assert len(seeds) == 2
-
-
-def test_changes_that_one_of_several_can_not_have_are_refused_before_any_episode(good):
+def test_changes_are_refused_before_any_episode(good):
     with pytest.raises(InputError, match=r"^task\.num_cubes is unknown"):
         drone_rl.judge([good, "pillars_good"], task={"num_cubes": 2}, progress=refused)
     with pytest.raises(InputError, match=r"^policy=oracle sees no images"):
         drone_rl.judge([good, "oracle"], appearance="fog", progress=refused)
 
 
-def test_a_baseline_takes_settings_as_a_policy_does_and_an_array_is_no_policy():
+def test_task_settings_of_a_baseline():
     task = drone_rl.TaskSettings(num_cubes=1)
     done = drone_rl.judge("oracle", task=task, episodes=2, progress=silent)
     assert done.as_dict()["num_cubes"] == 1
     with pytest.raises(InputError, match=r"^policy=\(ndarray\) is no policy"):
         drone_rl.judge(np.zeros(3), progress=refused)
+
+
+def judged(name, kind, certain, share):
+    success = {"share": share, "lower95": share - 0.05, "upper95": share + 0.05}
+    verdict = SimpleNamespace(kind=kind, certain=certain, evidence={"greedy": {"success": success}})
+    return SimpleNamespace(name=name, verdict=verdict)
+
+
+@pytest.fixture
+def both():
+    return Judgements(
+        (judged("a", VerdictKind.GOOD, True, 0.95), judged("<b>", VerdictKind.POOR, False, 0.1))
+    )
+
+
+def test_table_of_judgements(both):
+    assert both.rows() == [
+        ["policy", "verdict", "certain", "success rate (95% CI)"],
+        ["a", "good", "yes", "95.0% (90.0 to 100.0)"],
+        ["<b>", "poor", "no", "10.0% (5.0 to 15.0)"],
+    ]
+    assert [line.split()[0] for line in str(both).splitlines()] == ["policy", "a", "<b>"]

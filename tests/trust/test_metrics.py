@@ -1,7 +1,7 @@
 import pytest
 import torch
 
-from drone_rl.collectors.complete_episodes import Episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.sim.tasks import CollectCubes, Goals
 from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.trust.metrics import summarise
@@ -12,7 +12,7 @@ from tests.second_task import End, Posts
 @pytest.fixture
 def episodes():
     """Three episodes of two cubes; the last one never came to its second cube."""
-    return Episodes(
+    return CompleteEpisodes(
         task=CollectCubes(),
         goals=Goals(
             reached=torch.tensor([[True, True], [True, False], [False, False]]),
@@ -24,13 +24,13 @@ def episodes():
     )
 
 
-def test_episodes_by_what_was_true_when_they_ended():
+def test_episodes_from_the_last_step():
     info = {
         "passed": torch.tensor([[True, True], [True, False]]),
         "sides": torch.tensor([[0, 1], [1, -1]]),
         "end_reason": torch.tensor([[End.THROUGH], [End.TOUCHED]]),
     }
-    flown = Episodes.ended(Posts(), info, torch.tensor([8, 9]))
+    flown = CompleteEpisodes.ended(Posts(), info, torch.tensor([8, 9]))
     assert flown.success.tolist() == [1.0, 0.0]
     assert flown.goals.stratum.tolist() == [[0, 1], [1, -1]]
     assert flown.end_reason.tolist() == [End.THROUGH, End.TOUCHED]
@@ -52,24 +52,24 @@ def test_summary_by_hand(episodes):
     assert (summary["mean_length"], summary["max_length"]) == (30.0, 60)
 
 
-def test_a_stratum_is_not_those_after_it(episodes):
+def test_rate_of_one_stratum(episodes):
     episodes.goals.stratum[1, 1] = 2  # which was not reached, while its first one was
     assert episodes.stratum_share(0).tolist() == [1.0, 1.0]
     assert episodes.stratum_share(2).tolist() == [0.0, 0.0]
 
 
-def test_what_was_not_offered_has_no_share(episodes):
+def test_stratum_without_goals_has_no_rate(episodes):
     ahead = summarise(episodes)["shares"]["ahead"]
     assert ahead["mean"] is None
     assert (ahead["lower95"], ahead["upper95"], ahead["count"], ahead["goals"]) == (0, 1, 0, 0)
 
 
-def test_dependent_cubes_don_t_make_an_interval_narrower():
+def test_intervals_count_episodes_not_goals():
     """All or nothing: three cubes an episode tell no more than one."""
     whole = torch.arange(100) < 90
     common = {"end_reason": torch.ones(100).long(), "length": torch.ones(100).long()}
     alike = [
-        Episodes(
+        CompleteEpisodes(
             task=CollectCubes(),
             goals=Goals(
                 reached=whole[:, None].expand(100, cubes),
@@ -85,7 +85,7 @@ def test_dependent_cubes_don_t_make_an_interval_narrower():
     assert one["lower95"] < proportion(90, 100)["lower95"]
 
 
-def test_rows_can_be_chosen(episodes):
+def test_selecting_episodes(episodes):
     assert len(episodes[1:]) == 2
     assert episodes[torch.tensor([2])].offered(Side.RIGHT).tolist() == [True]
     assert episodes.stratum_share(Side.LEFT).tolist() == [1.0, 0.5]
@@ -93,13 +93,15 @@ def test_rows_can_be_chosen(episodes):
     assert episodes[1:].goals.world.tolist() == [[2.0], [-4.0]]
 
 
-def test_another_task_has_strata_and_ends_of_its_own():
+def test_summary_of_another_task():
     goals = Goals(
         reached=torch.tensor([[True, True], [False, False]]),
         stratum=torch.tensor([[0, 1], [1, -1]]),
         world=torch.zeros(2, 1),
     )
-    flown = Episodes(Posts(), goals, torch.tensor([End.THROUGH, End.TOUCHED]), torch.ones(2).long())
+    flown = CompleteEpisodes(
+        Posts(), goals, torch.tensor([End.THROUGH, End.TOUCHED]), torch.ones(2).long()
+    )
     summary = summarise(flown)
     assert {n: e["successes"] for n, e in summary["ends"].items()} == {
         "through": 1, "touched": 1, "time": 0,

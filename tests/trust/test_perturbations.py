@@ -1,18 +1,48 @@
 """A camera that is mounted otherwise in each world."""
 
+import dataclasses
+import itertools
+
 import pytest
 import torch
 
+from drone_rl.config import MINIMAL, CameraSettings, PillarsSettings, TaskSettings
+from drone_rl.envs.fault_models import dead_rows, late_frames, noise, out_of_focus
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.worlds import Worlds
-from drone_rl.trust.perturbations import mount
+from drone_rl.trust.agents import OracleAgent
+from drone_rl.trust.paired_evaluation import PairedEvaluator
+from drone_rl.trust.perturbations import (
+    DRIFT,
+    MAX_DISTRACTORS,
+    Condition,
+    FaultPipeline,
+    PerturbationMode,
+    as_bright,
+    clutter,
+    elevation,
+    expose,
+    fog,
+    frozen_frames,
+    mount,
+    reflect,
+    sample_distractors,
+    scene_appearance,
+    sun_at,
+    task_region,
+    tint,
+    variations,
+    whiten,
+)
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state
+from tests.trust.subjects import subject
 
 SWAY = torch.tensor([[1.0], [-0.5]], dtype=torch.float64)
 
 
-def test_each_world_has_its_share_of_it():
+def test_mounting_of_each_environment():
     look = mount(offset=(0.0, 2.0, 1.0)).change(Appearance(), SWAY)
     assert look.camera.offset.tolist() == [[0.0, 2.0, 1.0], [0.0, -1.0, -0.5]]
     assert look.camera.turn.tolist() == [[1.0, 0.0, 0.0, 0.0]] * 2
@@ -21,14 +51,14 @@ def test_each_world_has_its_share_of_it():
     assert both.camera.turn[0].tolist() == pytest.approx([3**0.5 / 2, 0.0, 0.0, 0.5])
 
 
-def test_the_look_is_otherwise_the_same():
+def test_mounting_keeps_the_appearance():
     own = Appearance(colors={SemanticClass.GROUND: (0.1, 0.2, 0.3)}, fog_visibility=50.0)
     look = mount(degrees=5.0).change(own, SWAY)
     assert (look.colors, look.fog_visibility) == (own.colors, 50.0)
 
 
 @pytest.mark.parametrize("renderer", ["raytrace", "mujoco_warp"])
-def test_the_picture_is_that_of_a_camera_there(renderer):
+def test_image_of_a_moved_camera(renderer):
     """Half a metre higher, the horizon stays and the near ground shrinks: as if the drone rose."""
     worlds = Worlds(1, num_shards=1, renderer=renderer)
     worlds.reset(torch.arange(1), [world_random_state(0, 0)])
@@ -43,3 +73,239 @@ def test_the_picture_is_that_of_a_camera_there(renderer):
     worlds.close()
     assert torch.equal(drawn[0], drawn[1])
     assert not torch.equal(drawn[0], drawn[2])
+
+
+def test_combined_conditions():
+    blurred, late = out_of_focus(1.0), late_frames(2)
+    tinted, sun, moved = tint((SemanticClass.GROUND,), 0.1), sun_at(5.0), mount(degrees=3.0)
+    one = Condition(
+        task={"cube_size": 2.0}, appearance_changes=(tinted,), faults=(blurred,), delay=3
+    )
+    two = Condition(
+        task={"cube_size": 3.0, "step_length": 0.5},
+        camera={"horizontal_fov": 90.0},
+        appearance_changes=(sun,),
+        mounts=(moved,),
+        faults=(late,),
+        delay=1,
+    )
+    both = one | two
+    assert both.task == {"cube_size": 3.0, "step_length": 0.5}
+    assert both.camera == {"horizontal_fov": 90.0}
+    assert (both.appearance_changes, both.mounts, both.faults) == (
+        (tinted, sun),
+        (moved,),
+        (blurred, late),
+    )
+    assert both.delay == 3
+    assert both.dimensions == (3, 0, 1)
+
+
+CUBES = TaskSettings()
+
+
+def test_distractors_are_blue_and_as_bright():
+    red, green, blue = as_bright((0.75, 0.12, 0.08))
+    assert 0.299 * red + 0.587 * green + 0.114 * blue == pytest.approx(0.30381)
+    assert blue > green > red
+    assert as_bright((1.0, 1.0, 1.0)) == (
+        pytest.approx(0.4895, abs=1e-3),
+        pytest.approx(0.979, abs=1e-3),
+        1.0,
+    )
+
+
+def test_distractors_stand_next_to_the_task():
+    places = sample_distractors(CUBES.object_region, 500, torch.Generator().manual_seed(0))
+    assert places.shape == (500, MAX_DISTRACTORS, 3)
+    x, y, z = places.flatten(0, 1).T
+    assert 7.5 <= x.min() < 8 and 40 < x.max() <= 7.5 + 33
+    assert 8 <= y.abs().min() < 8.1 and 15.9 < y.abs().max() <= 16
+    assert abs((y > 0).double().mean() - 0.5) < 0.03
+    assert (z == 2.5).all()
+
+
+def test_distractors_are_appended_with_the_targets_size():
+    places = torch.arange(12.0).reshape(2, 2, 3)
+    look = clutter(None, CUBES.object_region, places)
+    assert look.distractors.sizes.tolist() == [[2.5, 2.5]] * 2
+    assert look.distractors.colors[1, 0].tolist() == pytest.approx(as_bright(CUBES.cube_color))
+    both = clutter(look, CUBES.object_region, 1 + places[:, :1])
+    assert both.distractors.places.tolist() == torch.cat([places, 1 + places[:, :1]], 1).tolist()
+
+
+def test_oracle_ignores_distractors():
+    evaluator = PairedEvaluator(
+        subject(task=TaskSettings(num_cubes=1), camera=CameraSettings()), 20
+    )
+    for count in (0, 16):
+        assert evaluator.run(Condition(clutter=count), agent=OracleAgent()).episodes.success.all()
+    evaluator.close()
+
+
+def test_task_without_objects():
+    assert task_region(PillarsSettings()).size == 1.0
+
+    class Other(PillarsSettings):
+        name = "other"
+        object_region = None
+
+    with pytest.raises(InputError, match="axes=distractors is not for task=other"):
+        task_region(Other())
+
+
+PLAIN = Appearance(
+    colors={SemanticClass.TARGET: (0.8, 0.1, 0.0), SemanticClass.SKY: (0.6, 0.7, 0.9)},
+    ambient=(0.3, 0.3, 0.3),
+    sun=(0.7, 0.7, 0.7),
+    sun_direction=(3.0, -4.0, -12.0),
+)
+NONE = torch.zeros(2, 0)
+
+
+def test_tints_are_clipped():
+    sway = torch.tensor([[1.0, -1.0, 1.0], [-0.5, 0.0, 1.0]], dtype=torch.float64)
+    made = tint((SemanticClass.TARGET, SemanticClass.OBSTACLE), 0.3).change(PLAIN, sway)
+    expected = torch.tensor([[1.0, 0.0, 0.3], [0.65, 0.1, 0.3]], dtype=torch.float64)
+    torch.testing.assert_close(made.colors[SemanticClass.TARGET], expected)
+    assert made.colors[SemanticClass.SKY] == PLAIN.colors[SemanticClass.SKY]
+    assert SemanticClass.OBSTACLE not in made.colors
+
+
+def test_whitening():
+    made = whiten((SemanticClass.TARGET,), 0.5).change(PLAIN, NONE)
+    assert made.colors[SemanticClass.TARGET].tolist() == pytest.approx([0.9, 0.55, 0.5])
+
+
+def test_elevation_of_the_sun():
+    made = sun_at(30.0).change(PLAIN, NONE).sun_direction
+    assert made.tolist() == pytest.approx([0.6 * 3**0.5 / 2, -0.8 * 3**0.5 / 2, -0.5])
+    assert elevation(made) == pytest.approx(30.0)
+    assert elevation(sun_at(0.0).change(PLAIN, NONE).sun_direction) == pytest.approx(0.0)
+
+
+def test_exposure_and_fog():
+    assert expose(2.0).change(PLAIN, NONE).exposure == 2.0
+    assert expose(2.0).change(dataclasses.replace(PLAIN, exposure=0.75), NONE).exposure == 1.5
+    assert fog(40.0).change(PLAIN, NONE).fog_visibility == 40.0
+
+
+def test_appearance_of_a_scene_renders_the_same():
+    worlds = Worlds(1, num_shards=1)
+    look = scene_appearance(worlds.scene)
+    assert elevation(look.sun_direction) == pytest.approx(MINIMAL.sun_elevation, abs=0.05)
+    drawn = worlds.render(worlds.state).clone()
+    assert torch.equal(worlds.render(worlds.state, appearance=look), drawn)
+    worlds.close()
+
+
+def test_classes_of_several_colors_are_kept():
+    worlds = Worlds(1, task="pillars", num_shards=1)
+    geoms = worlds.scene.geoms(SemanticClass.OBSTACLE)
+    assert SemanticClass.OBSTACLE in scene_appearance(worlds.scene).colors
+    worlds.scene.model.geom_rgba[geoms[0], :3] = (0.1, 0.2, 0.3)
+    look = scene_appearance(worlds.scene)
+    assert SemanticClass.OBSTACLE not in look.colors and SemanticClass.SKY in look.colors
+    with pytest.raises(InputError, match="the task has no objects of one color"):
+        whiten([SemanticClass.OBSTACLE], 0.5).change(look, NONE)
+    worlds.close()
+
+
+def first(mode, steps, count=1000, dimensions=(1, 2)):
+    generator = torch.Generator().manual_seed(0)
+    return [*itertools.islice(variations(mode, dimensions, count, generator), steps)]
+
+
+@pytest.mark.parametrize("mode", [PerturbationMode.CONSTANT, PerturbationMode.ONSET])
+def test_constant_variations(mode):
+    one, two = first(mode, 2)
+    assert [part.shape for part in one] == [(1000, 1), (1000, 2)]
+    assert all(torch.equal(a, b) for a, b in zip(one, two, strict=True))
+    ways = torch.cat(one, -1)
+    assert set(ways.unique().tolist()) == {-1.0, 1.0}
+    assert abs(ways.mean()) < 0.1  # half of the worlds either way
+
+
+def test_drifting_variations():
+    walk = torch.stack([part[1] for part in first(PerturbationMode.DRIFTING, 400, 300)])
+    assert walk[0].abs().max() == 0
+    assert walk.abs().max() <= 1
+    assert (walk[1] - walk[0]).std() == pytest.approx(DRIFT, rel=0.1)
+    assert walk[-1].std() == pytest.approx(3**-0.5, rel=0.1)  # anywhere alike, in the end
+
+
+def test_reflection():
+    away = torch.tensor([0.3, 1.0, 1.2, -1.3, 3.0, -5.0])
+    torch.testing.assert_close(reflect(away), torch.tensor([0.3, 1.0, 0.8, -0.7, -1.0, -1.0]))
+
+
+def test_variations_repeat():
+    for one, two in zip(
+        first(PerturbationMode.DRIFTING, 5), first(PerturbationMode.DRIFTING, 5), strict=True
+    ):
+        assert all(torch.equal(a, b) for a, b in zip(one, two, strict=True))
+
+
+def picture(*values):
+    """A picture of 4x3 pixels in each world, all of one value."""
+    return torch.tensor(values)[:, None, None, None].expand(-1, 1, 4, 3).clone()
+
+
+ALL = torch.arange(2)
+
+
+def test_late_frames():
+    spoil = FaultPipeline([late_frames(2)], 2, seed=0)
+    seen = [spoil(picture(t / 10, t / 20), ALL)[:, 0, 0, 0].tolist() for t in range(4)]
+    assert seen == [pytest.approx(v) for v in ([0, 0], [0, 0], [0, 0], [0.1, 0.05])]
+
+
+def test_late_frames_of_the_active_environments():
+    spoil = FaultPipeline([late_frames(1)], 2, seed=0)
+    spoil(picture(0.1, 0.2), ALL)
+    assert spoil(picture(0.4), torch.tensor([1]))[:, 0, 0, 0].tolist() == pytest.approx([0.2])
+
+
+def test_dead_rows():
+    few, more = (FaultPipeline([dead_rows(n)], 2, seed=3) for n in (1, 2))
+    dead = [spoil(picture(1.0, 1.0), ALL)[:, 0, :, 0] == 0 for spoil in (few, more)]
+    assert [d.sum(-1).tolist() for d in dead] == [[1, 1], [2, 2]]
+    assert (dead[0] <= dead[1]).all()
+    assert torch.equal(few(picture(0.5, 0.5), ALL)[:, 0, :, 0] == 0, dead[0])
+    assert (more(picture(1.0, 1.0), ALL, -1.0).amin() == -1).all()
+
+
+def test_frozen_frames():
+    always = FaultPipeline([frozen_frames(1.0)], 2, seed=0)
+    seen = [always(picture(t / 10, t / 10), ALL)[0, 0, 0, 0] for t in range(3)]
+    assert seen == [0, 0, 0]
+    never = FaultPipeline([frozen_frames(0.0)], 2, seed=0)
+    assert [float(never(picture(t / 8, 0), ALL)[0, 0, 0, 0]) for t in range(3)] == [0, 0.125, 0.25]
+    half = FaultPipeline([frozen_frames(0.5)], 500, seed=0)
+    half(torch.zeros(500, 1, 4, 3), torch.arange(500))
+    shown = half(torch.ones(500, 1, 4, 3), torch.arange(500))[:, 0, 0, 0]
+    assert shown.mean() == pytest.approx(0.5, abs=0.08)
+
+
+def test_noise_is_proportional_to_its_strength():
+    gray = torch.full((2, 1, 4, 3), 0.5)
+    one, two = (FaultPipeline([noise(s)], 2, seed=1)(gray, ALL) - 0.5 for s in (0.01, 0.02))
+    torch.testing.assert_close(2 * one, two)
+    assert one.abs().max() > 0
+
+
+def test_correlation_of_noise():
+    gray = torch.full((200, 1, 4, 3), 0.5)
+    for fault, kept in ((noise(0.05, 19.5), 0.95), (noise(0.05), 0.0)):
+        spoil = FaultPipeline([fault], 200, seed=1)
+        one, two = (spoil(gray, torch.arange(200)).flatten() - 0.5 for _ in range(2))
+        assert float(torch.corrcoef(torch.stack([one, two]))[0, 1]) == pytest.approx(kept, abs=0.05)
+
+
+def test_faults_that_hide_objects():
+    faults = [noise(0.5), dead_rows(2), out_of_focus(2.0)]
+    sharp = picture(1.0, 1.0)
+    seen = FaultPipeline(faults, 2, seed=5, hiding_only=True)(sharp, ALL)
+    rows = FaultPipeline([noise(0.0), dead_rows(2)], 2, seed=5)(sharp, ALL)
+    assert torch.equal(seen, rows)  # the same rows are dead as in what the policy sees
+    assert set(seen.unique().tolist()) == {0.0, 1.0}

@@ -1,23 +1,21 @@
 """What rounding and batches can change in episodes, with networks made by hand."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import pytest
 import torch
-from tensordict import TensorDict
 
 import drone_rl
 from drone_rl.collectors.complete_episodes import StepLog, run_episodes
-from drone_rl.config.transforms import Gray, Stack
 from drone_rl.policies.external_network import ExternalNetwork
 from drone_rl.policies.external_policy import policy_from
-from drone_rl.policies.rounding import Decisions
 from drone_rl.sim.actions import MOVES, Move
-from drone_rl.trust import rounding_sensitivity
-from drone_rl.trust.outcomes import OutcomeSet
 from drone_rl.trust.rounding_sensitivity import (
+    _count_unexplained,
+    _first_difference,
+    _other_outcome,
     check_rounding,
-    compare_implementations,
     require_same_in_any_batch,
 )
 from drone_rl.utils.errors import InputError
@@ -30,9 +28,8 @@ def examined(policy, is_compiled=True):
         state, log = env.base_env.state_dict(), StepLog()
         flown = run_episodes(env, actor, EPISODES, is_compiled=is_compiled, log=log)
         env.base_env.load_state_dict(state)
-        how = check_rounding if is_compiled else compare_implementations
-        count = (EPISODES,) if is_compiled else ()
-        return how(env, actor, *count, greedy=flown, log=log), flown, log
+        how = {"greedy": flown, "log": log, "is_compiled": is_compiled}
+        return check_rounding(env, actor, EPISODES, **how), flown, log
 
 
 def with_unit(by_unit):
@@ -49,16 +46,6 @@ def with_unit(by_unit):
     return dataclasses.replace(
         policy, description=parse(described), state={**policy.state, "policy": weights}
     )
-
-
-_run_checked = rounding_sensitivity._run_checked
-
-
-def without_fragile_frames(*given):
-    """Runs episodes as `_run_checked`, with a bound that misses everything."""
-    checked, actions = _run_checked(*given)
-    none = [torch.zeros_like(of) for of in checked.fragile]
-    return dataclasses.replace(checked, fragile=none), actions
 
 
 def test_an_honest_policy_takes_the_same_actions_in_both_implementations():
@@ -85,13 +72,6 @@ def test_evaluations_compare_with_the_fused_kernel():
     assert found.differing == 0
     found, _, _ = examined(with_unit(1000.0), is_compiled=False)
     assert (found.differing, found.unexplained) == (EPISODES, 0)
-
-
-def test_differences_between_implementations_need_an_explanation(monkeypatch):
-    monkeypatch.setattr(rounding_sensitivity, "_run_checked", without_fragile_frames)
-    found, _, _ = examined(with_unit(1000.0), is_compiled=False)
-    assert (found.compared, found.differing) == ("fused kernel", EPISODES)
-    assert found.unexplained == EPISODES
 
 
 @pytest.mark.parametrize("kind", ["alone", "first", "calls"])
@@ -129,69 +109,35 @@ def test_frames_are_tried_in_batches_of_many_sizes():
         require_same_in_any_batch(ExternalNetwork(logits, (1, 1, 3), MOVES), frames, range(1, 65))
 
 
-def test_a_fragile_frame_explains_no_earlier_difference(make_episodes):
-    ends = make_episodes([[0], [1], [0]], [[True], [True], [True]])
+@pytest.mark.parametrize(
+    ("steps", "unexplained"), [([0, None, 1], 2), ([1, None, None], 0), ([2], 0)]
+)
+def test_a_fragile_frame_explains_only_later_differences(steps, unexplained):
     fragile = [torch.tensor(of) for of in ([False, True, False], [True, False], [False, False])]
-    checked = rounding_sensitivity._Checked(ends, fragile, None)
-    assert checked.unexplained({0: 0}) == checked.unexplained({2: 1}) == 1
-    assert checked.unexplained({0: 1}) == checked.unexplained({0: 2}) == 0
-    assert checked.unexplained({0: 0, 1: 1, 2: 0}) == 2
+    assert _count_unexplained(steps, fragile) == unexplained
 
 
-def test_outcomes_of_several_batches_are_numbered_by_episode(make_episodes):
-    ends = make_episodes([[0], [1]], [[True], [False]])
-    found = OutcomeSet(ends, torch.tensor([1, 0]), torch.tensor([False, True]))
-    fragile = [torch.tensor([False])] * 8
-    batches = [(0, found, torch.tensor([0, 2])), (4, found, torch.tensor([1, 3]))]
-    outcomes = rounding_sensitivity._Checked(ends, fragile, batches).outcomes()
-    assert outcomes.owner.tolist() == [2, 0, 7, 5]
-    assert outcomes.is_open.nonzero()[:, 0].tolist() == [2, 7]
-    assert outcomes.episodes.success.tolist() == [1, 0, 1, 0]
+@pytest.mark.parametrize(
+    ("one", "other", "step"),
+    [
+        ([1, 2, 3], [1, 2, 3], None),
+        ([1, 2, 3], [1, 0, 0], 1),
+        ([1, 2, 3], [1, 2], 2),  # the shorter one ended after the same actions
+        ([1], [1, 2], 1),
+        ([0, 2], [1], 0),
+    ],
+)
+def test_first_different_action(one, other, step):
+    assert _first_difference(torch.tensor(one), torch.tensor(other)) == step
 
 
-@pytest.fixture
-def with_fragile_starts(monkeypatch):
-    """Outcomes of a policy of two frames, which flies straight on after a fragile first frame.
-
-    They are found even if all episodes have such a frame.
-    """
-    monkeypatch.setattr(rounding_sensitivity, "MAX_FRAGILE_EPISODES", 1.0)
-
-    def with_fragile_starts(possible):
-        sizes = [0]
-
-        def decide(pixels):
-            sizes.append(len(pixels))  # falls as episodes end
-            is_first = sizes[-1] > sizes[-2]
-            outputs = torch.tensor([[3.0, 2.0, 1.0]]).repeat(len(pixels), 1)
-            is_possible = torch.tensor(possible if is_first else [True, False, False])
-            return Decisions(outputs, is_possible.repeat(len(pixels), 1))
-
-        policy = policy_from(lambda x: x[:, 0, 10:13, 5], transforms=[Gray(), Stack(N=2)])
-        with policy.flying(EPISODES, seed=1) as (env, actor):
-            checked, _ = rounding_sensitivity._run_checked(env, decide, actor.network, EPISODES)
-        assert [of.nonzero().tolist() for of in checked.fragile] == [[[0]]] * EPISODES
-        return checked.outcomes()
-
-    return with_fragile_starts
+def episodes(reasons, reached, lengths):
+    goals = SimpleNamespace(reached=torch.tensor(reached))
+    made = {"end_reason": torch.tensor(reasons), "length": torch.tensor(lengths)}
+    return SimpleNamespace(goals=goals, **made)
 
 
-def test_the_other_action_of_a_single_fragile_frame_is_followed(with_fragile_starts):
-    found = with_fragile_starts([True, True, False])
-    assert not found.is_open.any()
-    assert found.owner.tolist() == list(range(EPISODES))
-
-
-def test_a_frame_with_three_possible_actions_leaves_the_outcomes_open(with_fragile_starts):
-    assert with_fragile_starts([True, True, True]).is_open.all()
-
-
-def test_the_other_action_is_the_possible_one_even_if_another_has_a_greater_logit():
-    network = ExternalNetwork(lambda x: x.flatten(1)[:, :3], (1, 1, 3), MOVES)
-    outputs = torch.tensor([[3.0, 2.0, 1.0], [3.0, 2.0, 1.0]])
-    possible = torch.tensor([[True, False, True], [True, True, True]])
-    actor = rounding_sensitivity._CheckingActor(
-        lambda _: Decisions(outputs, possible), network, is_contrary=True
-    )
-    given = TensorDict({"pixels": torch.zeros(2, 1, 1, 3)}, [2])
-    assert actor(given)["action"].tolist() == [2, 0]
+def test_outcomes_differ_by_end_or_by_goals_reached():
+    one = episodes([1, 1, 1], [[True], [True], [True]], [5, 6, 7])
+    other = episodes([1, 2, 1], [[True], [True], [False]], [9, 9, 9])
+    assert [_other_outcome(one, other, i) for i in range(3)] == [None, 6, 7]

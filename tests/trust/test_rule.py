@@ -1,17 +1,19 @@
 import itertools
+import subprocess
+import sys
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from drone_rl.sim.tasks import CollectCubes
-from drone_rl.trust import rule
 from drone_rl.trust.rule import (
     BLIND_BASELINES,
+    KINDS,
     SIDES,
-    Kind,
     Quantity,
     Rule,
+    VerdictKind,
     decide,
     kinds_within,
     level,
@@ -32,37 +34,37 @@ def levels(
 @pytest.mark.parametrize(
     ("found", "kind"),
     [
-        (levels(), Kind.GOOD),
-        (levels(shares=(2, 1, 2)), Kind.NONE),  # dodges cubes ahead
-        (levels(shares=(2, 1, 2), offered=(1, 0, 1)), Kind.GOOD),  # there are next to none
-        (levels(success=0), Kind.NONE),
-        (levels(success=0, above=(1, 0, 1, 1)), Kind.POOR),  # no better than one luck
-        (levels(success=0, shares=(0, 0, 2)), Kind.ONE_SIDED_RIGHT),
-        (levels(success=0, shares=(2, 2, 0)), Kind.ONE_SIDED_LEFT),
-        (levels(success=0, shares=(0, 2, 2), above=(0, 0, 0, 0)), Kind.ONE_SIDED_RIGHT),
-        (levels(shares=(0, 2, 2)), Kind.ONE_SIDED_RIGHT),  # succeeds, but not on its left
-        (levels(shares=(0, 2, 2), offered=(0, 1, 1)), Kind.GOOD),
-        (levels(success=0, shares=(0, 2, 2), offered=(0, 1, 1)), Kind.NONE),
-        (levels(success=0, shares=(1, 2, 2)), Kind.NONE),
-        (levels(success=0, shares=(0, 2, 1)), Kind.NONE),
-        (levels(unsolved=(1, 0, 1, 1)), Kind.TRIVIAL),
-        (levels(unsolved=(0, 0, 0, 0), above=(0, 0, 0, 0)), Kind.TRIVIAL),
-        (levels(success=0, unsolved=(0, 1, 1, 1)), Kind.NONE),  # not even good
-        (levels(success=0, unsolved=(1, 0, 1, 1), above=(1, 0, 1, 1)), Kind.POOR),
-        (levels(above=(1, 0, 1, 1)), Kind.GOOD),  # succeeds more often than the baseline
+        (levels(), VerdictKind.GOOD),
+        (levels(shares=(2, 1, 2)), VerdictKind.NONE),  # dodges cubes ahead
+        (levels(shares=(2, 1, 2), offered=(1, 0, 1)), VerdictKind.GOOD),  # there are next to none
+        (levels(success=0), VerdictKind.NONE),
+        (levels(success=0, above=(1, 0, 1, 1)), VerdictKind.POOR),  # no better than one luck
+        (levels(success=0, shares=(0, 0, 2)), VerdictKind.ONE_SIDED_RIGHT),
+        (levels(success=0, shares=(2, 2, 0)), VerdictKind.ONE_SIDED_LEFT),
+        (levels(success=0, shares=(0, 2, 2), above=(0, 0, 0, 0)), VerdictKind.ONE_SIDED_RIGHT),
+        (levels(shares=(0, 2, 2)), VerdictKind.ONE_SIDED_RIGHT),  # succeeds, but not on its left
+        (levels(shares=(0, 2, 2), offered=(0, 1, 1)), VerdictKind.GOOD),
+        (levels(success=0, shares=(0, 2, 2), offered=(0, 1, 1)), VerdictKind.NONE),
+        (levels(success=0, shares=(1, 2, 2)), VerdictKind.NONE),
+        (levels(success=0, shares=(0, 2, 1)), VerdictKind.NONE),
+        (levels(unsolved=(1, 0, 1, 1)), VerdictKind.TRIVIAL),
+        (levels(unsolved=(0, 0, 0, 0), above=(0, 0, 0, 0)), VerdictKind.TRIVIAL),
+        (levels(success=0, unsolved=(0, 1, 1, 1)), VerdictKind.NONE),  # not even good
+        (levels(success=0, unsolved=(1, 0, 1, 1), above=(1, 0, 1, 1)), VerdictKind.POOR),
+        (levels(above=(1, 0, 1, 1)), VerdictKind.GOOD),  # succeeds more often than the baseline
     ],
 )
 def test_kinds_by_hand(found, kind):
     assert decide(found) is kind
 
 
-def test_who_equals_a_threshold_does_not_exceed_it():
+def test_level_at_a_threshold():
     assert [level(x, (0.3, 0.7)) for x in (0.29, 0.3, 0.31, 0.7, 0.71)] == [0, 0, 1, 1, 2]
     assert Quantity(0.7 + 1e-12, 0.0, 1.0, (0.3, 0.7)).level == 1  # rounding
     assert Quantity(None, 0.0, 1.0, (0.3, 0.7)).level == 0
 
 
-def test_an_interval_reaches_every_level_that_it_touches():
+def test_levels_of_an_interval():
     assert Quantity(0.5, 0.4, 0.6, (0.3, 0.7)).levels == (1, 1)
     assert Quantity(0.5, 0.3, 0.7, (0.3, 0.7)).levels == (0, 2)  # ends are within it
     assert Quantity(0.9, 0.0, 1.0, (0.3, 0.7)).levels == (0, 2)
@@ -78,14 +80,14 @@ def test_thresholds_of_every_quantity():
     assert RULE.confidence == pytest.approx(1 - 0.05 / 15)
 
 
-def test_no_corner_of_a_box_is_missed():
+def test_kinds_within_a_box():
     """Left about 0.68 of 0.7, right about 0.32 of 0.3: one-sided lies within both intervals."""
     box = [(0, 0), (1, 1), (1, 1), (1, 1), (1, 2), (2, 2), (0, 1), *[(1, 1)] * 8]
-    assert kinds_within(tuple(box)) == {Kind.NONE, Kind.ONE_SIDED_LEFT}
+    assert kinds_within(tuple(box)) == {VerdictKind.NONE, VerdictKind.ONE_SIDED_LEFT}
 
 
 @given(BOXES, st.data())
-def test_every_cell_is_seen(box, data):
+def test_kinds_within_a_box_include_every_cell(box, data):
     cell = [data.draw(st.integers(low, high)) for low, high in box]
     assert decide(cell) in kinds_within(box)
 
@@ -105,25 +107,25 @@ def test_a_mirrored_policy_gets_the_mirrored_kind(found):
 
 
 @given(st.tuples(*LEVELS), st.integers(0, len(RULE.quantities) - 1))
-def test_more_success_keeps_a_good_policy_good_and_makes_none_poor(found, which):
+def test_more_success_never_lowers_the_kind(found, which):
     """Sides that are offered more often are a harder task, and are left alone."""
     if RULE.quantities[which].startswith("offered"):
         return
     better = list(found)
     better[which] = len(RULE.thresholds[which])
-    if decide(found) is Kind.GOOD:
-        assert decide(better) is Kind.GOOD
-    if decide(found) is Kind.NONE:
-        assert decide(better) is not Kind.POOR
+    if decide(found) is VerdictKind.GOOD:
+        assert decide(better) is VerdictKind.GOOD
+    if decide(found) is VerdictKind.NONE:
+        assert decide(better) is not VerdictKind.POOR
 
 
 def test_every_kind_can_be_given():
     ranges = [range(len(t) + 1) for t in RULE.thresholds]
-    assert {decide(cell) for cell in itertools.product(*ranges)} == set(Kind)
+    assert {decide(cell) for cell in itertools.product(*ranges)} == set(VerdictKind)
 
 
 @pytest.mark.parametrize("value", [0.0, 1.0, -1, float("nan"), "much", True])
-def test_shares_out_of_range(value):
+def test_thresholds_out_of_range(value):
     with pytest.raises(InputError, match=f"good_share={value!r}"):
         Rule(good_share=value)
 
@@ -133,31 +135,7 @@ def test_thresholds_that_contradict_each_other():
         Rule(other_share=0.8)
 
 
-def test_the_rule_in_words_has_its_numbers():
-    text = Rule(good_share=0.8).text
-    assert all(
-        part in text for part in ("more than 80% of the oracle's", "70%", "30%", "5%", "17%")
-    )
-
-
-def test_the_text_says_every_number():
-    shares = {"good_share": 0.81, "side_share": 0.62, "other_share": 0.23, "offered_share": 0.14}
-    text = Rule(**shares, poor_margin=0.35, error_rate=0.06).text
-    for share in ("81% of the oracle's", "than 62% of", "23% on", "14% of episodes", "35% of the"):
-        assert share in text
-    assert "94% probability" in text
-    assert "more than 92.5% of the oracle's" in Rule(good_share=0.925).text
-
-
-@pytest.mark.parametrize(
-    "value", [-0.5, 0, 0.0, 1, 1.0, 1.5, float("nan"), float("inf"), True, "x"]
-)
-def test_no_share_is_refused_by_its_name(value):
-    with pytest.raises(InputError, match="good_share="):
-        Rule(good_share=value)
-
-
-def test_the_strata_and_luck_of_the_rule_are_those_of_cube_collection():
+def test_defaults_are_those_of_cube_collection():
     assert CollectCubes.strata == SIDES and CollectCubes.blind_baselines == BLIND_BASELINES
     assert (RULE.strata, RULE.blind_baselines) == (SIDES, BLIND_BASELINES)
 
@@ -165,15 +143,15 @@ def test_the_strata_and_luck_of_the_rule_are_those_of_cube_collection():
 @pytest.mark.parametrize(
     ("levels", "kind"),
     [
-        ((1, 1, 1, 2, 2, 1, 1), Kind.GOOD),
-        ((1, 1, 1, 2, 2, 1, 0), Kind.TRIVIAL),
-        ((0, 1, 1, 0, 2, 1, 1), Kind.ONE_SIDED_RIGHT),
-        ((0, 1, 1, 2, 0, 1, 1), Kind.ONE_SIDED_LEFT),
-        ((0, 1, 0, 2, 0, 1, 1), Kind.NONE),
-        ((0, 1, 1, 1, 1, 0, 1), Kind.POOR),
+        ((1, 1, 1, 2, 2, 1, 1), VerdictKind.GOOD),
+        ((1, 1, 1, 2, 2, 1, 0), VerdictKind.TRIVIAL),
+        ((0, 1, 1, 0, 2, 1, 1), VerdictKind.ONE_SIDED_RIGHT),
+        ((0, 1, 1, 2, 0, 1, 1), VerdictKind.ONE_SIDED_LEFT),
+        ((0, 1, 0, 2, 0, 1, 1), VerdictKind.NONE),
+        ((0, 1, 1, 1, 1, 0, 1), VerdictKind.POOR),
     ],
 )
-def test_a_task_may_have_two_strata_and_one_luck(levels, kind):
+def test_rule_for_two_strata_and_one_baseline(levels, kind):
     """Success, two offered, two reached, above one baseline, unsolved by it."""
     assert decide(levels, 2) is kind
     assert kinds_within(tuple((level, level) for level in levels), 2) == {kind}
@@ -183,19 +161,6 @@ def test_a_task_may_have_two_strata_and_one_luck(levels, kind):
         "above random", "unsolved by random",
     )  # fmt: skip
     assert len(rule.thresholds) == 7 and rule.confidence == 1 - 0.05 / 7
-
-
-def test_many_strata_are_not_multiplied(monkeypatch):
-    calls = []
-
-    def count(*of):
-        calls.append(of)
-        return decide(*of)
-
-    monkeypatch.setattr(rule, "decide", count)
-    box = ((0, 1), *[(0, 1)] * 7, *[(0, 2)] * 7, (0, 1), (0, 1))
-    assert kinds_within(box, 7) == set(Kind)
-    assert len(calls) < 2000
 
 
 def test_inner_strata_are_reduced_exactly():
@@ -214,3 +179,21 @@ def test_a_task_has_strata_and_baselines(name):
         Rule(**{name: ()})
     with pytest.raises(InputError, match="can't be called"):
         Rule(strata=("all", "left"))
+
+
+def test_exit_statuses():
+    assert [kind.exit_code for kind in VerdictKind] == [0, 18, 10, 11, 11, 12]
+
+
+def test_families_and_mirror_images():
+    assert {kind.family for kind in VerdictKind} == set(KINDS)
+    assert VerdictKind.ONE_SIDED_LEFT.family == VerdictKind.ONE_SIDED_RIGHT.family == "one-sided"
+    assert VerdictKind.ONE_SIDED_LEFT.mirrored is VerdictKind.ONE_SIDED_RIGHT
+    assert all(kind.mirrored.mirrored is kind for kind in VerdictKind)
+    assert VerdictKind.GOOD.mirrored is VerdictKind.GOOD
+    assert VerdictKind.TRIVIAL.family == "good, but trivial"
+
+
+def test_kinds_need_no_torch():
+    code = "import sys, drone_rl.trust.rule; sys.exit('torch' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -20,7 +20,7 @@ def done():
     return drone_rl.shifts("good", axes=["brightness", "late_frames"], modes=["constant"], **FEW)
 
 
-def test_it_tells_what_was_flown(done):
+def test_shifts_in_python(done):
     numbers = done.numbers
     assert [*numbers["axes"]] == ["brightness", "late_frames"]
     assert numbers["policy"] == "good" and numbers["settings"]["episodes"] == 12
@@ -33,14 +33,14 @@ def test_it_tells_what_was_flown(done):
     assert [len(strip) for strip in done.pictures.values()] == [6, 6]
 
 
-def test_few_flights_make_no_range(done):
+def test_few_episodes_give_no_range(done):
     """Twenty flights are too few to be certain of anything."""
     domain = done.numbers["domain"]
     assert not domain["plain"]["good"] and not domain["plain"]["bad"]
     assert "no range" in done.sentence and "Good with" not in done.sentence
 
 
-def test_it_is_saved_and_shows_itself(done, tmp_path):
+def test_shifts_files(done, tmp_path):
     done.save(tmp_path)
     kept = json.loads((tmp_path / "shifts.json").read_text())
     assert kept["axes"].keys() == done.numbers["axes"].keys() and "settings" in kept
@@ -51,7 +51,7 @@ def test_it_is_saved_and_shows_itself(done, tmp_path):
     assert done.sentence in text and done.sentence in done._repr_html_()
 
 
-def test_who_ignores_the_picture_is_called_good_nowhere():
+def test_blind_policy_has_no_range():
     """In a task that flying straight on solves, too."""
     task = TaskSettings(
         num_cubes=1, first_distance=8.0, front_margin=4.0, cube_size=4.0, lateral_bound=0.5
@@ -76,13 +76,13 @@ def test_who_ignores_the_picture_is_called_good_nowhere():
         ({"wind": 1}, "wind is a setting of dynamics; give dynamics="),
     ],
 )
-def test_mistakes_are_told_in_a_line_before_anything_is_drawn(change, message, monkeypatch):
+def test_wrong_settings_are_refused_before_rendering(change, message, monkeypatch):
     monkeypatch.setattr("drone_rl.sim.worlds.Worlds.render", None)
     with pytest.raises(InputError, match=message):
         drone_rl.shifts("good", **{**FEW, **change})
 
 
-def test_a_task_without_an_oracle_has_no_range(monkeypatch):
+def test_task_without_an_oracle_has_no_range(monkeypatch):
 
     none = property(lambda _: None, lambda _, value: None)
     monkeypatch.setattr(CollectCubes, "oracle", none)
@@ -94,7 +94,7 @@ def test_a_task_without_an_oracle_has_no_range(monkeypatch):
     assert found.numbers["axes"]["noise"]["levels"][0]["impossible"] is None
 
 
-def test_in_another_body_it_is_said_so():
+def test_shifts_with_other_dynamics():
     found = drone_rl.shifts(
         "good",
         axes=["brightness"],
@@ -108,7 +108,7 @@ def test_in_another_body_it_is_said_so():
     assert found.numbers["network"]["description"]["dynamics"]["mode"] == "simple_flight"
 
 
-def test_a_task_of_a_derived_class_is_not_replaced():
+def test_derived_task_is_refused():
     class Strict(CollectCubes):
         name = "strict"
 
@@ -120,7 +120,7 @@ def test_a_task_of_a_derived_class_is_not_replaced():
         drone_rl.shifts(policy, axes=["noise"], domain=False, **FEW)
 
 
-def test_an_oracle_of_other_actions_is_refused_before_any_flight(monkeypatch):
+def test_oracle_of_other_actions_is_refused(monkeypatch):
     rule = OracleRule(("drone",), lambda drone: drone[..., 0].long(), MOVES_3D)
     monkeypatch.setattr(CollectCubes, "oracle", property(lambda _: rule, lambda _, value: None))
     with pytest.raises(InputError, match="acts by forward, left, right, up, down, these drones"):

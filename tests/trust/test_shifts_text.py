@@ -1,12 +1,21 @@
 import pytest
 
-from drone_rl.trust.shifts_text import NAMES, SHIFTS, inward, rows
+from drone_rl.trust.shifts_text import (
+    QUOTED,
+    SHIFTS,
+    inward,
+    is_quoted,
+    lacking,
+    not_evaluated,
+    why_not,
+)
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.text import said
 from tests.evidence import SHIFTS as EVIDENCE
-from tests.evidence import changed
+from tests.evidence import VERDICT, changed
 
 
-def test_the_whole():
+def test_all_sentences():
     text = said(SHIFTS, EVIDENCE)
     assert text["shifts.good"] == (
         "Good with the sun at 21.1 to 60 degrees (no more was tried) and blur of up to 1.5 pixels "
@@ -31,11 +40,11 @@ def test_the_whole():
         (155.04, "156", "155"),
     ],
 )
-def test_limits_are_rounded_to_where_it_is_surely_good(value, low, high):
+def test_limits_are_rounded_inwards(value, low, high):
     assert (inward(value, True), inward(value, False)) == (low, high)
 
 
-def test_no_range_without_a_search_and_none_of_who_is_not_good():
+def test_no_range_without_a_search_or_without_a_good_policy():
     names = set(said(SHIFTS, changed(EVIDENCE, {"domain": None})))
     assert names == {"shifts.impossible", "shifts.together", "shifts.fixed_seed"}
     bad = {"low": None, "high": None, "positions": None, "failed": [], "low_open": None,
@@ -46,61 +55,14 @@ def test_no_range_without_a_search_and_none_of_who_is_not_good():
     assert "good" not in " ".join(v for k, v in text.items() if k != "shifts.none").lower()
 
 
-def test_an_axis_that_changes_nothing_is_claimed_nowhere():
+def test_axes_without_effect_are_not_claimed():
     same = {"axes.blur.levels.1.modes.constant.unchanged": True}
     text = said(SHIFTS, changed(EVIDENCE, same))
     assert "blur" not in text["shifts.good"]
     assert text["shifts.untested"] == "Not tested, because without effect: blur."
 
 
-def test_what_the_task_cannot_have():
-    refused = {"bad": True, "good": False, "refused": "task.cube_size=9", "value": 9.0}
-    refused |= {"end": "high", "oracle": None, "impossible": False}
-    text = said(SHIFTS, changed(EVIDENCE, {"domain.ranges.brightness.failed": [refused]}))
-    assert text["shifts.not"] == "Not with brightness at 9 times, which the task does not allow."
-
-
-def test_fog_is_good_from_the_least_sight_up():
-    fog = {"low": 85.06, "high": None, "positions": [0.0, 1 / 85.06], "flown": []}
-    fog |= {"low_open": False, "high_open": None, "failed": []}
-    changes = {"axes.fog": EVIDENCE["axes"]["blur"], "domain.ranges.fog": fog}
-    assert (
-        "fog with a visibility of 85.1 m or more ("
-        in said(SHIFTS, changed(EVIDENCE, changes))["shifts.good"]
-    )
-    between = {**fog, "high": 100.0, "positions": [-0.01, 0.01], "high_open": True}
-    text = said(SHIFTS, changed(EVIDENCE, {**changes, "domain.ranges.fog": between}))
-    assert "fog with a visibility of 85.1 to 100 m (no more was tried)" in text["shifts.good"]
-
-
-def test_all_at_once_names_the_axes():
-    text = said(SHIFTS, EVIDENCE)["shifts.together"]
-    assert text.startswith(
-        "With elevation of the sun, blur and brightness at once, each at its third"
-    )
-    many = {f"axes.{name}": EVIDENCE["axes"]["blur"] for name in list(NAMES)[:8]}
-    several = said(SHIFTS, changed(EVIDENCE, many))["shifts.together"]
-    assert several.startswith("With all 11 axes of the table at once")
-
-
-def test_the_table():
-    head, sun, *_ = rows(EVIDENCE)
-    assert head == ["success, constant", "1", "2", "3", "4", "5", "area", ""]
-    assert sun == [
-        "elevation of the sun",
-        "60: 99.5%",
-        "",
-        "",
-        "",
-        "0: 10.0%*",
-        "0.75",
-        "degrees",
-    ]
-    refused = {"axes.sun.levels.0.refused": "task.cube_size=9", "axes.sun.areas.constant": None}
-    assert rows(changed(EVIDENCE, refused))[1][1:7] == ["60: -", "", "", "", "0: 10.0%*", ""]
-
-
-def test_what_nobody_can_is_not_the_policys_failure():
+def test_impossible_strengths_are_no_failure_of_the_policy():
     failed = EVIDENCE["domain"]["ranges"]["brightness"]["failed"][0]
     failed = {**failed, "impossible": True, "oracle": {"share": 0.3}}
     text = said(SHIFTS, changed(EVIDENCE, {"domain.ranges.brightness.failed": [failed]}))
@@ -111,7 +73,7 @@ def test_what_nobody_can_is_not_the_policys_failure():
     assert "blur of up to 1.5 pixels (no more is possible)" in text["shifts.good"]
 
 
-def test_strengths_between_good_and_not_good_are_named_with_the_reason():
+def test_uncertain_strengths_are_named():
     dark = EVIDENCE["domain"]["ranges"]["brightness"]["failed"][0]
     near = {**dark, "bad": False, "success": 0.945}
     end = {**near, "end": "high", "value": 2.0, "success": 1.0, "fragile": 31}
@@ -124,14 +86,87 @@ def test_strengths_between_good_and_not_good_are_named_with_the_reason():
     assert "shifts.not" not in text and "blur of up to 1.5 pixels" in text["shifts.good"]
 
 
-def test_camera_faults_of_the_training_are_named():
-    seen = {"transforms": [{"name": "gray"}, {"name": "late_frames", "frames": 2}]}
-    text = said(SHIFTS, {**EVIDENCE, "network": {"description": seen}})
-    assert text["shifts.own_faults"] == "Without the camera faults of its training (late_frames)."
+@pytest.mark.parametrize(
+    ("name", "low", "high", "words"),
+    [
+        ("sun", 21.07, 60.0, None),
+        ("sun", 30.0, None, None),
+        ("sun", None, 60.0, None),
+        ("sun", 21.0, None, "needed 21 to 55 degrees, good 21.07 to 60 degrees"),
+        ("sun", 30.0, 61.0, "needed 30 to 61 degrees"),
+        ("blur", None, 1.5, None),
+        ("blur", None, 1.6, "needed 0 to 1.6 pixels, good 0 to 1.5 pixels"),
+        ("brightness", 0.9, 1.0, "good 1 to 1 times"),
+        ("fog", 60.0, None, "fog: not evaluated; run drone-rl shifts with axes=[fog]"),
+    ],
+)
+def test_lacking_range(name, low, high, words):
+    found = lacking(EVIDENCE, name, {"low": low, "high": high})
+    assert found == words if words is None else words in found
 
 
-def test_an_axis_of_which_all_strengths_are_refused_is_not_called_without_effect():
-    count = len(EVIDENCE["axes"]["blur"]["levels"])
-    refused = {f"axes.blur.levels.{i}.refused": "camera.horizontal_fov=180" for i in range(count)}
-    text = said(SHIFTS, changed(EVIDENCE, refused))["shifts.untested"]
-    assert text == "Not tested, because no strength is allowed: blur."
+@pytest.mark.parametrize(
+    ("name", "need", "words"),
+    [
+        ("sun", {"low": None, "high": 50.0}, "elevation of the sun: low is missing and therefore "
+         "55 degrees, the value without perturbation, but high is 50; give low, too"),
+        ("sun", {"low": 70.0, "high": None}, "elevation of the sun: high is missing and therefore "
+         "55 degrees, the value without perturbation, but low is 70; give high, too"),
+    ],
+)  # fmt: skip
+def test_single_end_beyond_the_unperturbed_value_is_refused(name, need, words):
+    with pytest.raises(InputError, match=f"^{words}$"):
+        lacking(EVIDENCE, name, need)
+
+
+def test_required_fog_has_no_upper_end():
+    ranges = {"low": 80.0, "high": None, "positions": [0.0, 1 / 80], "failed": []}  # from clear air
+    fog = {**EVIDENCE["axes"]["blur"], "neutral": None, "unit": "m of sight"}
+    shifts = changed(EVIDENCE, {"axes.fog": fog, "domain.ranges.fog": ranges})
+    assert lacking(shifts, "fog", {"low": 80.0, "high": None}) is None
+    found = lacking(shifts, "fog", {"low": 60.0, "high": None})
+    assert "needed 60 and more m of sight, good 80 and more m of sight" in found
+    clear = changed(shifts, {"domain.ranges.fog.low": None, "domain.ranges.fog.positions": [0, 0]})
+    found = lacking(clear, "fog", {"low": 60.0, "high": None})
+    assert found == "fog: needed 60 and more m of sight, good only without fog"
+
+
+def test_untested_axes_cover_nothing():
+    need = {"low": None, "high": 1.0}
+    same = {"axes.blur.levels.1.modes.constant.unchanged": True}
+    assert "not tested" in lacking(changed(EVIDENCE, same), "blur", need)
+    nowhere = {"domain.ranges.blur.positions": None}
+    assert "without perturbation" in lacking(changed(EVIDENCE, nowhere), "blur", need)
+    lost = {"domain.ranges.blur.failed": [{"end": "high", "impossible": True}]}
+    assert "impossible even for the oracle" in lacking(
+        changed(EVIDENCE, lost), "blur", {"low": None, "high": 2.0}
+    )
+
+
+GOOD = {"verdict": {**VERDICT, "kind": "good", "certain": True}, "shifts": EVIDENCE}
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"shifts": {"refused": "it is of another task"}}, "of another task"),
+        ({"verdict.good_share": 0.99}, "requires 0.9 of the oracle's success rate"),
+        ({"verdict.kind": "poor"}, "this verdict does not"),
+    ],
+)
+def test_refused_evaluations_are_not_quoted(changes, why):
+    evidence = changed(GOOD, changes)
+    assert not is_quoted(evidence) and why in why_not(evidence)
+    assert list(said(QUOTED, evidence)) == ["domain.refused"]
+    assert not_evaluated(evidence) == ["colors", "light", "sizes"]
+
+
+def test_evaluations_that_do_not_contradict_the_verdict_are_quoted():
+    assert is_quoted(changed(GOOD, {"verdict.kind": "poor", "verdict.certain": False}))
+    nowhere = {"shifts.domain.plain.good": False, "verdict.kind": "poor"}
+    assert is_quoted(changed(GOOD, nowhere))
+
+
+def test_groups_that_were_not_evaluated():
+    assert not_evaluated(GOOD) == ["colors", "sizes"]
+    assert not_evaluated({"verdict": VERDICT}) == ["colors", "light", "sizes"]

@@ -1,13 +1,15 @@
 """A policy's flights under several conditions, with numbers worked out by hand."""
 
+import numpy as np
 import pytest
 import torch
 
+from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.envs.fault_models import dead_rows
 from drone_rl.trust.axes import AXES
 from drone_rl.trust.paired_evaluation import PairedEvaluator
-from drone_rl.trust.perturbations import Condition, Mode
-from drone_rl.trust.suite import Suite, area, mcnemar
+from drone_rl.trust.perturbations import Condition, PerturbationMode
+from drone_rl.trust.suite import Suite, area, make_strip, mcnemar
 from tests.trust.subjects import Blind, subject
 
 
@@ -18,7 +20,7 @@ def silent(text):
 @pytest.fixture(scope="module")
 def suite():
     evaluator = PairedEvaluator(subject(Blind(0)), 20)
-    yield Suite(evaluator, [*Mode], 0.9)
+    yield Suite(evaluator, [*PerturbationMode], 0.9)
     evaluator.close()
 
 
@@ -38,7 +40,7 @@ def test_the_area_under_a_curve_by_hand():
     assert area([-1.0, 0.0, 1.0], [0.0, 1.0, 1.0]) == pytest.approx(0.75)
 
 
-def test_an_axis_by_its_strengths(suite):
+def test_axis_by_strength(suite):
     found = suite.run([AXES["object_size"], AXES["object_color"]], [1, 5], silent)
     plain = found["plain"]["success"]["share"]
     along = found["axes"]["object_size"]
@@ -64,7 +66,7 @@ def test_an_axis_by_its_strengths(suite):
     assert found["together"]["modes"]["constant"]["success"]["share"] <= plain
 
 
-def test_what_changes_nothing_is_noticed(suite):
+def test_unchanged_episodes_are_noticed(suite):
     level = suite.level(Condition())
     assert level["modes"]["constant"]["unchanged"]
     assert level["modes"]["constant"]["paired"] == {"lost": 0, "gained": 0, "p": 1.0}
@@ -72,12 +74,34 @@ def test_what_changes_nothing_is_noticed(suite):
     assert not tinted["modes"]["constant"]["unchanged"]
 
 
-def test_what_hides_all_is_impossible(suite):
+def test_impossible_condition(suite):
     level = suite.level(Condition(faults=(dead_rows(5),)))
     assert level["impossible"] and level["oracle"]["upper95"] < 0.9
 
 
-def test_what_the_task_cannot_be_is_refused(suite):
+def test_refused_condition(suite):
     level = suite.level(Condition(task={"cube_size": 9.0}))
     assert level["refused"].startswith("task.altitude=2.5") and level["modes"] == {}
     assert level["impossible"] is None
+
+
+def test_strip_has_every_strength():
+    evaluator = PairedEvaluator(subject(Blind(0), TaskSettings(), camera=CameraSettings()), 1)
+    for name in ("brightness", "late_frames", "object_size"):
+        pictures = make_strip(evaluator, AXES[name])
+        assert [p.shape for p in pictures] == [(25, 64, 3)] * 6
+        assert not np.array_equal(pictures[0], pictures[-1])
+    dark = make_strip(evaluator, AXES["brightness"])[-1]
+    assert dark.max() < 40
+    evaluator.close()
+
+
+def test_strip_without_refused_strengths():
+    wide = subject(Blind(0))
+    wide = type(wide)(
+        wide.network, wide.task, wide.camera.replace(horizontal_fov=165.0), wide.transforms
+    )
+    evaluator = PairedEvaluator(wide, 1)
+    shown = [picture is not None for picture in make_strip(evaluator, AXES["field_of_view"])]
+    evaluator.close()
+    assert shown == [True, True, False, True, False, True]  # 175 and 185 degrees are too wide

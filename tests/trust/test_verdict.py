@@ -7,20 +7,25 @@ import torch
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import drone_rl
 from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.policies.baselines import constant_policy, oracle_policy
+from drone_rl.policies.policy import Policy
 from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.sim.vocabulary import TaskVocabulary
-from drone_rl.trust.outcomes import OutcomeSet, Rounding
-from drone_rl.trust.rule import Kind, Rule
-from drone_rl.trust.verdict import apply_rule, judge_policy, measure, observe, widen
+from drone_rl.trust.rounding_sensitivity import Rounding
+from drone_rl.trust.rule import Rule, VerdictKind
+from drone_rl.trust.verdict import apply_rule, judge_for_selection, judge_policy, measure, observe
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds, proportion
+from drone_rl.utils.progress import silent
+from drone_rl.utils.seeding import Stream
 from tests.fake_flight import floating
 from tests.second_task import Posts
+from tests.training.test_train import TINY
 
 LEFT, AHEAD, RIGHT = Side
 SHARED = HealthCheck.function_scoped_fixture
@@ -42,13 +47,13 @@ def judged(make_episodes, make_baselines):
 @pytest.mark.parametrize(
     ("hits", "kind", "status"),
     [
-        (lambda i, side: True, Kind.GOOD, 0),
-        (lambda i, side: False, Kind.POOR, 10),
-        (lambda i, side: side != LEFT, Kind.ONE_SIDED_RIGHT, 11),
-        (lambda i, side: side != RIGHT, Kind.ONE_SIDED_LEFT, 11),
-        (lambda i, side: side != AHEAD, Kind.NONE, 12),
-        (lambda i, side: side == AHEAD, Kind.POOR, 10),  # as flying straight on
-        (lambda i, side: i % 8 < 4, Kind.NONE, 12),
+        (lambda i, side: True, VerdictKind.GOOD, 0),
+        (lambda i, side: False, VerdictKind.POOR, 10),
+        (lambda i, side: side != LEFT, VerdictKind.ONE_SIDED_RIGHT, 11),
+        (lambda i, side: side != RIGHT, VerdictKind.ONE_SIDED_LEFT, 11),
+        (lambda i, side: side != AHEAD, VerdictKind.NONE, 12),
+        (lambda i, side: side == AHEAD, VerdictKind.POOR, 10),  # as flying straight on
+        (lambda i, side: i % 8 < 4, VerdictKind.NONE, 12),
     ],
 )
 def test_kinds(judged, hits, kind, status):
@@ -60,9 +65,9 @@ def test_kinds(judged, hits, kind, status):
     json.dumps(plain, allow_nan=False)
 
 
-def test_few_episodes_prove_nothing(judged):
+def test_few_episodes_are_not_certain(judged):
     verdict = judged(lambda i, side: True, number=5)
-    assert (verdict.kind, verdict.certain, verdict.exit_code) == (Kind.GOOD, False, 13)
+    assert (verdict.kind, verdict.certain, verdict.exit_code) == (VerdictKind.GOOD, False, 13)
     assert verdict.evidence["enough"] == 100
     assert judged(lambda i, side: True, number=100).exit_code == 0
 
@@ -79,12 +84,12 @@ def test_few_episodes_prove_nothing(judged):
         (40, 14, 100 * 40),
     ],
 )
-def test_how_many_episodes_would_be_enough(judged, number, missed, enough):
+def test_number_of_episodes_that_would_be_enough(judged, number, missed, enough):
     verdict = judged(lambda i, side: missed is None or i % missed > 0, number=number)
     assert (verdict.certain, verdict.evidence["enough"]) == (False, enough)
 
 
-def test_luck_is_measured_on_the_way_to_what_the_oracle_gets(make_episodes, make_baselines):
+def test_margin_above_baselines(make_episodes, make_baselines):
     episodes = make_episodes([[LEFT, LEFT], [AHEAD, AHEAD]], [[1, 1], [1, 0]])
     baselines = make_baselines(episodes)
     baselines["oracle"] = make_episodes([[LEFT, LEFT], [AHEAD, AHEAD]], [[1, 0], [0, 0]])
@@ -94,12 +99,12 @@ def test_luck_is_measured_on_the_way_to_what_the_oracle_gets(make_episodes, make
     assert told["above forward"].tolist() == pytest.approx([1 - 1 / 6 * 0.5, 0.5 - 5 / 6])
 
 
-def test_exactly_at_the_threshold_is_not_good_and_never_certain(judged):
+def test_success_at_the_threshold_is_not_good(judged):
     verdict = judged(lambda i, side: i % 10 > 0)
     assert verdict.evidence["greedy"]["success"]["share"] == 0.9
-    assert (verdict.kind, verdict.certain) == (Kind.NONE, False)
+    assert (verdict.kind, verdict.certain) == (VerdictKind.NONE, False)
     assert verdict.evidence["enough"] is None
-    assert judged(lambda i, side: i % 10 > 0, rule=Rule(good_share=0.8)).kind is Kind.GOOD
+    assert judged(lambda i, side: i % 10 > 0, rule=Rule(good_share=0.8)).kind is VerdictKind.GOOD
 
 
 def test_quantities_by_hand(make_episodes, make_baselines):
@@ -120,29 +125,20 @@ def test_quantities_by_hand(make_episodes, make_baselines):
     assert found["above forward"].value == pytest.approx(0.5 - 5 / 6 * 0.5 / 3 - 1 / 6)
 
 
-def test_more_of_the_same_is_known_better(make_episodes, make_baselines):
-    episodes = make_episodes([[LEFT, RIGHT], [RIGHT, AHEAD]], [[1, 1], [1, 0]])
-    baselines, rule = make_baselines(episodes), Rule()
-    once, often = (measure(episodes, baselines, rule, times) for times in (1, 50))
-    for few, many in zip(once, often, strict=True):
-        assert few.value == pytest.approx(many.value)
-        assert many.upper - many.lower < few.upper - few.lower
-
-
-def test_what_was_not_offered_is_no_failure(make_episodes, make_baselines):
+def test_sides_without_goals_do_not_count(make_episodes, make_baselines):
     episodes = make_episodes([[AHEAD, AHEAD]] * 400, [[1, 1]] * 400)
     verdict = apply_rule(episodes, make_baselines(episodes))
-    assert (verdict.kind, verdict.certain) == (Kind.TRIVIAL, True)
+    assert (verdict.kind, verdict.certain) == (VerdictKind.TRIVIAL, True)
     assert verdict.evidence["greedy"]["shares"]["left"]["mean"] is None
     assert "0%" not in verdict.sentence.replace("100%", "")
 
 
 @pytest.mark.parametrize(
     ("solved", "kind", "certain", "status"),
-    [(400, Kind.TRIVIAL, True, 18), (360, Kind.TRIVIAL, False, 13), (352, Kind.GOOD, False, 13),
-     (200, Kind.GOOD, True, 0)],
+    [(400, VerdictKind.TRIVIAL, True, 18), (360, VerdictKind.TRIVIAL, False, 13),
+     (352, VerdictKind.GOOD, False, 13), (200, VerdictKind.GOOD, True, 0)],
 )  # fmt: skip
-def test_a_task_that_a_baseline_solves_is_trivial(
+def test_task_that_a_baseline_solves_is_trivial(
     make_episodes, make_baselines, solved, kind, certain, status
 ):
     """Of 400 episodes the policy succeeds in all; flying straight needs 360 to be good, too."""
@@ -154,7 +150,7 @@ def test_a_task_that_a_baseline_solves_is_trivial(
     assert verdict.sentence.startswith(trivial) == (solved == 400)
 
 
-def test_baselines_fly_with_the_dynamics_of_the_environment(monkeypatch):
+def test_baselines_have_the_dynamics_of_the_environment(monkeypatch):
     """The baselines of a verdict meet the same wind as the policy."""
     floating(monkeypatch)
     task = TaskSettings(num_cubes=1)
@@ -167,7 +163,7 @@ def test_baselines_fly_with_the_dynamics_of_the_environment(monkeypatch):
     assert still.evidence["greedy"]["mean_length"] < policy["mean_length"]
 
 
-def test_other_worlds_are_no_baseline(make_episodes, make_baselines):
+def test_other_initial_states_are_refused(make_episodes, make_baselines):
     ours = make_episodes([[LEFT, LEFT]] * 2, [[1, 1]] * 2)
     theirs = make_episodes([[RIGHT, LEFT]] * 2, [[1, 1]] * 2)
     with pytest.raises(ValueError, match="different initial states"):
@@ -176,23 +172,16 @@ def test_other_worlds_are_no_baseline(make_episodes, make_baselines):
         apply_rule(ours, make_baselines(ours), sampled=ours[:1])
 
 
-def test_one_other_world_is_enough_to_be_no_baseline(make_episodes, make_baselines):
-    ours = make_episodes([[LEFT, LEFT]] * 3, [[1, 1]] * 3)
-    theirs = make_episodes([[LEFT, LEFT]] * 2 + [[RIGHT, LEFT]], [[1, 1]] * 3)
-    with pytest.raises(ValueError, match="different initial states"):
-        apply_rule(ours, make_baselines(theirs))
-
-
-def test_sampled_flights_are_compared_pair_by_pair(judged, make_episodes):
+def test_sampled_episodes_are_compared_pairwise(judged, make_episodes):
     sides = [LAYOUTS[i % 4] for i in range(400)]
     drawn = make_episodes(sides, [[i % 2 == 0] * 2 for i in range(400)])
     verdict = judged(lambda i, side: True, sampled=drawn)
     assert verdict.evidence["drawing"]["mean"] == -0.5
     assert verdict.evidence["sampled"]["success"]["share"] == 0.5
-    assert verdict.kind is Kind.GOOD
+    assert verdict.kind is VerdictKind.GOOD
 
 
-def test_a_policy_is_flown_beside_its_baselines_and_repeats():
+def test_verdict_repeats():
     task = TaskSettings(num_cubes=1)
     dicts = []
     for _ in range(2):
@@ -222,7 +211,7 @@ def mirrored(episodes):
 @settings(
     max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
-def test_a_mirrored_flight_gets_the_mirrored_kind(make_episodes, make_baselines, drawn):
+def test_mirrored_episodes_get_the_mirrored_kind(make_episodes, make_baselines, drawn):
     sides, hits = [row[0] for row in drawn] * 30, [row[1:] for row in drawn] * 30
     ours = make_episodes(sides, hits)
     baselines = make_baselines(ours)
@@ -233,10 +222,10 @@ def test_a_mirrored_flight_gets_the_mirrored_kind(make_episodes, make_baselines,
     assert reflected.certain == verdict.certain
 
 
-def test_another_task_is_judged_by_its_own_strata_and_luck():
+def test_verdict_on_another_task():
     env = DroneEnv(20, Posts(), pixels=False)
     straight = judge_policy(env, constant_policy(Move.FORWARD), 200, sampled=False)
-    assert (straight.kind, straight.certain) == (Kind.TRIVIAL, True)
+    assert (straight.kind, straight.certain) == (VerdictKind.TRIVIAL, True)
     evidence = straight.evidence
     assert list(evidence["quantities"]) == [
         "success", "offered left", "offered right", "collected left", "collected right",
@@ -244,11 +233,11 @@ def test_another_task_is_judged_by_its_own_strata_and_luck():
     ]  # fmt: skip
     assert list(evidence["baselines"]) == ["random", "forward", "oracle"]
     leaving = judge_policy(env, constant_policy(Move.LEFT), 200, sampled=False)
-    assert (leaving.kind, leaving.certain) == (Kind.POOR, True)
+    assert (leaving.kind, leaving.certain) == (VerdictKind.POOR, True)
     assert leaving.evidence["failures"]["largest"]["value"] in ("left", "right")
 
 
-def test_a_policy_is_flown_greedily_and_with_drawn_actions_in_the_same_worlds(monkeypatch):
+def test_greedy_and_sampled_episodes_share_initial_states(monkeypatch):
     flown = []
 
     def run(env, actor, episodes, **how):
@@ -266,7 +255,7 @@ def test_a_policy_is_flown_greedily_and_with_drawn_actions_in_the_same_worlds(mo
     assert [greedy for greedy, *_ in flown] == [True]
 
 
-def test_a_task_without_an_oracle_is_refused_before_any_episode(monkeypatch):
+def test_task_without_an_oracle_is_refused(monkeypatch):
     class Blind(Posts):
         name, oracle = "fog", None
 
@@ -280,89 +269,42 @@ def test_a_task_without_an_oracle_is_refused_before_any_episode(monkeypatch):
         judge_policy(env, constant_policy(Move.LEFT), 2)
 
 
-@pytest.fixture
-def rounded(make_episodes, make_baselines):
-    """The verdict on a perfect policy of whose 400 episodes some may end otherwise."""
-
-    def rounded(number, *, is_open=False, excessive=False):
-        sides = [LAYOUTS[i % 4] for i in range(400)]
-        flown = make_episodes(sides, [[True, True]] * 400)
-        lost = make_episodes(sides[:number], [[False, False]] * number) if not is_open else None
-        opened = torch.arange(400) < (number if is_open else 0)
-        owner = torch.arange(0 if is_open else number)
-        rounding = Rounding(
-            arithmetic="float32 on cpu, PyTorch",
-            is_bound=True,
-            frames=16_000,
-            fragile=16_000 if excessive else number,
-            is_fragile=torch.arange(400) < number,
-            outcomes=OutcomeSet(lost, owner, opened),
-            compared="fused kernel",
-            compared_episodes=50,
-            differing=0,
-            unexplained=0,
-        )
-        return apply_rule(flown, make_baselines(flown), rounding=rounding)
-
-    return rounded
+def rounding(fragile, number=400, unexplained=0):
+    """A check of 40 frames for each of so many episodes, with fragile frames in all of them."""
+    return Rounding(
+        arithmetic="float32 on cpu, PyTorch",
+        is_bound=True,
+        frames=40 * number,
+        fragile=fragile,
+        episodes=number,
+        fragile_episodes=min(fragile, number),
+        compared="fused kernel",
+        compared_episodes=50,
+        differing=unexplained,
+        unexplained=unexplained,
+    )
 
 
-@pytest.mark.parametrize("is_open", [False, True])
-def test_few_episodes_that_rounding_decides_leave_a_verdict_certain(rounded, is_open):
-    verdict = rounded(4, is_open=is_open)
-    assert (verdict.kind, verdict.exit_code) == (Kind.GOOD, 0)
+def test_few_fragile_frames_leave_a_verdict_certain(judged):
+    verdict = judged(lambda i, side: True, rounding=rounding(100))
+    assert (verdict.kind, verdict.exit_code) == (VerdictKind.GOOD, 0)
     assert verdict.sentence.endswith("The verdict holds for float32 on cpu, PyTorch.")
 
 
-@pytest.mark.parametrize("is_open", [False, True])
-def test_a_tenth_of_the_episodes_makes_it_uncertain(rounded, is_open):
-    verdict = rounded(40, is_open=is_open)
-    assert (verdict.kind, verdict.certain, verdict.exit_code) == (Kind.GOOD, False, 13)
-    assert "Not certain: decisions depend on rounding. In 40 of 16,000 frames" in verdict.sentence
-    assert "too few" not in verdict.sentence
+@pytest.mark.parametrize("found", [rounding(321), rounding(101), rounding(0, unexplained=1)])
+def test_many_fragile_frames_or_episodes_or_other_actions_make_it_uncertain(judged, found):
+    verdict = judged(lambda i, side: True, rounding=found)
+    assert (verdict.kind, verdict.certain, verdict.exit_code) == (VerdictKind.GOOD, False, 13)
+    assert "Not certain: decisions depend on rounding." in verdict.sentence
     assert verdict.evidence["rounding"]["decides"]
 
 
-def test_no_certainty_where_all_frames_are_fragile(rounded):
-    assert rounded(1, excessive=True).exit_code == 13
+def test_more_episodes_do_not_help_where_rounding_decides(judged):
+    verdict = judged(lambda i, side: True, number=8, rounding=rounding(320, number=8))
+    assert not verdict.certain and verdict.evidence["enough"] is None
 
 
-def test_an_episode_that_may_offer_nothing_on_a_side_may_have_any_share_there(
-    make_episodes, make_baselines
-):
-    flown = make_episodes([[Side.LEFT, Side.LEFT]] * 400, [[True, True]] * 400)
-    ends = make_episodes([[Side.RIGHT, Side.RIGHT]] * 40, [[True, True]] * 40)
-    outcomes = OutcomeSet(ends, torch.arange(40), torch.zeros(400, dtype=torch.bool))
-    baselines, rule = make_baselines(flown), Rule()
-    found = measure(flown, baselines, rule)
-    wider = widen(found, flown, baselines, rule, outcomes)
-    left = rule.quantities.index("collected left")
-    assert found[left].lower > 0.95
-    assert wider[left].lower < 0.9 < wider[left].upper  # 40 of the 400 may have collected none
-
-
-def test_more_episodes_do_not_help_where_rounding_decides(make_episodes, make_baselines):
-    flown = make_episodes([LAYOUTS[i % 4] for i in range(8)], [[True, True]] * 8)
-    is_open = torch.arange(8) < 2
-    rounding = Rounding(
-        arithmetic="float32 on cpu, PyTorch",
-        is_bound=True,
-        frames=320,
-        fragile=2,
-        is_fragile=is_open,
-        outcomes=OutcomeSet(None, torch.arange(0), is_open),
-        compared="fused kernel",
-        compared_episodes=8,
-        differing=0,
-        unexplained=0,
-    )
-    for one in (rounding, dataclasses.replace(rounding, fragile=320)):
-        verdict = apply_rule(flown, make_baselines(flown), rounding=one)
-        assert not verdict.certain and verdict.evidence["enough"] is None
-        assert "would do" not in verdict.sentence
-
-
-def test_phrases_that_no_file_may_hold_are_refused_before_any_episode(monkeypatch):
+def test_unusable_vocabulary_is_refused(monkeypatch):
     class Wordy(Posts):
         name, vocabulary = "wordy", TaskVocabulary(tested="two posts\nin a row")
 
@@ -374,3 +316,27 @@ def test_phrases_that_no_file_may_hold_are_refused_before_any_episode(monkeypatc
     env = DroneEnv(2, Wordy(), pixels=False)
     with pytest.raises(InputError, match=r"terms\.tested="):
         judge_policy(env, constant_policy(Move.LEFT), 2)
+
+
+@pytest.fixture
+def trained(tmp_path):
+    """The folder of a training that was not judged."""
+    return drone_rl.train(TINY, folder=tmp_path / "run", progress=silent).folder
+
+
+def test_selection_has_its_own_environments(trained, monkeypatch):
+    asked = {}
+
+    def note(self, num_envs, **kwargs):
+        asked.update(kwargs, num_envs=num_envs)
+        raise InputError("enough")
+
+    monkeypatch.setattr(Policy, "make_env", note)
+    with pytest.raises(InputError, match="enough"):
+        judge_for_selection(trained / "checkpoints" / "last.pt", 5, "cpu", "mujoco_warp")
+    where = {"device": "cpu", "renderer": "mujoco_warp"}
+    seed = asked.pop("seed")
+    assert asked == {"stream": Stream.CHOICE, "num_envs": 5, **where}
+    with pytest.raises(InputError, match="enough"):
+        judge_for_selection(trained / "checkpoints" / "last.pt", 5, "cpu")
+    assert asked["seed"] != seed, "both are fresh"

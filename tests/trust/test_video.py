@@ -1,9 +1,12 @@
+import math
+
 import numpy as np
 import pytest
 import torch
 from tensordict import TensorDict
 from torchrl.envs.utils import exploration_type
 
+import drone_rl
 from drone_rl.config import (
     ActionSettings,
     AppearanceSettings,
@@ -12,15 +15,18 @@ from drone_rl.config import (
     TaskSettings,
 )
 from drone_rl.sim.actions import MOVES
-from drone_rl.sim.continuous_actions import ContinuousActions
+from drone_rl.sim.entities import CHASE
+from drone_rl.sim.rendering.appearance import product, rotate, turned
 from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.worlds import Worlds
 from drone_rl.trust.video import (
-    StepImages,
-    _caption,
-    _compose,
     _draw_bars,
+    film,
     film_episode,
+    level,
+    render_chase,
     render_step,
+    view,
     write_video,
 )
 from drone_rl.utils.errors import InputError
@@ -42,7 +48,7 @@ class Canvas:
         self.bars.append((box[0], box[2] - box[0], color))
 
 
-def test_film_and_files(make_pipeline, tmp_path):
+def test_film_is_written_as_mp4_and_gif(make_pipeline, tmp_path):
     settings = TaskSettings(num_cubes=1, first_distance=4.0, step_limit=4)
     env, actor = make_pipeline(1, task=settings)
     frames = list(film_episode(env, actor))
@@ -54,13 +60,13 @@ def test_film_and_files(make_pipeline, tmp_path):
     assert all(f.stat().st_size > 1000 for f in files)
 
 
-def test_a_suspended_film_leaves_the_exploration_type_as_it_was(make_pipeline):
+def test_a_suspended_film_keeps_the_exploration_type(make_pipeline):
     film = film_episode(*make_pipeline(1, task=TaskSettings(num_cubes=1)))
     next(film)
     assert exploration_type() is None
 
 
-def test_a_film_shows_the_world_as_it_was_drawn(make_pipeline):
+def test_a_film_shows_the_appearance_of_the_environment(make_pipeline):
     look = AppearanceSettings(ground_color=((0.9, 0.0, 0.0), (1.0, 0.1, 0.1)))
     env, _ = make_pipeline(1, appearance=look)
     env.reset()
@@ -79,13 +85,13 @@ def test_video_that_cannot_be_written(tmp_path):
         write_video([np.zeros((16, 16, 3), np.uint8)], tmp_path / "file" / "episode")
 
 
-def test_another_task_is_filmed_too(make_pipeline):
+def test_film_of_another_task(make_pipeline):
     frames = list(film_episode(*make_pipeline(1, task=Posts())))
     assert 2 <= len(frames) <= 13 and frames[0].shape == (720, 1280, 3)
 
 
 @pytest.mark.parametrize("actions", [MOVES, FIVE])
-def test_there_is_a_bar_for_each_action_from_left_to_right_as_long_as_it_is_probable(actions):
+def test_bars_of_action_probabilities(actions):
     canvas, count = Canvas(), len(actions)
     logits = torch.zeros(1, count)
     logits[0, actions.left] = 50.0
@@ -102,15 +108,7 @@ def test_there_is_a_bar_for_each_action_from_left_to_right_as_long_as_it_is_prob
     )
 
 
-def test_of_speeds_there_is_a_bar_for_each_part():
-    canvas, actions = Canvas(), ContinuousActions.of(SETTINGS)
-    acted = {"action": torch.tensor([[0.0, 0.9, 0.0]]), "logits": torch.zeros(1, 6)}
-    _draw_bars(canvas, None, TensorDict(acted, [1]), actions)
-    assert len({color for *_, color in canvas.bars[:1] + canvas.bars[2:]}) == 1
-    assert canvas.texts[1][1].startswith("left 0.") and canvas.bars[1][2] != canvas.bars[0][2]
-
-
-def test_who_has_no_logits_is_sure():
+def test_bars_without_logits():
     canvas = Canvas()
     _draw_bars(canvas, None, TensorDict({"action": torch.tensor([2])}, [1]), MOVES)
     assert [text for _, text in canvas.texts] == ["left 0.00", "forward 0.00", "right 1.00"]
@@ -120,7 +118,7 @@ def test_who_has_no_logits_is_sure():
     "task", [TaskSettings(num_cubes=1, first_distance=4.0), PillarsSettings(num_rows=1)]
 )
 @pytest.mark.parametrize("actions", [ActionSettings(), SETTINGS])
-def test_in_flight_there_are_instruments(make_pipeline, task, actions):
+def test_instruments_are_shown_in_flight(make_pipeline, task, actions):
     flying = DynamicsSettings(mode="simple_flight")
     pipeline = make_pipeline(1, task=task, dynamics=flying, actions=actions)
     films = film_episode(*pipeline), film_episode(*make_pipeline(1, task=task))
@@ -128,51 +126,80 @@ def test_in_flight_there_are_instruments(make_pipeline, task, actions):
     assert tuple(shown[0, 0]) == (24, 26, 31) != tuple(other[0, 0])
 
 
-def test_pictures_of_one_moment_by_the_pixel():
-    red, green, blue = (
-        torch.tensor(c, dtype=torch.uint8) for c in ((200, 0, 0), (0, 200, 0), (0, 0, 200))
-    )
-    seen = StepImages(
-        camera=blue.expand(10, 20, 3),
-        chase=red.expand(532, 1280, 3),
-        strip=green.expand(5, 144, 252, 3),
-    )
-    shown = _compose(seen, "")
-    of = {name: (shown == color.numpy()).all(-1) for name, color in
-          (("red", red), ("green", green), ("blue", blue))}  # fmt: skip
-    assert shown.shape == (720, 1280, 3)
-    rows, columns = of["blue"].nonzero()  # 320 pixels across and half as high
-    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (39, 198, 15, 334)
-    assert of["red"][0].all() and of["red"][531].all() and not of["red"][532:].any()
-    around = ~of["red"][:532]
-    assert around[12:202, 12:338].all() and around.sum() == 190 * 326
-    below = of["green"]
-    assert not below[:537].any() and not below[681:].any()
-    assert below[680].tolist() == [x % 257 < 252 for x in range(1280)]
-    label = ~below[537]  # from a camera's left edge on, behind its name
-    assert label[0] and label[257] and below[537, 251] and below[560 + 1, 0] and not below[560, 0]
+SIZE = {"height": 60, "width": 90}
 
 
-def test_a_tall_picture_of_the_policys_is_cut_to_half_the_height():
-    red, blue = (torch.tensor(c, dtype=torch.uint8) for c in ((200, 0, 0), (0, 0, 200)))
-    five = torch.zeros(5, 144, 252, 3, dtype=torch.uint8)
-    shown = _compose(StepImages(blue.expand(40, 20, 3), red.expand(532, 1280, 3), five), "")
-    rows, _ = (shown == blue.numpy()).all(-1).nonzero()
-    assert (rows.min(), rows.max()) == (39, 39 + 266 - 1)
+def worlds(mode="simple_flight", mount="gimbal"):
+    return Worlds(1, dynamics=DynamicsSettings(mode=mode, camera_mount=mount))
 
 
-def test_bars_by_the_pixel():
-    canvas, acted = Canvas(), {"action": torch.tensor([0]), "logits": torch.zeros(1, 3)}
-    acted["logits"][0] = torch.tensor([0.5, 0.25, 0.25]).log()
-    _draw_bars(canvas, None, TensorDict(acted, [1]), MOVES)
-    assert [(x, width) for x, width, _ in canvas.bars] == [(420, 45), (740, 90), (1060, 45)]
-    assert [x for x, _ in canvas.texts] == [300, 620, 940]
-    assert [text for _, text in canvas.texts] == ["left 0.25", "forward 0.50", "right 0.25"]
+def roll(drones, degrees):
+    drones.state.body.attitude[:] = turned("roll", degrees)
 
 
-def test_a_caption_names_the_end_once_there_is_one(make_pipeline):
-    env, _ = make_pipeline(1, task=TaskSettings(num_cubes=1, first_distance=4.0))
-    state, task = env.reset(), env.base_env.worlds.task
-    assert _caption(task, state, 0.0).endswith(" 0")
-    state["info", "end_reason"][0] = 1
-    assert _caption(task, state, 1.0).endswith(" 1   ended: all cubes")
+def test_chase_view_in_computer_vision_mode():
+    still = worlds("computer_vision")
+    view = still.view(CHASE.name, **SIZE, show_drone=True)
+    assert torch.equal(render_chase(still, None, **SIZE), still.render(still.state, view))
+
+
+@pytest.mark.parametrize("mount", ["gimbal", "body"])
+def test_chase_view_stays_level_while_the_drone_rolls(mount):
+    flying = worlds(mount=mount)
+    view = flying.view(CHASE.name, "segmentation", **SIZE, show_drone=True)
+    drone = flying.scene.geoms(SemanticClass.DRONE)
+    is_drone = torch.isin(flying.render(flying.state, view)[0], torch.tensor(drone))
+    level_picture = render_chase(flying, None, **SIZE)[0]
+    roll(flying, 30.0)
+    tilted = render_chase(flying, None, **SIZE)[0]
+    differs = (tilted != level_picture).any(-1)
+    assert differs.any()
+    rows, columns = torch.nonzero(is_drone, as_tuple=True)
+    near = torch.zeros_like(is_drone)
+    near[rows.min() - 6 : rows.max() + 7, columns.min() - 6 : columns.max() + 7] = True
+    assert not (differs & ~near).any()
+
+
+def test_mounting_of_a_level_chase_camera():
+    tilt, heading = turned("pitch", 20.0), turned("yaw", 40.0)
+    body = product(heading, tilt)
+    mounted = level(body[None], "drone/chase")
+    place = torch.tensor(CHASE.pos, dtype=torch.float64)
+    found = rotate(body, place + mounted.offset[0])
+    assert found.tolist() == pytest.approx(rotate(heading, place).tolist())
+    assert product(body, mounted.turn[0]).tolist() == pytest.approx(heading.tolist())
+    assert math.isclose(float(mounted.turn.norm()), 1.0)
+
+
+def test_film_writes_one_mp4_and_one_gif_per_episode(tmp_path):
+    policy = drone_rl.load_policy("good").in_task(num_cubes=1, first_distance=4.0)
+    flying = policy.in_dynamics(mode="simple_flight")  # its video has instruments, too
+    files = film(flying, tmp_path, 1)
+    assert [file.name for file in files] == ["episode_0.mp4", "episode_0.gif"]
+    assert all(file.stat().st_size > 0 for file in files)
+
+
+def test_viewer_needs_a_display(monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(InputError, match="needs a display"):
+        view(drone_rl.load_policy("good"))
+
+
+@pytest.mark.parametrize("name", ["good", "flight_velocity", "pillars_good"])
+def test_viewer_runs_a_policy_in_dm_control(name, monkeypatch):
+    """A viewer calls the policy with each time step of some episodes; the last stacks frames."""
+    policy, actions = drone_rl.load_policy(name), []
+
+    def launch(env, act, title):
+        for _ in range(2):
+            timestep = env.reset()
+            for _ in range(5):
+                actions.append(act(timestep))
+                timestep = env.step(actions[-1])
+
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr("dm_control.viewer.launch", launch)
+    view(policy)
+    assert len(actions) == 10
+    assert actions[0].shape == ((3,) if name == "flight_velocity" else ())

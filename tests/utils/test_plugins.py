@@ -12,7 +12,6 @@ from drone_rl.utils.plugins import (
     errors_of,
     failure,
     line_of,
-    place_of,
     with_methods_of,
 )
 
@@ -27,11 +26,6 @@ def caught(error):
     return info.value
 
 
-def test_place_has_name_and_file():
-    assert place_of(raise_it) == f"raise_it of {__file__}"
-    assert place_of(type("Typed", (), {"__module__": "gone"})) == "Typed of gone"
-
-
 def test_failure_names_the_last_line_of_the_users_files():
     line = raise_it.__code__.co_firstlineno + 1
     error = caught(ValueError("two\n words"))
@@ -44,13 +38,6 @@ def test_a_file_whose_name_begins_like_the_package_is_the_users(tmp_path):
     with pytest.raises(ValueError) as info:
         exec(compile("raise ValueError('here')", file, "exec"))
     assert line_of(info.value) == f"line 1 of {file}"
-
-
-def test_failure_elsewhere_names_the_place():
-    error = KeyError("x")
-    assert (
-        failure("x=1", error, "A of b.py") == "x=1 failed in A of b.py (KeyError: 'x'); correct it"
-    )
 
 
 def test_failure_of_syntax_names_the_line_of_the_file():

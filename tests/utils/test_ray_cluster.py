@@ -25,10 +25,6 @@ def test_it_does_not_take_over_sigterm(monkeypatch):
         signal.signal(signal.SIGTERM, before)
 
 
-def test_a_connected_process_stays_connected(monkeypatch):
-    assert not join(monkeypatch, lambda **_: pytest.fail("connected again"), before=True)
-
-
 def test_a_cluster_out_of_reach_is_told_in_one_line(monkeypatch):
     def fail(**options):
         raise ConnectionError(options["address"])

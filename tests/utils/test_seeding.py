@@ -38,13 +38,7 @@ def test_streams_never_overlap():
     assert len(seen) == 4 * 8 * len(Stream)
 
 
-def test_world_of_next_seed_is_no_world_of_this_one():
-    this = {draws(world_random_state(0, world)) for world in range(100)}
-    following = {draws(world_random_state(1, world)) for world in range(100)}
-    assert not this & following
-
-
-def test_streams_have_the_numbers_on_which_all_figures_rest():
+def test_numbers_of_streams():
     assert {s.name: s.value for s in Stream} == {
         "WORLDS": 0,
         "POLICY_INIT": 1,
@@ -84,19 +78,7 @@ def test_any_other_key_is_another_stream(seed, world, stream):
     assert here not in others and len(others) == len(Stream) + 1
 
 
-def test_worlds_of_choice_and_report_are_none_of_training():
-    seen = [
-        {draws(world_random_state(seed, world, stream)) for seed in range(3) for world in range(60)}
-        for stream in (Stream.WORLDS, Stream.CHOICE, Stream.REPORT)
-    ]
-    assert all(len(part) == 180 for part in seen) and len(set.union(*seen)) == 540
-
-
-def test_same_key_repeats():
-    assert draws(world_random_state(3, 5)) == draws(world_random_state(3, 5))
-
-
-def test_state_round_trip_goes_on_where_it_was():
+def test_state_round_trip():
     random_state = world_random_state(0, 0)
     random_state.uniform(size=7)
     state = get_state(random_state)
@@ -107,7 +89,7 @@ def test_state_round_trip_goes_on_where_it_was():
     assert all(isinstance(v, int) for v in state.values())
 
 
-def test_state_holds_the_half_of_a_draw_that_is_kept_for_the_next_integer():
+def test_state_includes_the_kept_half_of_a_draw():
     """A 31-bit integer takes half of a 64-bit draw; the next one takes the other half."""
     random_state = world_random_state(0, 0)
     for _ in range(3):
@@ -130,11 +112,7 @@ def test_bad_seed_is_refused(seed):
         seed_sequence(seed)
 
 
-def test_numpy_integers_are_seeds():
-    assert seed_sequence(np.int64(3)).entropy == 3
-
-
-def test_a_stream_beside_a_worlds_own_leaves_it_where_it_stands():
+def test_side_streams():
     world = world_random_state(3, 1)
     before = get_state(world)
     drawn = side_stream(world, 5).random(4)
@@ -157,7 +135,7 @@ def test_fresh_seeds_differ_and_are_exact_in_json():
     assert max(found) > 2**40  # by chance less once in 2**800
 
 
-def test_a_seed_is_fixed_if_and_only_if_the_user_gave_it():
+def test_root_seed():
     assert root_seed(0) == RootSeed(0, is_fixed=True)
     assert not root_seed(None).is_fixed
     given, seed = with_seed(JudgeSettings(seed=7, episodes=3))
@@ -167,7 +145,7 @@ def test_a_seed_is_fixed_if_and_only_if_the_user_gave_it():
     assert fresh.as_dict() == {"seed": fresh.value, "seed_is_fixed": False}
 
 
-def test_a_part_of_an_analysis_has_the_seed_of_the_whole():
+def test_with_seed_of_a_whole_analysis():
     whole = RootSeed(2**47, is_fixed=False)
     part, seed = with_seed(JudgeSettings(seed=3), whole)
     assert (part.seed, seed) == (2**47, whole)
@@ -179,7 +157,7 @@ def test_seeds_of_any_length_have_a_generator():
     assert torch.equal(one, long)
 
 
-def test_a_long_seed_is_shortened_for_generators_of_32_bits():
+def test_legacy_seed():
     assert [legacy_seed(s) for s in (0, 5, 2**32 - 1)] == [0, 5, 2**32 - 1]
     long = [legacy_seed(2**32 + i) for i in range(100)]
     assert len(set(long)) == 100

@@ -4,7 +4,6 @@ import contextlib
 import dataclasses
 import functools
 import importlib.util
-import logging
 import os
 import re
 import sys
@@ -15,28 +14,17 @@ from pathlib import Path
 from typing import Any
 
 import hydra
-from hydra._internal.hydra import Hydra
-from hydra.core import utils as hydra_utils
 from hydra.core.config_store import ConfigStore
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException
-from hydra.types import RunMode
 from omegaconf import MISSING, DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
 from drone_rl.cli.hydra.help import next_steps, show_help
 from drone_rl.cli.hydra.messages import input_error, is_output_closed, one_line
-from drone_rl.cli.hydra.mistakes import (
-    check_choices,
-    check_launcher,
-    explain,
-    explain_file,
-    repeated,
-)
+from drone_rl.cli.hydra.mistakes import OPTIONS, check_words, explain
 from drone_rl.cli.hydra.resuming import spare_run
-from drone_rl.cli.hydra.values import whole_numbers
-from drone_rl.cli.hydra.words import check_words, sweep_flag_first
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.config import (
     TASKS,
@@ -85,12 +73,16 @@ PARTS: dict[str, type[Variant]] = {
     "collector": Collector,
 }
 """Groups whose files start from the schema of a variant, `base_<its name>`."""
-_EXTENSIBLE = ("task", "network", "returns", "objective", "collector")
-"""Groups for which modules of the user's register choices."""
 SEVERAL: dict[str, type[Variant]] = {"transforms": Transform, "logger": Logger}
 """Groups whose files name several variants, each by `schema@<name>: <the variant's name>`."""
 
-_log = logging.getLogger(__name__)
+_TEXTS = re.compile(
+    r"[+~]*(hydra|paths|policy|policies|resume|certificate|explanations|folder|name|shifts|require|"
+    r"demonstrations)(?=[=.@/]|$)"
+)
+"""Settings whose values are names and paths."""
+_EXPONENT = re.compile(r"(?<=[=,\[(\s])(\d+(?:\.\d+)?[eE]\+?\d+)(?=[,\])]|$)")
+_LARGEST_WHOLE = 10**15
 _PLUGINS = (("plugins", list[str], dataclasses.field(default_factory=list)),)
 """Modules that register parts; `import_plugins` imports them before Hydra composes."""
 
@@ -150,11 +142,9 @@ def import_plugins(overrides: Sequence[str]) -> None:
             importlib.import_module(name)
             IMPORTED.append(name)
         except ModuleNotFoundError as error:
-            is_own = f"{name}.".startswith(f"{error.name}.")  # or its package
+            is_plugin = f"{name}.".startswith(f"{error.name}.")  # or its package
             place = "give a module in this folder or on PYTHONPATH"
-            remedy = place if is_own else f"install {error.name}"
-            if name.endswith(".py"):
-                remedy = f"type the module's name: plugins=[{name[:-3]}]"
+            remedy = place if is_plugin else f"install {error.name}"
             raise InputError(f"plugins={name} can't be imported ({error}); {remedy}") from error
         except (Exception, SystemExit) as error:  # any that the user's module raises
             raise InputError(failure(f"plugins={name}", error, name)) from error
@@ -162,20 +152,16 @@ def import_plugins(overrides: Sequence[str]) -> None:
 
 def _check_module(name: str) -> None:
     """Raise an `InputError` for a path, and for a file that another module has precedence over."""
-    if "/" in name or name.startswith("."):
-        own = Path(name).name.removesuffix(".py")
-        raise InputError(
-            f"plugins={name} is a path; type the module's name, plugins=[{own}], in its folder "
-            "or with the folder on PYTHONPATH"
-        )
-    own, found = Path(f"{name}.py"), None
-    if own.is_file() and name not in sys.stdlib_module_names:
-        found = importlib.util.find_spec(name)
-    is_other = found is not None and Path(found.origin or "").resolve() != own.resolve()
-    if name in sys.stdlib_module_names or is_other:
+    path = Path(name)
+    if path.suffix == ".py" or not name.replace(".", "").isidentifier():
+        module = path.name.removesuffix(".py")
+        raise InputError(f"plugins={name} is a path; type the module's name, plugins=[{module}]")
+    file = Path(f"{name}.py")
+    spec = importlib.util.find_spec(name) if file.is_file() else None
+    if spec is not None and Path(spec.origin or "").resolve() != file.resolve():
         raise InputError(
             f"plugins={name} is a module of Python or of an installed package, which has "
-            f"precedence over your {own}; rename the file"
+            f"precedence over your {file}; rename the file"
         )
 
 
@@ -225,11 +211,14 @@ def _simple(hint: Any) -> Any:
     return hint if hint in (int, float, str, bool) else Any
 
 
-_MULTIRUN_WORDS = re.compile(r"^[-+~]|^hydra(?!\.run\.)|^sweep|^experiment")
-"""Words on a command line that may start many runs, or select a group that does."""
-_MULTIRUN_TEXT = re.compile(r"mode:|sweep: (?!null)")
-"""Text of a command's YAML file that may start many runs."""
-_save_config = hydra_utils._save_config
+def whole_numbers(override: str) -> str:
+    """Write whole numbers such as 1e5 without an exponent, as whole-number settings need them."""
+
+    def plain_number(number: re.Match[str]) -> str:
+        value = float(number[1])
+        return str(int(value)) if value.is_integer() and value < _LARGEST_WHOLE else number[1]
+
+    return override if _TEXTS.match(override) else _EXPONENT.sub(plain_number, override)
 
 
 def run_command(name: str, command: type[CommandSettings], overrides: Sequence[str]) -> int:
@@ -240,77 +229,37 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
     is_help = bool({"--help", "-h"} & set(overrides))
     topics = [word for word in overrides if is_help and re.fullmatch(r"[A-Za-z_][\w.]*", word)]
     words = [word for word in overrides if word not in topics]
-    overrides = sweep_flag_first(spare_run(command.prepare([*map(whole_numbers, words)])))
-    import_plugins(overrides)
+    words = spare_run(command.prepare([*map(whole_numbers, words)]))
+    words.sort(key=lambda word: word not in OPTIONS)  # Hydra needs options before settings
+    import_plugins(words)
     register_schemas(**{name: command})
-    check_choices(overrides, conf_dir(), _EXTENSIBLE)
-    check_launcher(name, overrides)
-    if "hydra.mode=RUN" not in overrides:  # else a sweep starts it
-        for override in repeated(words):
-            counts = f"{override.partition('=')[0]} is given several times; {override} counts"
-            print(f"warning: {counts}", file=sys.stderr)
-    check_words(name, conf_dir(), overrides)
+    check_words(name, conf_dir(), words)
     if is_help:
-        with _explained(name, overrides):
-            show_help(name, conf_dir(), overrides, command, topics)
+        with _explained(name, words):
+            show_help(name, conf_dir(), words, command, topics)
         return 0
     statuses: list[int] = []
-    job = _job(name, command, statuses, overrides)
+    job = _job(name, command, statuses, words)
     wrapped = hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name=name)(job)
     argv = sys.argv
-    sys.argv = [f"drone-rl {name.replace('_', '-')}", *overrides]
-    mode = Hydra.get_mode if _may_be_multirun(name, overrides) else lambda *_, **__: RunMode.RUN
+    sys.argv = [f"drone-rl {name.replace('_', '-')}", *words]
     try:
-        with (
-            _explained(name, overrides),
-            _replaced(Hydra, "get_mode", mode),
-            _replaced(hydra_utils, "_save_config", _save_named),
-        ):
+        with _explained(name, words):
             wrapped()
     finally:
         sys.argv = argv
     return max(statuses, default=0)
 
 
-def _may_be_multirun(name: str, overrides: Sequence[str]) -> bool:
-    """Return whether Hydra must determine its mode, which takes another composition of settings.
-
-    Otherwise the mode is a single run. Hydra rejects a multirun mode in a group's file.
-    """
-    text = (conf_dir() / f"{name}.yaml").read_text()
-    return any(map(_MULTIRUN_WORDS.search, overrides)) or bool(_MULTIRUN_TEXT.search(text))
-
-
 @contextlib.contextmanager
-def _explained(name: str, overrides: Sequence[str]) -> Iterator[None]:
+def _explained(name: str, words: Sequence[str]) -> Iterator[None]:
     """Raise an `InputError` for settings that Hydra, OmegaConf or PyYAML rejects."""
     try:
         yield
     except (HydraException, OmegaConfBaseException, YAMLError) as error:
         if input_error(error) is not None:
             raise
-        in_file = explain_file(error, name, conf_dir())
-        raise in_file or explain(error, name, conf_dir(), overrides) from error
-
-
-@contextlib.contextmanager
-def _replaced(owner: Any, name: str, value: Any) -> Iterator[None]:
-    """Replace an attribute temporarily."""
-    before = getattr(owner, name)
-    setattr(owner, name, value)
-    try:
-        yield
-    finally:
-        setattr(owner, name, before)
-
-
-def _save_named(cfg: DictConfig, filename: str, output_dir: Path) -> None:
-    """Save a file as Hydra does; its path is part of every error."""
-    try:
-        _save_config(cfg, filename, output_dir)
-    except OSError as error:
-        path = str(error.filename or output_dir / filename)
-        raise OSError(error.errno, error.strerror, path) from error
+        raise explain(error, name, conf_dir(), words) from error
 
 
 def read_settings(cls: type[Settings], config: DictConfig) -> Any:
@@ -320,41 +269,18 @@ def read_settings(cls: type[Settings], config: DictConfig) -> Any:
     return from_config(cls, values)
 
 
-def _mistake(error: Exception, overrides: Sequence[str]) -> str | None:
-    """Return the message about a user's mistake, also in a plugin; None for any other error."""
-    if isinstance(error, InputError | OSError):
-        return one_line(error)
-    plugins = next((o for o in overrides if o.lstrip("+").startswith("plugins=")), "")
-    return failure(plugins, error) if plugins and line_of(error) else None
-
-
-def _take(folder: Path, taken: set[Path]) -> None:
-    if folder in taken:
-        raise InputError(
-            f"an earlier run has the same folder, {folder}; add ${{hydra.job.num}} to "
-            "hydra.sweep.subdir"
-        )
-    taken.add(folder)
-
-
 def _job(
     name: str, command: type[CommandSettings], statuses: list[int], overrides: Sequence[str] = ()
 ) -> Callable[[DictConfig], object]:
     """Return the function that Hydra calls for each run."""
-    folders: set[Path] = set()
+    plugins = [o for o in overrides if o.lstrip("+").startswith("plugins=")]
 
     def job(config: DictConfig) -> object:
         try:
             with _explained(name, overrides):
                 settings = read_settings(command, config)
             folder = Path(HydraConfig.get().runtime.output_dir)
-            _take(folder, folders)
-            which = getattr(settings, "policy", None)
-            is_latest = which in ("latest", ("latest",))
-            if is_latest and (used := settings.used_policy(folder)) != "latest":
-                _log.info("policy=latest is %s", used)
-                one = used if which == "latest" else (used,)
-                settings = settings.replace(policy=one)  # another may be the newest soon
+            settings = settings.with_policy_of_now(folder)
             with Heartbeat() if settings.ends_alone() else contextlib.nullcontext():
                 status, value = settings.run(folder)
             if status < 128 and sys.stdout.isatty():  # pipes get only the results
@@ -364,10 +290,12 @@ def _job(
             status, value = USER_ERROR, None
             if isinstance(error, BrokenPipeError) and is_output_closed():
                 status = OUTPUT_CLOSED  # Hydra would print an error that is raised again
-            elif (text := _mistake(error, overrides)) is None:
-                raise
+            elif isinstance(error, InputError | OSError):
+                print(f"error: {one_line(error)}", file=sys.stderr)
+            elif plugins and line_of(error):
+                print(f"error: {failure(plugins[-1], error)}", file=sys.stderr)
             else:
-                print(f"error: {text}", file=sys.stderr)
+                raise
         statuses.append(status)
         if status > 128:  # a signal ends a whole sweep, not one run of it
             sys.exit(status)

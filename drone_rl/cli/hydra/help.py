@@ -11,7 +11,7 @@ import yaml
 from omegaconf import OmegaConf
 
 from drone_rl.cli.commands import TABLE
-from drone_rl.cli.hydra.names import closest, composed, flattened
+from drone_rl.cli.hydra.mistakes import composed, flattened, similar
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import Settings, kinds_of
 
@@ -39,76 +39,79 @@ def show_help(
     """
     typed = [o for o in overrides if "=" in o or o.startswith("~")]
     config = composed(command, conf, typed)
-    choices = config.hydra.runtime.choices
-    chosen = {k: v for k, v in choices.items() if "/" not in k and "@" not in k}
     values: Any = OmegaConf.to_container(config, resolve=False)
     del values["hydra"]
-    meanings = comments(command, conf, chosen)
-    groups = {g: sorted(p.stem for p in (conf / g).glob("*.yaml")) for g in chosen}
-    groups = {g: names for g, names in groups.items() if names and g not in _NOT_SHOWN}
+    selected = {g: c for g, c in config.hydra.runtime.choices.items() if "@" not in g}
+    files = {g: sorted(path.stem for path in (conf / g).glob("*.yaml")) for g in selected}
+    groups = {g: names for g, names in files.items() if names and g not in _NOT_SHOWN}
+    keys = [*(group for group in groups if group not in values), *flattened(values)]
+    meanings = comments(command, conf, {g: c for g, c in selected.items() if "/" not in g})
+    meanings |= {g: f"One of: {', '.join(names)}." for g, names in groups.items()}
+    meanings["hydra.run.dir"] = _RUN_FOLDER
     name = command.replace("_", "-")
     print(f"drone-rl {name} [setting=value ...]\n")
     print((conf / f"{command}.yaml").read_text().split("\ndefaults:")[0], end="\n\n")
-    if topics:
-        if "all" not in topics:
-            values = _chosen({g: chosen[g] for g in groups} | values, topics, f"drone-rl {name}")
-            groups = {g: names for g, names in groups.items() if g in values}
-        if groups:
-            lines = [f"  {g}: {', '.join(names)}" for g, names in groups.items()]
-            print("Groups, each chosen by the name of a file:", *lines, "", sep="\n")
-        print("Settings, as they would be used now:")
-        for line in explained(values, meanings):
-            print(f"  {line}")
-    else:
+    if not topics:
         print(f"Most used settings, with their values (drone-rl {name} --help all lists all):")
-        meanings |= {g: f"One of: {', '.join(names)}." for g, names in groups.items()}
-        meanings["hydra.run.dir"] = _RUN_FOLDER
-        for key in TABLE[name]["settings"]:
-            value = chosen[key] if key in chosen else OmegaConf.select(config, key)
-            shown = "FOLDER" if key == "hydra.run.dir" else _value(value)
+        keys = TABLE[name]["settings"]
+    else:
+        print("Settings, as they would be used now:")
+        if "all" not in topics:
+            keys = [key for topic in topics for key in _about(topic, keys, f"drone-rl {name}")]
+    for key in keys:
+        value = selected[key] if key in groups else _inside(values, key)
+        meaning = " ".join(meanings.get(key, "").split())
+        if not isinstance(value, dict) or not value:
+            text = "FOLDER" if key == "hydra.run.dir" else _value(value)
+            text = text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}..."
             unit = _unit(settings, key.split("."))
-            shown = shown if len(shown) <= _LONGEST_VALUE else f"{shown[:_LONGEST_VALUE]}..."
-            print(f"  {key}={shown}" + (f"  ({unit})" if unit else ""))
-            text = " ".join(meanings.get(key, "").split())
-            print(textwrap.indent(textwrap.fill(text, _WIDTH - 6), " " * 6))
+            print(f"  {key}={text}" + (f"  ({unit})" if unit else ""))
+        elif meaning:
+            print(f"  {key}")
+        print(
+            textwrap.indent(textwrap.fill(meaning, _WIDTH - 6), " " * 6), end="\n" * bool(meaning)
+        )
     print("\nexamples")
     for line, purpose in TABLE[name]["examples"]:
         print(f"  {line:<55}  {purpose}")
 
 
-def _chosen(values: Any, topics: Sequence[str], command: str) -> dict[str, Any]:
-    """Return the settings, and groups of them, whose names are most like those of topics."""
-    found: dict[str, Any] = {}
-    for topic in topics:
-        key = closest(topic, [*flattened(values)])
-        if key is None or "=" in key:
-            raise InputError(f"{command} has no setting {topic}; {command} --help all lists all")
-        *groups, last = key.split(".")
-        source, target = values, found
-        for group in groups:
-            source, target = source[group], target.setdefault(group, {})
-        target[last] = source[last]
-    return found
+def _about(topic: str, keys: Sequence[str], command: str) -> list[str]:
+    """Return the setting that is most like a topic, and the settings inside it."""
+    setting = next((name for name in similar(topic, keys) if name in keys), None)
+    if setting is None:
+        raise InputError(f"{command} has no setting {topic}; {command} --help all lists all")
+    return [key for key in keys if f"{key}.".startswith(f"{setting}.")]
 
 
 def next_steps(name: str, policy: str, folder: Path, plugins: Sequence[str] = ()) -> str:
     """Return the lines about the policy that a command used, and what a user may do next."""
     quoted = {"policy": shlex.quote(policy), "folder": shlex.quote(str(folder))}
     files = re.compile(r"\{folder\}/([\w.]+)")
-    every = TABLE[name]["next"]
-    known = [line for line in every if all((folder / f).exists() for f in files.findall(line))]
-    named = shlex.quote(f"plugins=[{','.join(dict.fromkeys(plugins))}]") if plugins else ""
-    more = [f" {named}" if named and "{policy}" in line else "" for line in known]
-    steps = [f"  {line.format(**quoted)}{end}" for line, end in zip(known, more, strict=True)]
-    is_used = any("{policy}" in line for line in known)
-    lines = [f"policy: {policy}"] if is_used else []
-    return "\n".join([*lines, *(["next:", *steps] if steps else [])])
+    if plugins:
+        override = f"plugins=[{','.join(dict.fromkeys(plugins))}]"
+        quoted["policy"] += f" {shlex.quote(override)}"
+    possible = [
+        line
+        for line in TABLE[name]["next"]
+        if all((folder / f).exists() for f in files.findall(line))
+    ]
+    lines = ["next:", *(f"  {line.format(**quoted)}" for line in possible)] if possible else []
+    if any("{policy}" in line for line in possible):
+        lines.insert(0, f"policy: {policy}")
+    return "\n".join(lines)
+
+
+def _inside(values: Any, key: str) -> Any:
+    """Return the value of a dotted name; None if there is none."""
+    for name in key.split("."):
+        values = (values or {}).get(name)
+    return values
 
 
 def _value(value: Any) -> str:
     """Return a value as YAML on one line."""
-    plain = OmegaConf.to_container(value) if OmegaConf.is_config(value) else value
-    return yaml.safe_dump(plain, default_flow_style=True, width=1000).splitlines()[0]
+    return yaml.safe_dump(value, default_flow_style=True, width=1000).splitlines()[0]
 
 
 def _unit(settings: Any, path: Sequence[str]) -> str:
@@ -121,42 +124,26 @@ def _unit(settings: Any, path: Sequence[str]) -> str:
     return getattr(getattr(kind, "kind", kind), "unit", "")
 
 
-def explained(values: Any, meanings: dict[str, str], prefix: str = "") -> Iterator[str]:
-    """Yield settings as lines of YAML, each below its comment."""
-    indent = "  " * prefix.count(".")
-    for name, value in values.items():
-        if name == "_target_":
-            continue
-        meaning = meanings.get(prefix + name)
-        if meaning:
-            yield from (f"{indent}# {line}" for line in meaning.splitlines())
-        if isinstance(value, dict) and value:
-            yield f"{indent}{name}:"
-            yield from explained(value, meanings, f"{prefix}{name}.")
-        else:
-            yield f"{indent}{name}: {_value(value)}"
-
-
-def comments(command: str, conf: Path, chosen: dict[str, str | None]) -> dict[str, str]:
+def comments(command: str, conf: Path, selected: dict[str, str | None]) -> dict[str, str]:
     """Return the comment of each setting of a command by its dotted name.
 
-    `command` is the name of its file in `conf`, `chosen` the file of each group.
+    `command` is the name of its file in `conf`, `selected` the file of each group.
     """
-    found = {"plugins": "Modules that register parts of your own: networks, transforms and so on."}
+    texts = {"plugins": "Modules that register parts of your own: networks, transforms and so on."}
     dynamics = read_comments(conf / "dynamics" / "computer_vision.yaml")
-    found |= {f"dynamics.{key}": text for key, text in dynamics.items()}
+    texts |= {f"dynamics.{key}": text for key, text in dynamics.items()}
     tasks = conf / "task"
     for path in [*sorted(tasks.glob("*.yaml")), tasks / "collect_cubes.yaml"]:  # the last one wins
-        found |= {f"task.{key}": text for key, text in read_comments(path).items()}
-    for group, name in chosen.items():
+        texts |= {f"task.{key}": text for key, text in read_comments(path).items()}
+    for group, name in selected.items():
         for path in _with_parents(conf / group / f"{name}.yaml"):
-            found |= {f"{group}.{key}": text for key, text in read_comments(path).items()}
-    return found | read_comments(conf / f"{command}.yaml")
+            texts |= {f"{group}.{key}": text for key, text in read_comments(path).items()}
+    return texts | read_comments(conf / f"{command}.yaml")
 
 
 def read_comments(path: Path) -> dict[str, str]:
     """Return the comment above each setting of one file by its dotted name."""
-    found, above, where = {}, [], []
+    texts, above, where = {}, [], []
     for line in path.read_text().splitlines():
         setting = _SETTING.match(line)
         if line.lstrip().startswith("#"):
@@ -164,11 +151,11 @@ def read_comments(path: Path) -> dict[str, str]:
         elif setting and setting["name"] != "defaults":
             where = [*where[: len(setting["indent"]) // 2], setting["name"]]
             if above:
-                found[".".join(where)] = "\n".join(above)
+                texts[".".join(where)] = "\n".join(above)
             above = []
         else:
             above = []
-    return found
+    return texts
 
 
 def _with_parents(path: Path) -> Iterator[Path]:

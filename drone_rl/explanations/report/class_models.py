@@ -14,18 +14,18 @@ _OBJECTIVES = ("probability", "logit")
 
 def say_class_models(evidence: Evidence) -> Claims:
     """Say which actions the optimized observations make probable, and which none does."""
-    found, names = evidence["class_model"], shown_actions(evidence).names
-    pairs = zip(names, found["logit"]["probabilities"], strict=True)
+    models, names = evidence["class_model"], shown_actions(evidence).names
+    pairs = zip(names, models["logit"]["probabilities"], strict=True)
     claims = {
         "class_model.reached": (
             "Probabilities of the actions on the observations optimized by logit: "
             f"{listed([f'{action} {p:.3f}' for action, p in pairs])}."
         )
     }
-    highest = [max(p) for p in zip(*(found[o]["highest"] for o in _OBJECTIVES), strict=True)]
+    highest = [max(p) for p in zip(*(models[o]["highest"] for o in _OBJECTIVES), strict=True)]
     unreached = [action for action, p in zip(names, highest, strict=True) if p <= 0.5]
     if unreached:
-        attempts = sum(found[o]["starts"] * found[o]["num_settings"] for o in _OBJECTIVES)
+        attempts = sum(models[o]["starts"] * models[o]["num_settings"] for o in _OBJECTIVES)
         claims["class_model.not_reached"] = (
             f"None of the {attempts} attempts made {listed(unreached, 'or')} more probable than "
             "not; this does not show that no observation does."
@@ -38,26 +38,26 @@ def grid(explanations: Sequence[Explanation]) -> Image.Image:
     grids = []
     for explanation in explanations:
         start = f"{explanation.name[:18]}: " if len(explanations) > 1 else ""
-        shown = [*tiles(explanation, start).values()]
-        grids.append(images.gridded(shown, len(explanation.actions.names)))
+        row = [*tiles(explanation, start).values()]
+        grids.append(images.gridded(row, len(explanation.actions.names)))
     return images.stacked(grids, gap=12)
 
 
 def tiles(explanation: Explanation, start: str = "") -> dict[str, Image.Image]:
     """Return the images of one policy by caption, each with a start."""
-    shown: dict[str, Image.Image] = {}
+    by_caption: dict[str, Image.Image] = {}
     numbers = explanation.numbers["class_model"]
     low, high = numbers["statistics"]["low"], numbers["statistics"]["high"]
     channels = numbers["channels"]
     for objective in _OBJECTIVES:
         reached = numbers[objective]["probabilities"]
-        found = explanation.arrays[f"class_model_{objective}"]
+        observations = explanation.arrays[f"class_model_{objective}"]
         for action in explanation.actions.order:
-            image = images.shown_picture(found[action], low, high, channels)
+            image = images.shown_picture(observations[action], low, high, channels)
             name = explanation.actions.names[action]
             caption = f"{start}{name} {reached[action]:.3f} (by {objective})"
-            shown[caption] = images.titled(images.enlarge(image), caption)
-    return shown
+            by_caption[caption] = images.titled(images.enlarge(image), caption)
+    return by_caption
 
 
 PART = Part(

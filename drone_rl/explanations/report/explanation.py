@@ -1,7 +1,6 @@
 """An explanation read from its files, and the parts of the report that display its sections."""
 
 import dataclasses
-import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,12 +10,11 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary, shown_actions, terms_of
-from drone_rl.trust.plots.saving import Rows
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import parse_json, read_bytes, refuse_links
+from drone_rl.utils.files import parse_json, read_bytes
 from drone_rl.utils.limits import EXPLANATION_BYTES
-from drone_rl.utils.schema import Text, as_mapping
+from drone_rl.utils.schema import as_mapping
 from drone_rl.utils.text import SEED_KEYS, Paragraph
 
 FORMAT = "drone_rl explanation"
@@ -38,12 +36,6 @@ METHOD_NAMES = {
     "occlusion": "occlusion",
 }
 """Attribution methods and their display names."""
-_UNSHOWN = re.compile("map_[a-z_]+|observations|regions|depth|features/.+")
-"""Large arrays for other readers, which no part of the report shows."""
-
-
-def _may_be_shown(name: str) -> bool:
-    return _UNSHOWN.fullmatch(name) is None
 
 
 @dataclasses.dataclass
@@ -78,22 +70,13 @@ class Explanation:
             InputError: A file is missing, damaged, too large, or of another version.
         """
         try:
-            refuse_links(folder, depth=1)
             content = read_bytes(folder / "explanation.json", EXPLANATION_BYTES)
             parsed = parse_json(content, "explanation.json", allow_nan=True)
             numbers = dict(as_mapping(parsed, "explanation.json"))
             version = numbers.get("format"), numbers.get("format_version")
             if version != (FORMAT, FORMAT_VERSION):
                 raise InputError(f"it has no format version {FORMAT_VERSION}")
-            arrays, data = (
-                read_arrays(folder / f"{name}.npz", wanted=_may_be_shown)
-                for name in ("arrays", "dataset")
-            )
-            data.pop("meta", None)
-            shown_actions(numbers)
-            terms_of(numbers)
-            if "name" in numbers:
-                Text(1000).read(numbers["name"], "name")
+            arrays, data = (read_arrays(folder / f"{name}.npz") for name in ("arrays", "dataset"))
         except (InputError, OSError) as error:
             raise InputError(
                 f"explanation {folder} can't be read ({error}); run drone-rl explain again"
@@ -124,14 +107,10 @@ class Part:
     """A short heading, for links."""
     needs: tuple[str, ...]
     """Entries of `explanation.json` that it shows; if one is missing, the part is left out."""
-    is_slow: bool = False
-    """Whether it is rendered after the other parts, so that their errors are found first."""
     text: Mapping[str, Paragraph] = dataclasses.field(default_factory=dict)
     """Paragraphs by name."""
     draw: Callable[[Explanation], Figures] = _nothing
     """Returns the figures of one policy by file name."""
-    tables: Callable[[Explanation], Mapping[str, Rows]] = _nothing
-    """Returns the numbers behind the figures, saved as CSV."""
     extras: Callable[[Explanation], Mapping[str, Any]] = _nothing
     """Returns further values for the template."""
     compare: Callable[[Sequence[Explanation]], Figures] = _nothing

@@ -8,7 +8,6 @@ from markupsafe import Markup
 from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.sim.vocabulary import shown_actions
 from drone_rl.trust.plots import regions
-from drone_rl.trust.plots.saving import Rows
 from drone_rl.utils.text import Claims, Evidence, exact_percent, listed
 
 WHERE = {"left": "on its left", "ahead": "straight ahead", "right": "on its right"}
@@ -94,8 +93,11 @@ def _exact_map(explanation: Explanation) -> tuple[Any, ...]:
     return explanation.numbers["places"], outlines, explanation.actions
 
 
-def _rows(explanation: Explanation) -> Rows:
-    return rows(explanation.numbers["places"], explanation.actions.names)
+def _extras(explanation: Explanation) -> dict[str, Any]:
+    if not (drawn := _exact_map(explanation)):
+        return {}
+    table = rows(explanation.numbers["places"], explanation.actions.names)
+    return {"svg": Markup(regions.svg(*drawn)), "rows": table}
 
 
 PART = Part(
@@ -103,11 +105,6 @@ PART = Part(
     label="Exact map",
     needs=("places",),
     text={"places": say_places},
-    draw=lambda e: {"places": regions.chart(*_exact_map(e))} if _exact_map(e) else {},
-    tables=lambda e: {"places": _rows(e)} if _exact_map(e) else {},
-    extras=lambda e: (
-        {"svg": Markup(regions.svg(*_exact_map(e))), "rows": _rows(e)}
-        if _exact_map(e)
-        else {"svg": ""}
-    ),
+    draw=lambda e: {"places": regions.chart(*drawn)} if (drawn := _exact_map(e)) else {},
+    extras=_extras,
 )

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import torch
-from dm_control import mjcf
 from torch import Tensor
 
 from drone_rl.config import TaskSettings
 from drone_rl.sim.dynamics import BodyState, Obstacles
 from drone_rl.sim.entities import Field, Pillar, VisualEntity
+from drone_rl.sim.quiet_dm_control import mjcf
 from drone_rl.sim.rendering.scene import SemanticClass, compiled
 from drone_rl.sim.tasks import CollectCubes, Task, as_task
 from drone_rl.utils.errors import InputError, did_you_mean

@@ -1,14 +1,16 @@
 """Compute devices, Warp's start-up and kernel loading, and a worker pool for CPU kernels."""
 
 import atexit
+import contextlib
 import functools
 import logging
 import os
 import re
 import shutil
+import sys
 import tempfile
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, nullcontext, suppress
 from types import ModuleType
@@ -18,12 +20,27 @@ import torch
 import warp as wp
 
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.imports import standard_error_closed
 from drone_rl.utils.provenance import num_cores
 
 _log = logging.getLogger(__name__)
 _LOADING = threading.Lock()
 """Two threads may both be the first to start Warp or to load kernels."""
+
+
+@contextlib.contextmanager
+def _standard_error_closed() -> Iterator[None]:
+    """Discard all output to standard error, also of compiled code."""
+    sys.stderr.flush()
+    kept = os.dup(2)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        sys.stderr.flush()  # an unfinished line, too
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
 
 
 def check_defaults() -> None:
@@ -77,7 +94,7 @@ def _start_warp(device: str) -> None:
 
 def _initialize_warp(*, is_quiet: bool) -> None:
     """Start Warp; compile into a temporary folder if the one for kernels can't be written."""
-    with standard_error_closed() if is_quiet else nullcontext():  # Warp ignores the log level
+    with _standard_error_closed() if is_quiet else nullcontext():  # Warp ignores the log level
         with suppress(OSError):
             wp.init()
             if os.access(str(wp.config.kernel_cache_dir), os.W_OK):

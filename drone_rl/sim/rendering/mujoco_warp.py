@@ -99,9 +99,8 @@ class WarpRenderer:
             capacity = -(-self._capacity // count)
             with _BUILDING, wp.ScopedDevice(str(self.device)):
                 shards = [Shard(self.scene, single, camera, capacity) for _ in range(count)]
-                shards[0].launch(1)  # compiles or loads the kernels; the other shards share them
-            for shard in shards[1:]:
-                shard.share_kernel_of(shards[0])
+                for shard in shards:
+                    shard.launch(1)  # compiles or loads the kernels, which is not thread-safe
             self._shards[single] = shards
         return self._shards[single]
 
@@ -136,10 +135,6 @@ class Shard:
         self._mocap_pos = wp.to_torch(self._data.mocap_pos)
         self._pixels = self._buffer(view.height, view.width)
         self._appearance = ModelAppearance(scene, self._model, capacity)
-
-    def share_kernel_of(self, other: "Shard") -> None:
-        """Reuse the kernel of another shard of the same model and view: loading takes long."""
-        self._context._megakernel = other._context._megakernel
 
     def render(self, poses: Poses, appearance: Appearance | None, out: Tensor) -> None:
         """Render the first rows of the buffers and copy them to `out`."""

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import mujoco as _mujoco
 import numpy as np
-from dm_control import mjcf
 from numpy.typing import NDArray
 
+from drone_rl.sim.quiet_dm_control import mjcf
 from drone_rl.utils.errors import InputError
 
 mujoco: Any = _mujoco

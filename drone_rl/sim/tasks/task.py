@@ -12,12 +12,12 @@ from typing import Any, Generic, NamedTuple, NoReturn, Protocol, TypeVar
 
 import numpy as np
 import torch
-from dm_control import mjcf
 from torch import Tensor
 
 from drone_rl.config import TASKS, BaseTaskSettings, CameraSettings, TaskSettings, settings_of
 from drone_rl.sim.actions import Actions, Entry
 from drone_rl.sim.dynamics import BodyState, ComputerVision, Dynamics, Obstacles
+from drone_rl.sim.quiet_dm_control import mjcf
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.utils.batch import Batch

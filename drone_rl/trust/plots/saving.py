@@ -1,12 +1,8 @@
 """Save images, videos, tables and numbers as files and data URIs."""
 
 import base64
-import csv
 import io
-import json
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import imageio.v3 as iio
 from matplotlib import rc_context
@@ -15,8 +11,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-Rows = Sequence[Sequence[Any]]
-"""A table, heading first."""
 _DPI = 90
 """Pixels per inch of a chart."""
 _MAX_PIXELS = 2**25
@@ -50,17 +44,6 @@ def save_drawn(drawn: Image.Image | Figure | NDArray, path: Path) -> str:
     film = path.with_name(path.name + ".mp4")
     iio.imwrite(film, drawn, fps=FRAMES_PER_SECOND, codec="libx264")
     return to_uri(film.read_bytes(), "video/mp4")
-
-
-def save_rows(rows: Rows, path: Path) -> None:
-    """Save a table as CSV. The path is without suffix."""
-    with open(path.with_name(path.name + ".csv"), "w", newline="", encoding="utf-8") as file:
-        csv.writer(file).writerows(rows)
-
-
-def save_numbers(numbers: Any, path: Path) -> None:
-    """Save plain values as JSON. The path is without suffix."""
-    path.with_name(path.name + ".json").write_text(json.dumps(numbers, indent=1))
 
 
 def to_png(drawn: Image.Image | Figure) -> bytes:

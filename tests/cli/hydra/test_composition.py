@@ -5,16 +5,10 @@ import types
 import pytest
 from omegaconf import OmegaConf
 
+from drone_rl.cli.evaluation import EvaluateCommand
 from drone_rl.cli.hydra import composition
-from drone_rl.cli.hydra.composition import (
-    Hydra,
-    HydraConfig,
-    _job,
-    _may_be_multirun,
-    read_settings,
-)
+from drone_rl.cli.hydra.composition import HydraConfig, _job, read_settings, whole_numbers
 from drone_rl.cli.settings import CommandSettings
-from drone_rl.cli.train import TrainCommand
 from drone_rl.utils.errors import InputError
 
 
@@ -37,9 +31,9 @@ def job(monkeypatch, tmp_path):
 
 
 def test_a_job_gets_its_settings_and_its_folder(job, tmp_path):
-    done, statuses = job(lambda settings, folder: (3, (settings.name, folder)))
+    function, statuses = job(lambda settings, folder: (3, (settings.name, folder)))
     config = OmegaConf.create({"name": "zy"})
-    assert done(config) == ("zy", tmp_path)
+    assert function(config) == ("zy", tmp_path)
     assert statuses[-1] == 3
     assert read_settings(Command, config) == Command(name="zy")
 
@@ -48,62 +42,52 @@ def test_a_mistake_in_one_run_leaves_the_others_alone(job, capsys):
     def run(settings, folder):
         raise InputError("seed=-1 is out of range")
 
-    done, statuses = job(run)
-    assert done(OmegaConf.create({})) is None
+    function, statuses = job(run)
+    assert function(OmegaConf.create({})) is None
     assert statuses == [2]
     assert capsys.readouterr().err == "error: seed=-1 is out of range\n"
 
 
 def test_a_signal_ends_a_whole_sweep(job):
-    done, _ = job(lambda *_: (143, None))
+    function, _ = job(lambda *_: (143, None))
     with pytest.raises(SystemExit) as stop:
-        done(OmegaConf.create({}))
+        function(OmegaConf.create({}))
     assert stop.value.code == 143
 
 
 @pytest.mark.parametrize(
-    ("overrides", "may_be"),
+    ("override", "number"),
     [
-        ([], False),
-        (["task.num_cubes=2", "seed=1", "hydra.run.dir=here"], False),
-        (["-m", "seed=1,2"], True),
-        (["--multirun", "seed=1,2"], True),
-        (["hydra.mode=MULTIRUN"], True),
-        (["sweep=seeds"], True),
-        (["experiment=mine"], True),
-        (["+more=seeds"], True),
+        ("trainer.total_frames=1e5", "trainer.total_frames=100000"),
+        ("trainer.total_frames=1.5E+3", "trainer.total_frames=1500"),
+        ("collector.num_envs=1e1,2e1", "collector.num_envs=10,20"),
+        ("network.hidden=[1e2,64]", "network.hidden=[100,64]"),
+        ("certificate_flights=1e3", "certificate_flights=1000"),
+        ("certificate=1e3", "certificate=1e3"),
+        ("optimizer.lr=1e-3", "optimizer.lr=1e-3"),
+        ("optimizer.lr=1e30", "optimizer.lr=1e30"),
+        ("hydra.run.dir=1e5", "hydra.run.dir=1e5"),
+        ("task=x1e5", "task=x1e5"),
     ],
 )
-def test_the_command_line_may_start_many_runs(overrides, may_be):
-    assert _may_be_multirun("train", overrides) is may_be
+def test_whole_numbers_may_have_an_exponent(override, number):
+    assert whole_numbers(override) == number
 
 
-@pytest.mark.parametrize("text", ["sweep: seeds", "hydra:\n  mode: MULTIRUN"])
-def test_a_file_may_start_many_runs(text, monkeypatch, tmp_path):
-    (tmp_path / "mine.yaml").write_text(text)
-    monkeypatch.setattr(composition, "conf_dir", lambda: tmp_path)
-    assert _may_be_multirun("mine", [])
-
-
-def test_settings_are_composed_once(monkeypatch, tmp_path):
-    composed, compose = [], Hydra.compose_config
-
-    def count(self, *args, **kwargs):
-        composed.append(kwargs["run_mode"].name)
-        return compose(self, *args, **kwargs)
-
-    monkeypatch.setattr(Hydra, "compose_config", count)
+@pytest.mark.parametrize("line", ["-m seed=1,2 device=cpu", "seed=1,2 -m device=cpu"])
+def test_a_command_gets_its_settings_and_status_for_each_run(monkeypatch, tmp_path, line):
     monkeypatch.chdir(tmp_path)
-    done, get_mode = [], Hydra.get_mode
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "1")  # as `guarded` does
+    runs = []
 
     def run(settings, folder):
-        done.append((settings.seed, folder))
-        return 3, None
+        runs.append((settings.seed, folder.relative_to(tmp_path).as_posix()))
+        return 10 + settings.seed, None
 
-    monkeypatch.setattr(TrainCommand, "run", run)
-    overrides = ["seed=3", f"hydra.run.dir={tmp_path}"]
-    assert composition.run_command("train", TrainCommand, overrides) == 3
-    assert (composed, done) == (["RUN"], [(3, tmp_path)])
-    assert Hydra.get_mode is get_mode
-    assert composition.run_command("train", TrainCommand, [*overrides, "hydra.mode=RUN"]) == 3
-    assert composed[1:] == ["MULTIRUN", "RUN"]
+    monkeypatch.setattr(EvaluateCommand, "run", run)
+    words = [*line.split(), "hydra.sweep.dir=x", "hydra.sweep.subdir=${hydra.job.num}"]
+    assert composition.run_command("evaluate", EvaluateCommand, words) == 12
+    assert runs == [(1, "x/0"), (2, "x/1")]
+    with pytest.raises(InputError, match="runs 0 and 1 have the same folder"):
+        composition.run_command("evaluate", EvaluateCommand, [*words[:-1], "hydra.sweep.subdir=y"])
+    assert len(runs) == 2 and not (tmp_path / "x" / "y").exists()

@@ -1,28 +1,16 @@
-"""What a sweeper gets to see of a run; whole sweeps are in tests/cli/test_sweeps."""
+"""Launchers of sweeps; whole sweeps are in tests/cli/test_sweeps."""
 
 import json
 import logging
 import os
+import shlex
 import signal
 import sys
 
 import pytest
-from hydra.core.plugins import Plugins
 
-from drone_rl.cli.hydra.launchers import (
-    NAMESPACE,
-    LocalLauncher,
-    RayLauncher,
-    SlurmLauncher,
-    SweepLauncher,
-    _command,
-    _job_return,
-    _outcome,
-    _sigterm_as_interrupt,
-    register_plugins,
-)
+from drone_rl.cli.hydra.launchers import _sigterm_as_interrupt
 from drone_rl.sweeps import executors
-from drone_rl.sweeps.manifest import Run, Sweep
 from tests.cli.running import error_line
 
 TRAINING = """
@@ -37,78 +25,17 @@ with (folder / "starts").open("a") as file:
 GRID = ["train", "-m", "seed=0,1", "optimizer.lr=1e-3,1e-2", "hydra.sweep.dir=sweep"]
 
 
-@pytest.fixture
-def run(tmp_path):
-    return Run(0, ("seed=1",), tmp_path)
-
-
-def test_a_finished_run_returns_its_running_mean(run):
-    result = {"reason": "frames", "running_reward": 1.5}
-    (run.folder / "result.json").write_text(json.dumps(result))
-    job = _job_return(run)
-    assert (job.return_value, job.overrides) == (1.5, ["seed=1"])
-    assert _outcome(run) == "not solved in trainer.total_frames, running reward 1.500"
-    (run.folder / "result.json").write_text(json.dumps({**result, "collapsed_at_frames": 12_345}))
-    assert "(learning collapsed after 12,345 frames), running reward 1.500" in _outcome(run)
-    result = {"reason": "solved", "running_reward": 2.98, "verdict": {"kind": "good"}}
-    (run.folder / "result.json").write_text(json.dumps(result))
-    assert _outcome(run) == "solved, running reward 2.980, verdict: good"
-
-
-def test_an_unfinished_run_returns_nothing_and_says_why(run):
-    assert _job_return(run).return_value is None
-    assert _outcome(run) == "failed: reason unknown"
-    (run.folder / "failure.json").write_text(json.dumps({"error": "no memory"}))
-    assert _outcome(run) == "failed: no memory"
-
-
-def test_rubbish_in_a_result_is_no_number(run):
-    result = {"reason": "frames", "running_reward": "high"}
-    (run.folder / "result.json").write_text(json.dumps(result))
-    assert _job_return(run).return_value is None
-
-
-def test_the_command_is_what_was_typed(monkeypatch):
-    argv = ["drone-rl train", "-m", "seed=0,1", "hydra.sweep.dir=${paths.outputs}/x"]
-    monkeypatch.setattr(sys, "argv", argv)
-    assert _command() == ["drone-rl", "train", "-m", "seed=0,1"]
-
-
-def test_hydra_finds_the_launchers():
-    register_plugins(LocalLauncher, SlurmLauncher, RayLauncher)
-    known = Plugins.instance().class_name_to_class
-    for launcher in (LocalLauncher, SlurmLauncher, RayLauncher):
-        assert known[f"{NAMESPACE}.{launcher.__name__}"] is launcher
-
-
-def test_sigterm_stops_a_sweep_as_ctrl_c_does_with_its_own_status():
-    before, seen = signal.getsignal(signal.SIGTERM), []
+def test_sigterm_interrupts_a_sweep():
+    before, events = signal.getsignal(signal.SIGTERM), []
     with pytest.raises(SystemExit) as stop, _sigterm_as_interrupt():
         try:
             os.kill(os.getpid(), signal.SIGTERM)
             signal.sigtimedwait([], 1)
         except KeyboardInterrupt:
-            seen.append("interrupt")
+            events.append("interrupt")
             raise
-    assert (stop.value.code, seen) == (143, ["interrupt"])
+    assert (stop.value.code, events) == (143, ["interrupt"])
     assert signal.getsignal(signal.SIGTERM) is before
-
-
-def test_an_interrupted_sweep_says_how_to_go_on(run, tmp_path, monkeypatch, caplog):
-    class Interrupted:
-        def finish(self, runs):
-            raise KeyboardInterrupt
-
-    launcher = SweepLauncher()
-    launcher.executor = lambda folder: Interrupted()
-    monkeypatch.setattr(
-        "drone_rl.sweeps.report.write_sweep_report", lambda sweep: ("report.html", {})
-    )
-    caplog.set_level(logging.INFO)
-    sweep = Sweep(tmp_path, "drone-rl train -m seed=0,1", {}, [run])
-    with pytest.raises(KeyboardInterrupt):
-        launcher._finish(sweep, [run])
-    assert "resume with the same command: drone-rl train -m seed=0,1" in caplog.text
 
 
 @pytest.mark.parametrize("subdir", ["seed${seed}_lr${optimizer.lr}", "lr${optimizer.lr}/${seed}"])
@@ -125,19 +52,20 @@ def test_each_run_is_in_the_folder_that_hydra_resolves(in_process, monkeypatch, 
     sweep = tmp_path / "sweep"
     starts = {str(p.parent.relative_to(sweep)): p.read_text() for p in sweep.rglob("starts")}
     assert starts == settings
-    runs = json.loads((sweep / "sweep.json").read_text())["runs"]
-    assert [run["folder"] for run in runs] == [*settings]
+    manifest = json.loads((sweep / "sweep.json").read_text())
+    assert [run["folder"] for run in manifest["runs"]] == [*settings]
+    words = ["drone-rl", *GRID, f"hydra.sweep.subdir={subdir}"]
+    assert manifest["command"] == shlex.join(words)
 
 
-def test_long_names_of_folders_are_shortened_alone(in_process, monkeypatch, tmp_path):
-    monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-c", TRAINING))
-    long = [f"trainer.checkpoint_interval_s={i}" for i in range(1000, 1012)]
-    subdir = "hydra.sweep.subdir=a/../${hydra.job.override_dirname}/${hydra.job.num}"
-    done = in_process(*GRID, *long, subdir)
-    assert done.returncode == 0, done.stderr
-    runs = json.loads((tmp_path / "sweep" / "sweep.json").read_text())["runs"]
-    assert [run["folder"].rpartition("/")[2] for run in runs] == ["0", "1", "2", "3"]
-    assert all(len(run["folder"]) < 200 for run in runs)
+def test_an_interrupted_sweep_logs_the_command_that_resumes_it(in_process, monkeypatch, caplog):
+    def interrupt(self, runs):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(executors.LocalExecutor, "finish", interrupt)
+    caplog.set_level(logging.INFO)
+    assert in_process(*GRID).returncode == 130
+    assert "resume with the same command: drone-rl train -m seed=0,1" in caplog.text
 
 
 @pytest.mark.parametrize(
@@ -145,7 +73,8 @@ def test_long_names_of_folders_are_shortened_alone(in_process, monkeypatch, tmp_
     [
         ([*GRID, "hydra.sweep.subdir=${seed}"], "runs 0 and 1 have the same folder"),
         ([*GRID, "hydra.sweep.subdir=../${hydra.job.num}"], "'../0' is not inside"),
-        (["train", "-m", "seed=range(0)"], "seed=range(0): a sweep of no runs"),
+        ([*GRID, "seed=0,x"], "seed=0,x: it needs a whole number"),
+        ([*GRID, "seed=range(0)"], "a sweep of no runs"),
     ],
 )
 def test_a_sweep_that_is_refused_writes_nothing(in_process, tmp_path, words, message):

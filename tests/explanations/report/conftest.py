@@ -1,6 +1,5 @@
 """Explanations of a small untrained policy, computed once, and small ones made by hand."""
 
-import contextlib
 import json
 import shutil
 
@@ -10,7 +9,7 @@ import torch
 
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
 from drone_rl.explanations.explain import explain_policy
-from drone_rl.explanations.report import page, write_report
+from drone_rl.explanations.report import write_report
 from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import SmallCNN
@@ -31,17 +30,9 @@ def explanations(tmp_path_factory):
 @pytest.fixture(scope="session")
 def report(explanations, tmp_path_factory):
     """The page of both; other files of the report are next to it."""
-    save_drawn = page.save_drawn
-
-    def save(drawn, path):
-        """Draw the charts of the first policy quickly, those of the second as users get them."""
-        is_first = path.name.startswith("0_")
-        with quick_figures() if is_first else contextlib.nullcontext():
-            return save_drawn(drawn, path)
 
     def make(folder):
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(page, "save_drawn", save)
+        with quick_figures():
             write_report(explanations, folder)
 
     return shared_folder(tmp_path_factory, "report", make) / "report.html"

@@ -8,6 +8,7 @@ pytest.importorskip("selenium.webdriver")
 
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
 
 from tests.chromium import open_page
@@ -23,72 +24,45 @@ def browser(report, tmp_path_factory):
 
 
 def points(browser):
-    """What the first map knows of its frames."""
-    found = browser.execute_script("return document.querySelector('#map0 script').textContent")
-    return json.loads(found)
+    """Data of the frames of the first map."""
+    script = "return document.querySelector('#map0 script').textContent"
+    return json.loads(browser.execute_script(script))
 
 
-def middle_of_a_frame(browser, number):
-    """Offset from the map's middle of some frame's cell."""
-    known = points(browser)
-    return browser.execute_script(
-        """const canvas = document.querySelector('#map0 canvas');
+def point_at(browser, number):
+    """Point at some frame's cell of the first map."""
+    canvas = browser.find_element(By.CSS_SELECTOR, "#map0 > canvas")
+    browser.execute_script("arguments[0].scrollIntoView({block: 'start'})", canvas)
+    data = points(browser)
+    x, y = browser.execute_script(
+        """const canvas = document.querySelector('#map0 > canvas');
         const box = canvas.getBoundingClientRect();
         const [[c, r], [w, h]] = arguments;
         return [(c + .5) * w * box.width / canvas.width - box.width / 2,
                 (r + .5) * h * box.height / canvas.height - box.height / 2];""",
-        known["cells"]["features"][number],
-        known["tile"],
+        data["cells"]["features"][number],
+        data["tile"],
     )
-
-
-def test_hover_shows_the_frame_with_its_probabilities(browser):
-    canvas = browser.find_element(By.CSS_SELECTOR, "#map0 canvas")
-    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", canvas)
-    x, y = middle_of_a_frame(browser, 4)
     ActionChains(browser).move_to_element_with_offset(canvas, round(x), round(y)).perform()
-    tip, known = browser.find_element(By.ID, "tip"), points(browser)
-    assert tip.is_displayed()
-    assert "forward" in tip.text
-    assert f"episode 1, step {known['step'][4]} of {known['last'][1]}" in tip.text
+    return canvas, browser.find_element(By.CSS_SELECTOR, "#map0 .strip"), data
 
 
-def test_click_shows_the_moment_in_the_episode(browser):
-    canvas = browser.find_element(By.CSS_SELECTOR, "#map0 canvas")
-    x, y = middle_of_a_frame(browser, 4)  # the second of three frames of episode 1
-    ActionChains(browser).move_to_element_with_offset(canvas, round(x), round(y)).click().perform()
-    strip, steps = browser.find_element(By.CSS_SELECTOR, "#map0 .strip"), points(browser)["step"]
-    assert all(f"step {step}:" in strip.text for step in steps[3:6])
-    assert f"step {steps[4]}:" in strip.find_element(By.CSS_SELECTOR, ".here").text
+def test_pointing_at_a_frame_shows_its_probabilities_and_neighbours(browser):
+    canvas, strip, data = point_at(browser, 4)  # the second of three frames of episode 1
+    assert "forward" in strip.text
+    assert f"episode 1, step {data['step'][4]} of {data['last'][1]}" in strip.text
+    assert all(f"step {step}:" in strip.text for step in data["step"][3:6])
+    here = strip.find_element(By.CSS_SELECTOR, ".here")
+    assert f"step {data['step'][4]}:" in here.text
+    canvas.send_keys(Keys.ARROW_RIGHT)
+    here = strip.find_element(By.CSS_SELECTOR, ".here")
+    assert f"step {data['step'][5]}:" in here.text
 
 
 def test_the_map_of_pixels_can_be_chosen(browser):
     button = browser.find_element(By.CSS_SELECTOR, "#map0 button[data-which=pixels]")
-    button.click()
+    browser.execute_script("arguments[0].click()", button)
     assert button.get_attribute("aria-pressed") == "true"
-
-
-def test_the_exact_map_is_zoomed_and_shown_whole_again(browser):
-    element = browser.find_element(By.CSS_SELECTOR, "#places svg")
-    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", element)
-    whole = element.get_dom_attribute("viewBox").split()
-    browser.execute_script(
-        """const box = arguments[0].getBoundingClientRect();
-        arguments[0].dispatchEvent(new WheelEvent("wheel", {deltaY: -500, cancelable: true,
-            clientX: box.left + box.width / 2, clientY: box.top + box.height / 2}));""",
-        element,
-    )
-    assert float(element.get_dom_attribute("viewBox").split()[2]) < 0.5 * float(whole[2])
-    ActionChains(browser).move_to_element(element).perform()
-    where = browser.find_element(By.CSS_SELECTOR, "#places .where").text
-    assert "m ahead" in where and "goes " in where
-    ActionChains(browser).double_click(element).perform()
-    assert [float(v) for v in element.get_dom_attribute("viewBox").split()] == [
-        float(v) for v in whole
-    ]
-    margin = element.size["width"] // 2 - 2, element.size["height"] // 2 - 2
-    ActionChains(browser).move_to_element_with_offset(element, *margin).perform()
-    assert "goes " not in browser.find_element(By.CSS_SELECTOR, "#places .where").text
 
 
 def test_it_fits_a_phone(browser):

@@ -139,7 +139,7 @@ def test_unknown_keys_are_warned_about_and_others_are_not(caplog):
         ("{'SimMode': 'Car'}", "SimMode=Car is not supported; give Multirotor or ComputerVision"),
         ("{'SimMode': 'Boat'}", "SimMode='Boat' is unknown; give Multirotor, ComputerVision$"),
         ("{'ApiServerPort': 70000}", "ApiServerPort=70000 is out of range"),
-        ("{'ApiServerPort': '1'}", "ApiServerPort='1' is a text"),
+        ("{'ApiServerPort': '1'}", "ApiServerPort='1'"),
         ("{'ClockSpeed': 0}", "ClockSpeed=0 is out of range"),
         ("{'Vehicles': {'A': {'X': 'far'}}}", "Vehicles.A.X='far'"),
         (

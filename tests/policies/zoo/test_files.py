@@ -2,17 +2,12 @@ import hashlib
 import json
 import os
 import shutil
-from collections import OrderedDict
 from pathlib import Path
 
 import pytest
 import torch
 from safetensors.torch import save
-from torch import nn
 
-from drone_rl.config.registry import register_network
-from drone_rl.policies import PolicyNetwork
-from drone_rl.policies.networks import orthogonal
 from drone_rl.policies.zoo import (
     card_path,
     certificate_path,
@@ -24,12 +19,11 @@ from drone_rl.policies.zoo import (
     read_policy,
     shifts_path,
 )
-from drone_rl.policies.zoo.files import exported_bytes
 from drone_rl.trust.export import export_policy
 from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.errors import InputError
 from tests.policies.zoo.test_description import DEFAULT
-from tests.trust.test_export_card_text import VERDICT
+from tests.trust.cards import VERDICT
 
 DESCRIPTION = {
     **DEFAULT,
@@ -201,31 +195,6 @@ def test_failed_export_writes_nothing(tmp_path, where):
     with pytest.raises(KeyError):
         export_policy(path, CHECKPOINT, verdict={**VERDICT, "failures": {}}, **origin)
     assert [found.name for found in tmp_path.iterdir()] == [where]
-
-
-def test_tied_weights_are_written_twice():
-    tied = torch.ones(2)
-    assert len(exported_bytes({"a": tied, "b": tied}, {}, {})) > 16
-
-
-def test_masks_of_the_users_own_networks_are_read(tmp_path, registered):
-    class Masked(PolicyNetwork):
-        def __init__(self, in_shape, num_actions, *, generator: torch.Generator | None = None):
-            size = in_shape[0] * in_shape[1] * in_shape[2]
-            parts = [("flatten", nn.Flatten()), ("logits", nn.Linear(size, num_actions))]
-            super().__init__(in_shape, OrderedDict(parts), orthogonal(generator))
-            self.register_buffer("mask", torch.ones(in_shape, dtype=torch.bool))
-
-        def forward(self, pixels):
-            return super().forward(pixels * self.mask)
-
-    registered(register_network("masked")(Masked))
-    description = {**DEFAULT, "network": {"name": "masked"}}
-    expected = parse(description).expected_weights()
-    weights = {name: torch.zeros(v.shape, dtype=v.dtype) for name, v in expected.items()}
-    path = tmp_path / "masked.safetensors"
-    path.write_bytes(exported_bytes(weights, description, ABOUT))
-    assert load_exported(path)["policy"]["mask"].dtype == torch.bool
 
 
 def test_latest_and_folders_are_resolved(tmp_path):

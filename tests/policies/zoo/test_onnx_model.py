@@ -1,7 +1,6 @@
 """ONNX models equal the pipeline and document all that is needed to use them."""
 
 import json
-import sys
 
 import onnxruntime
 import pytest
@@ -164,13 +163,3 @@ def test_unsupported_graph_raises_one_line(registered):
     with pytest.raises(InputError, match=r"can't be written as an ONNX model \(.*safeten") as error:
         make_onnx(description, build(description), {})
     assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize("missing", ["onnxscript", "onnxruntime"])
-def test_missing_package_raises_with_install_command(missing, monkeypatch, linear):
-    monkeypatch.setitem(sys.modules, missing, None)
-    description = describe(5, 6, [GRAY], LINEAR)
-    with pytest.raises(InputError, match=rf"format=onnx needs {missing}.*-e '.\[onnx\]'"):
-        open_onnx(linear) if missing == "onnxruntime" else make_onnx(
-            description, build(description), {}
-        )

@@ -150,7 +150,7 @@ class WithUnion(BaseTaskSettings):
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        (WithText, r"^WithText\.cost='0\.005' is a text; give a finite number$"),
+        (WithText, r"^WithText\.cost='0\.005' is out of range; give a finite number$"),
         (WithUnion, r"^WithUnion\.cost is of type int \| str; annotate it with a kind"),
     ],
 )

@@ -31,7 +31,7 @@ WAYS = {
 }  # fmt: skip
 
 
-def test_the_chart_has_left_on_the_left():
+def test_chart_of_regions():
     figure = chart(NUMBERS, WAYS, SHOWN_MOVES)
     (axis,) = figure.axes
     assert axis.get_xlim() == (3, -3)
@@ -46,12 +46,6 @@ def test_the_chart_has_left_on_the_left():
     assert [text.get_text() for text in axis.texts] == [f"not covered: closer than {near:g} m"]
 
 
-def test_what_is_seen_everywhere_has_no_hatch_in_the_key():
-    figure = chart(NUMBERS | {"unseen": 0.0}, WAYS, SHOWN_MOVES)
-    texts = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    assert "cube not seen" not in texts
-
-
 def corners(words):
     """The corners of one closed way of a path."""
     start, steps = re.fullmatch(r"M(\S+ \S+)l(.+)z", words).groups()
@@ -59,7 +53,7 @@ def corners(words):
     return np.cumsum(np.reshape(numbers, (-1, 2)), 0)
 
 
-def test_the_element_has_the_same_corners_turned_upwards():
+def test_svg_of_regions():
     root = ElementTree.fromstring(svg(NUMBERS, WAYS, SHOWN_MOVES))
     paths = [p for p in root.iter("path") if p.get("fill-rule")]
     assert [p.get("fill") for p in paths] == ["#cc79a7", "#e69f00", "url(#unseen)"]
@@ -78,39 +72,5 @@ def test_the_element_has_the_same_corners_turned_upwards():
 @pytest.mark.parametrize(
     ("most", "ticks"), [(20, [0, 5, 10, 15, 20]), (8, [0, 2, 4, 6, 8]), (3, [0, 1, 2, 3])]
 )
-def test_round_numbers(most, ticks):
+def test_ticks(most, ticks):
     assert _ticks(most) == ticks
-
-
-def test_marks_and_scale_of_the_element_by_the_centimetre():
-    """A unit is a 60th of 3 + 4 metres."""
-    text = svg(NUMBERS, WAYS, SHOWN_MOVES)
-    root = ElementTree.fromstring(text)
-    unit = 7 / 60
-    box = (-3 - 3 * unit, -4 - unit, 6 + 4 * unit, 4 + 5.5 * unit)
-    assert [float(v) for v in root.get("viewBox").split()] == pytest.approx(box, rel=1e-4)
-    (camera,) = (p for p in root.iter("path") if p.find("title") is not None
-                 and p.find("title").text == "camera")  # fmt: skip
-    assert camera.get("d") == "M0 -0.116667L0.0816667 0.07H-0.0816667Z"
-    frame = next(p for p in root.iter("path") if p.get("stroke") == "currentColor")
-    assert frame.get("d") == "M-3 -2H3V-4H-3Z"
-    lines = [p.get("d") for p in root.iter("path") if p.get("stroke-dasharray")]
-    assert lines == ["M-1.5 -2V-4", "M1.5 -2V-4"]
-    key = [(float(r.get("x")), float(r.get("y"))) for r in root.findall("rect")]
-    assert [x for x, _ in key] == [-3, -1, 1]
-    assert [y for _, y in key] == pytest.approx([2.2 * unit] * 3, rel=1e-4)
-    aside = [t for t in root.iter("text") if t.get("text-anchor") == "middle"]
-    assert [float(t.get("x")) for t in aside] == [-1, 1, -2, 2, -3, 3]
-    assert [t.text for t in aside] == ["1 m", "1 m", "2 m", "2 m", "3 m", "3 m"]
-    assert float(aside[0].get("y")) == pytest.approx(1.2 * unit - 2, rel=1e-4)
-
-
-def test_the_charts_outlines_are_closed_and_its_size_follows_the_window():
-    figure = chart(NUMBERS, WAYS, SHOWN_MOVES)
-    assert figure.get_size_inches() == pytest.approx([9.0, 1.6 + 0.88 * 9.0 * 4 / 6])
-    forward = next(p for p in figure.axes[0].patches if isinstance(p, PathPatch)).get_path()
-    assert forward.codes.tolist() == [1, 2, 2, 2, 79]
-    touch = [line.get_xdata()[0] for line in figure.axes[0].lines if len(line.get_xdata()) == 2]
-    assert [x for x in touch if abs(x) == 1.5] == [-1.5, -1.5, 1.5, 1.5]
-    labels = [t.get_text() for t in figure.axes[0].get_legend().get_texts()]
-    assert labels.count("beyond: flying straight on misses it") == 1

@@ -1,14 +1,12 @@
 import base64
-import csv
 import io
-import json
 
 import imageio.v3 as iio
 import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
-from drone_rl.trust.plots.saving import new_chart, save_drawn, save_numbers, save_rows, to_uri
+from drone_rl.trust.plots.saving import new_chart, save_drawn, to_uri
 
 
 def content(uri, kind):
@@ -47,14 +45,6 @@ def test_a_film_is_an_mp4_with_all_frames(tmp_path):
     read = iio.imread(tmp_path / "f.mp4")
     assert read.shape == film.shape
     assert read[0].mean() < 20 and read[4].mean() > 180
-
-
-def test_rows_and_numbers(tmp_path):
-    save_rows([["a", "b"], [1, "x, y"]], tmp_path / "t")
-    with open(tmp_path / "t.csv", newline="") as file:
-        assert list(csv.reader(file)) == [["a", "b"], ["1", "x, y"]]
-    save_numbers({"a": [1, None]}, tmp_path / "n")
-    assert json.loads((tmp_path / "n.json").read_text()) == {"a": [1, None]}
 
 
 def test_a_uri():

@@ -1,33 +1,22 @@
 "use strict";
-const tip = document.getElementById("tip");
-function make(tag, text, name) {
+function make(tag, text, name = "") {
   const element = document.createElement(tag);
   element.textContent = text;
-  element.className = name || "";
+  element.className = name;
   return element;
-}
-function bars(points, i) {
-  const p = points.probabilities[i], chosen = points.action[i];
-  return points.order.map(a => {
-    const bar = make("div", "", a === chosen ? "bar chosen" : "bar"), length = make("i", "");
-    length.style.width = `${Math.max(1, 100 * p[a])}%`;
-    bar.append(make("span", points.names[a]), length, make("span", p[a].toFixed(2)));
-    return bar;
-  });
 }
 function setUp(root, points) {
   const [w, h] = points.tile, canvas = root.querySelector("canvas"), strip = root.querySelector(".strip");
   const sheet = new Image(), n = points.action.length;
   let which = "features", chosen = -1;
-  const cut = (ctx, i, x, y, dw, dh) =>
-    ctx.drawImage(sheet, (i % 30) * w, Math.floor(i / 30) * h, w, h, x, y, dw, dh);
+  const cut = (ctx, i, x, y) => ctx.drawImage(sheet, (i % 30) * w, Math.floor(i / 30) * h, w, h, x, y, w, h);
   function draw() {
     const cells = points.cells[which];
     canvas.width = w * (1 + Math.max(...cells.map(c => c[0])));
     canvas.height = h * (1 + Math.max(...cells.map(c => c[1])));
     const ctx = canvas.getContext("2d");
     cells.forEach(([c, r], i) => {
-      cut(ctx, i, c * w, r * h, w, h);
+      cut(ctx, i, c * w, r * h);
       ctx.fillStyle = `rgba(${points.colors[points.action[i]]},.4)`;
       ctx.fillRect(c * w, r * h, w, h);
       if (i === chosen) { ctx.lineWidth = 5; ctx.strokeStyle = "#000"; ctx.strokeRect(c * w, r * h, w, h); }
@@ -39,43 +28,36 @@ function setUp(root, points) {
     const r = Math.floor((event.clientY - box.top) / box.height * canvas.height / h);
     return points.cells[which].findIndex(cell => cell[0] === c && cell[1] === r);
   }
-  function picture(target, i, scale) {
-    target.width = w; target.height = h;
-    cut(target.getContext("2d"), i, 0, 0, w, h);
-    if (scale) target.style.width = "100%";
+  function thumbnail(i) {
+    const small = document.createElement("canvas");
+    small.width = w; small.height = h;
+    cut(small.getContext("2d"), i, 0, 0);
+    return small;
   }
-  function describe(i) {
-    return `episode ${points.episode[i]}, step ${points.step[i]} of ${points.last[points.episode[i]]}` +
-      (points.event[i] ? ", " + points.event[i] : "");
-  }
-  function hover(event) {
-    const i = at(event);
-    tip.style.display = i < 0 ? "none" : "block";
-    if (i < 0) return;
-    picture(tip.querySelector("canvas"), i, true);
-    tip.querySelector("div").replaceChildren(...bars(points, i), make("small", describe(i)));
-    const x = Math.min(event.clientX + 16, innerWidth - tip.offsetWidth - 8);
-    const y = event.clientY + 16 + tip.offsetHeight > innerHeight ? event.clientY - tip.offsetHeight - 16 : event.clientY + 16;
-    tip.style.left = `${Math.max(4, x)}px`; tip.style.top = `${Math.max(4, y)}px`;
+  function bar(i, action) {
+    const share = points.probabilities[i][action], length = make("i", "");
+    const line = make("div", "", action === points.action[i] ? "bar chosen" : "bar");
+    length.style.width = `${Math.max(1, 100 * share)}%`;
+    line.append(make("span", points.names[action]), length, make("span", share.toFixed(2)));
+    return line;
   }
   function choose(i) {
-    if (i < 0 || i >= n) return;
+    if (i < 0 || i >= n || i === chosen) return;
     chosen = i;
     strip.replaceChildren();
-    for (let k = i - 3; k <= i + 3; k++) {
-      if (k < 0 || k >= n || points.episode[k] !== points.episode[i]) continue;
-      const box = document.createElement("div"), small = document.createElement("canvas");
-      box.className = k === i ? "here" : "";
-      picture(small, k, true);
-      box.append(small, `step ${points.step[k]}: ${points.names[points.action[k]]}`);
+    for (let k = Math.max(0, i - 3); k <= Math.min(n - 1, i + 3); k++) {
+      if (points.episode[k] !== points.episode[i]) continue;
+      const box = make("div", "", k === i ? "here" : "");
+      box.append(thumbnail(k), `step ${points.step[k]}: ${points.names[points.action[k]]}`);
       strip.append(box);
     }
-    strip.append(make("div", describe(i), "note"));
+    const event = points.event[i] ? `, ${points.event[i]}` : "", episode = points.episode[i];
+    const note = make("div", `episode ${episode}, step ${points.step[i]} of ${points.last[episode]}${event}`);
+    note.append(...points.order.map(action => bar(i, action)));
+    strip.append(note);
     draw();
   }
-  canvas.addEventListener("mousemove", hover);
-  canvas.addEventListener("mouseleave", () => { tip.style.display = "none"; });
-  canvas.addEventListener("click", event => { choose(at(event)); });
+  for (const name of ["mousemove", "click"]) canvas.addEventListener(name, event => { choose(at(event)); });
   canvas.addEventListener("keydown", event => {
     const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
     if (step) { choose(Math.min(n - 1, Math.max(0, chosen + step))); event.preventDefault(); }

@@ -1,0 +1,200 @@
+"""Sweepers: which runs `drone-rl COMMAND -m` makes; `hydra_plugins` names them."""
+
+import itertools
+import logging
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import ChoiceSweep, IntervalSweep, Override, RangeSweep
+from hydra.core.plugins import Plugins
+from hydra.plugins.launcher import Launcher
+from hydra.plugins.sweeper import Sweeper
+from hydra.types import HydraContext, TaskFunction
+from omegaconf import DictConfig, OmegaConf
+
+from drone_rl.sweeps.search import import_optuna, next_trials, note_outcome, open_study
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import refuse_links
+from drone_rl.utils.readers import read_result
+from drone_rl.utils.schema import Whole, shown
+
+_log = logging.getLogger(__name__)
+
+
+class CombiningSweeper(Sweeper):
+    """One run for each combination of values, see conf/hydra/sweeper/grid.yaml."""
+
+    config: DictConfig
+    hydra_context: HydraContext
+    launcher: Launcher
+
+    def __init__(self, params: Mapping[str, str]) -> None:
+        self.params = params
+
+    def setup(
+        self, *, hydra_context: HydraContext, task_function: TaskFunction, config: DictConfig
+    ) -> None:
+        """Store Hydra's objects and make the launcher."""
+        # set once, before use, though Hydra declares them optional
+        self.hydra_context = hydra_context  # pyright: ignore[reportIncompatibleVariableOverride]
+        self.config = config  # pyright: ignore[reportIncompatibleVariableOverride]
+        self.launcher = Plugins.instance().instantiate_launcher(  # pyright: ignore[reportIncompatibleVariableOverride]
+            hydra_context=hydra_context, task_function=task_function, config=config
+        )
+
+    def sweep(self, arguments: list[str]) -> None:
+        """Launch all runs at once; they start if all can be composed."""
+        values = []
+        for key, override in self.overrides(arguments).items():
+            if override.is_interval_sweep():
+                raise InputError(
+                    f"{override.input_line}: only a search tries an interval; add "
+                    "hydra/sweeper=optuna"
+                )
+            several = override.is_sweep_override()
+            texts = override.sweep_string_iterator() if several else [_value(override)]
+            values.append([f"{key}={text}" for text in texts])
+        runs = [*map(list, itertools.product(*values))]
+        if not runs:
+            raise InputError(
+                f"{' '.join(arguments)}: a sweep of no runs; give each setting at least one value"
+            )
+        for job in self.launcher.launch(runs, 0):
+            _ = job.return_value  # raises the error of a job that failed
+
+    def overrides(self, arguments: Sequence[str]) -> dict[str, Override]:
+        """Return the last override of each setting in `params` and on the command line."""
+        parser = OverridesParser.create(config_loader=self.hydra_context.config_loader)
+        texts = [*(f"{key}={value}" for key, value in self.params.items()), *arguments]
+        return {override.get_key_element(): override for override in parser.parse_overrides(texts)}
+
+
+def _value(override: Override) -> str:
+    return override.get_value_element_as_str()
+
+
+class SearchSweeper(CombiningSweeper):
+    """Maximize the final running mean of rewards, see conf/hydra/sweeper/optuna.yaml."""
+
+    def __init__(
+        self, *, num_trials: int, batch: int, seed: int, params: dict[str, str], **shared: Any
+    ) -> None:
+        super().__init__(params)
+        import_optuna()
+        frames = shared["report_frames"]
+        if num_trials < 1 or batch < 1 or frames < 1:
+            raise InputError(
+                f"hydra.sweeper.num_trials={num_trials}, batch={batch} and report_frames={frames} "
+                "must be 1 or more"
+            )
+        seed = Whole(0, 2**31).read(seed, "hydra.sweeper.seed")
+        self.num_trials, self.batch, self.seed, self.shared = num_trials, batch, seed, shared
+
+    def sweep(self, arguments: list[str]) -> None:
+        """Sample settings, run them and report the results until all trials are done."""
+        overrides = self.overrides(arguments)
+        space = {key: distribution(o) for key, o in overrides.items() if o.is_sweep_override()}
+        fixed = [f"{key}={_value(o)}" for key, o in overrides.items() if key not in space]
+        if not space:
+            raise InputError(
+                "there is nothing to search; give a range such as "
+                "'optimizer.lr=tag(log,interval(1e-4,1e-1))' or sweep=search"
+            )
+        for key, searched in space.items():
+            self._check_task(overrides[key].input_line, key, searched, [*fixed, *_first(space)])
+        folder = Path(str(self.config.hydra.sweep.dir)).absolute()
+        folder.mkdir(parents=True, exist_ok=True)
+        refuse_links(folder)
+        study = open_study(folder, direction="maximize")
+        for name, value in self.shared.items():
+            study.set_user_attr(name, value)
+        self._search(study, space, fixed)
+
+    def _check_task(self, typed: str | None, key: str, searched: Any, others: list[str]) -> None:
+        """Raise an `InputError` for a setting whose values make different tasks."""
+        compose = self.hydra_context.config_loader.load_sweep_config
+        configs = [compose(self.config, [*others, f"{key}={v}"]) for v in _values(searched)]
+        tasks = [OmegaConf.to_container(config.task, resolve=True) for config in configs]
+        if any(task != tasks[0] for task in tasks):
+            raise InputError(
+                f"{typed} can't be searched: it changes the task, and a search maximizes the "
+                "running reward, which is comparable within one task only; give one value"
+            )
+
+    def _search(self, study: Any, space: dict[str, Any], fixed: list[str]) -> None:
+        states = import_optuna().trial.TrialState
+        while (left := self.num_trials - sum(t.state.is_finished() for t in study.trials)) > 0:
+            trials = next_trials(study, space, min(left, self.batch), self.seed)
+            for trial in trials:
+                check_params(trial.params, space)
+            batch = [
+                [*fixed, *(f"{k}={v}" for k, v in t.params.items()), f"trial={t.number}"]
+                for t in trials
+            ]
+            jobs = self.launcher.launch(batch, trials[0].number)
+            for trial, job in zip(trials, jobs, strict=True):
+                note_outcome(study, trial.number, read_result(Path(str(job.working_dir))))
+        if any(trial.state == states.COMPLETE for trial in study.trials):
+            best = study.best_trial
+            _log.info("best: run %d, running reward %.3f, %s", best.number, best.value, best.params)
+
+
+def _values(searched: Any) -> Sequence[Any]:
+    """Return the choices or the bounds of a distribution of Optuna."""
+    is_choice = hasattr(searched, "choices")
+    return searched.choices if is_choice else (searched.low, searched.high)
+
+
+def _first(space: Mapping[str, Any]) -> list[str]:
+    return [f"{key}={_values(searched)[0]}" for key, searched in space.items()]
+
+
+def check_params(params: Mapping[str, Any], space: Mapping[str, Any]) -> None:
+    """Raise an `InputError` for parameters of a journal outside this search's space."""
+    for name, value in params.items():
+        if name not in space or not _contains(space[name], value):
+            raise InputError(
+                f"optuna.journal sets {shown(name)} to {shown(value)}, which is outside "
+                "this search's space; choose another folder"
+            )
+
+
+def _contains(searched: Any, value: object) -> bool:
+    """Return whether a distribution of Optuna contains a value."""
+    if hasattr(searched, "choices"):
+        return value in searched.choices
+    return isinstance(value, int | float) and searched.low <= value <= searched.high
+
+
+def distribution(override: Override) -> Any:
+    """Return Optuna's distribution of a range in Hydra's grammar.
+
+    Raises:
+        InputError: It is no range that can be searched.
+    """
+    d = import_optuna().distributions
+    value = override.value()
+    if isinstance(value, ChoiceSweep):
+        return d.CategoricalDistribution([str(v) for v in override.sweep_string_iterator()])
+    try:
+        if isinstance(value, RangeSweep):
+            numbers = [int(value.start or 0), int(value.stop or 0), int(value.step)]
+            start, stop, step = numbers
+            if numbers == [value.start or 0, value.stop or 0, value.step] and step > 0:
+                return d.IntDistribution(
+                    start, start + (stop - 1 - start) // step * step, step=step
+                )
+        elif isinstance(value, IntervalSweep):
+            low, high = cast(float, value.start), cast(float, value.end)  # Hydra wants both
+            is_log = "log" in value.tags
+            if isinstance(low, int) and isinstance(high, int):  # int(interval(LOW,HIGH))
+                return d.IntDistribution(low, high, log=is_log)
+            return d.FloatDistribution(float(low), float(high), log=is_log)
+    except (ValueError, OverflowError):  # an empty, negative logarithmic or infinite range
+        pass
+    raise InputError(
+        f"{override.input_line} can't be searched; give a choice, interval(LOW,HIGH), or an "
+        "ascending range of whole numbers"
+    )
