@@ -62,15 +62,23 @@ docs: $(STAMP)
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo "site/index.html"
 
-# Mutation testing of one module with its tests:
+# Mutation testing: change a module in MUTANTS random places, one at a time, and list the changes
+# that its tests do not notice. Do not edit the module meanwhile.
 #   make mutants MODULE=drone_rl/utils/intervals.py TESTS=tests/utils/test_intervals.py
+MUTANTS ?= 50
+SAMPLE := import sqlite3; db = sqlite3.connect("outputs/mutants.sqlite"); \
+  db.execute("delete from work_items where job_id not in \
+    (select job_id from work_items order by random() limit $(MUTANTS))"); \
+  db.execute("delete from mutation_specs where job_id not in (select job_id from work_items)"); \
+  db.commit()
 mutants: $(STAMP)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(EXTRAS),mutants]'
 	@printf '[cosmic-ray]\nmodule-path = "%s"\ntimeout = 120\ntest-command = "%s -m pytest -x -q %s"\n\n[cosmic-ray.distributor]\nname = "local"\n' \
 	  '$(MODULE)' '$(BIN)/python' '$(TESTS)' > outputs/mutants.toml
 	@$(BIN)/cosmic-ray init --force outputs/mutants.toml outputs/mutants.sqlite
+	@$(BIN)/python -c '$(SAMPLE)'
 	@$(BIN)/cosmic-ray exec outputs/mutants.toml outputs/mutants.sqlite
-	@$(BIN)/cr-report --show-pending outputs/mutants.sqlite | tail -n 4
+	@$(BIN)/cr-report --surviving-only --show-diff outputs/mutants.sqlite
 
 # Delete files that are created automatically: environment, site, caches, packages. Results are kept.
 clean:

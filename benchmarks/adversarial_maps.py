@@ -84,8 +84,8 @@ def fingerprint(network: ImageNetwork) -> int:
 def saliency(network: ImageNetwork, observations: Tensor, actions: Tensor) -> Tensor:
     """Return the absolute gradient of the action's logit. Shape: (T, h, w)."""
     x = observations.detach().clone().requires_grad_()
-    chosen = network(x).gather(1, actions[:, None]).sum()
-    return torch.autograd.grad(chosen, x)[0].abs().sum(1)
+    logits = network(x).gather(1, actions[:, None]).sum()
+    return torch.autograd.grad(logits, x)[0].abs().sum(1)
 
 
 def _constant(heat: Tensor) -> MapOf:

@@ -14,7 +14,6 @@ from drone_rl.utils.files import read_json
 def call(
     *args: str,
     statuses: tuple[int, ...] = (0,),
-    program: tuple[str, ...] = PROGRAM,
     environment: Mapping[str, str] | None = None,
     tree: Path | None = None,
 ) -> None:
@@ -23,24 +22,23 @@ def call(
     Args:
         args: Arguments of the command.
         statuses: Exit statuses that count as success.
-        program: Another program that takes the same arguments.
         environment: Additional environment variables.
         tree: Checkout whose code runs, in its folder; by default that of this program, here.
 
     Raises:
         RuntimeError: The exit status is not in `statuses`.
     """
-    own = {} if tree is None else {"PYTHONPATH": str(tree)}
-    done = subprocess.run(
-        [*program, *args],
+    python_path = {} if tree is None else {"PYTHONPATH": str(tree)}
+    process = subprocess.run(
+        [*PROGRAM, *args],
         capture_output=True,
         text=True,
         check=False,
         cwd=tree,
-        env={**os.environ, **own, **(environment or {})},
+        env={**os.environ, **python_path, **(environment or {})},
     )
-    if done.returncode not in statuses:
-        raise RuntimeError(f"drone-rl {' '.join(args)} failed: {done.stderr.strip()[-500:]}")
+    if process.returncode not in statuses:
+        raise RuntimeError(f"drone-rl {' '.join(args)} failed: {process.stderr.strip()[-500:]}")
 
 
 def train(run: Path, *args: str, environment: Mapping[str, str] | None = None) -> tuple[float, Any]:
@@ -58,8 +56,7 @@ def train(run: Path, *args: str, environment: Mapping[str, str] | None = None) -
         RuntimeError: The command failed.
     """
     begin = time.perf_counter()
-    given: Any = {} if environment is None else {"environment": environment}
-    call("train", *args, f"hydra.run.dir={run}", **given)
+    call("train", *args, f"hydra.run.dir={run}", environment=environment)
     return time.perf_counter() - begin, read_json(run / "result.json")
 
 

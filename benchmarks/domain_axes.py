@@ -3,7 +3,6 @@
 import dataclasses
 import json
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 from benchmarks.benchmark import Setup
@@ -33,7 +32,7 @@ def bench_domain_axes(setup: Setup) -> dict[str, Any]:
     folder = setup.runs / "domain_axes"
     folder.mkdir(parents=True, exist_ok=True)
     policy = load_policy(POLICY)
-    found = shifts(
+    result = shifts(
         policy,
         axes=["fog", "sun"] if setup.quick else None,
         strengths=[5],
@@ -42,59 +41,47 @@ def bench_domain_axes(setup: Setup) -> dict[str, Any]:
         domain_episodes=200 if setup.quick else 600,
         progress=silent,
     )
-    found.save(folder)
+    result.save(folder)
+    saved = find_domain(policy, folder)
+    stated = compare_with_required(policy, folder / "domain.yaml", saved)
+    wrong = {name: [*_problems(policy, saved, stated, name)] for name in result.numbers["axes"]}
     flights = JudgeSettings(domain_flights=20 if setup.quick else 100)
-    wrong = {name: [*_problems(policy, folder, name)] for name in found.numbers["axes"]}
-    needs = _required(policy, folder, folder / "domain.yaml").needs
-    reflown = recheck_domain(policy, needs, found.numbers, flights, root_seed(None))
+    recheck = recheck_domain(policy, stated.needs, result.numbers, flights, root_seed(None))
     return {
         "domain_axes": len(wrong),
         "domain_axes_right": sum(not problems for problems in wrong.values()),
         "domain_axes_wrong": {name: problems for name, problems in wrong.items() if problems},
-        "domain_axes_contradicted": [*reflown.contradictions],
+        "domain_axes_contradicted": [*recheck.contradictions],
     }
 
 
-def _problems(policy: Policy, folder: Path, name: str) -> Iterator[str]:
+def _problems(policy: Policy, saved: Any, stated: Coverage, name: str) -> Iterator[str]:
     """Yield what is wrongly accepted or refused on an axis."""
-    own = _required(policy, folder, folder / "domain.yaml")
-    if name not in own.needs or name in own.lacking:
+    if name not in stated.needs or name in stated.lacking:
         yield "the program's own file is refused"
-    for needed, is_inside in _ranges(policy, folder, name):
-        path = folder / "needs.json"
-        path.write_text(json.dumps({name: needed}))
-        if _required(policy, folder, path).is_stated != is_inside:
-            yield f"{needed} is {'refused' if is_inside else 'accepted'}"
-
-
-def _required(policy: Policy, folder: Path, needs: Path) -> Coverage:
-    return compare_with_required(policy, needs, find_domain(policy, folder))
+    path = saved.path.with_name("needs.json")
+    for need, is_inside in _ranges(policy, saved.numbers["domain"]["ranges"][name], name):
+        path.write_text(json.dumps({name: need}))
+        if compare_with_required(policy, path, saved).is_stated != is_inside:
+            yield f"{need} is {'refused' if is_inside else 'accepted'}"
 
 
 def _ranges(
-    policy: Policy, folder: Path, name: str
+    policy: Policy, measured: Mapping[str, Any], name: str
 ) -> Iterator[tuple[Mapping[str, float | str], bool]]:
     """Yield ranges that end near each limit, and whether they are inside."""
-    measured = find_domain(policy, folder)
-    assert measured is not None and measured.numbers is not None
-    found, of = measured.numbers["domain"]["ranges"][name], policy.description
+    subject: Any = policy.description  # has the task, camera and appearance that axes need
     axis = AXES[name]
     if axis.own is not None:
-        axis = dataclasses.replace(axis, neutral=axis.own(_as_subject(of)))
+        axis = dataclasses.replace(axis, neutral=axis.own(subject))
     for end, sign in axis.signs.items():
-        if found["positions"] is None or found[f"{end}_open"] is None:
+        if measured["positions"] is None or measured[f"{end}_open"] is None:
             continue  # this side was not measured
-        limit = found["positions"][0 if sign < 0 else 1]
+        limit = measured["positions"][0 if sign < 0 else 1]
         for is_inside in (True, False):
-            strength = _near(axis, limit, sign, is_inside)
-            value = axis.value(strength, _as_subject(of))
+            value = axis.value(_near(axis, limit, sign, is_inside), subject)
             if abs(value) < float("inf"):
                 yield {end: value, "unit": axis.unit}, is_inside
-
-
-def _as_subject(of: Any) -> Any:
-    """Return a description, which has the task, camera and appearance that axes need."""
-    return of
 
 
 def _near(axis: Axis, limit: float, sign: int, is_inside: bool) -> float:

@@ -124,17 +124,17 @@ def _realtime(seconds: float) -> float:
 
 def _collecting(seconds: float) -> tuple[float, float]:
     """Return frames per second with vehicle dynamics, and the ratio to computer-vision mode."""
-    found = []
+    rates = []
     for count in _COLLECTED:
         flying, still = (default_collector(count, "cpu", d) for d in (FLYING, DynamicsSettings()))
         work = [partial(_collect, collector) for collector in (flying, still)]
         for collect in work:
             collect()
-        found.append(paired(*work, seconds=seconds, rounds=5))
+        rates.append(paired(*work, seconds=seconds, rounds=5))
         for collector in (flying, still):
             collector.shutdown()
-    best_flying = max(a for a, _, _ in found)
-    return best_flying, best_flying / max(b for _, b, _ in found)
+    best_flying = max(a for a, _, _ in rates)
+    return best_flying, best_flying / max(b for _, b, _ in rates)
 
 
 def _collect(collector: Any) -> int:

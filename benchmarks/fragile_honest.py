@@ -27,12 +27,12 @@ def bench_fragile_honest(setup: Setup) -> dict[str, Any]:
         train(run, f"seed={seed}")
         policies.append(load_policy(run))
     settings = JudgeSettings(sampled=False, episodes=50 if setup.quick else 400)
-    found = [
+    roundings = [
         judge(policy, settings, progress=silent).verdict.evidence["rounding"] for policy in policies
     ]
     return {
-        "fragile_honest": sum(one["decides"] for one in found),
-        "fragile_honest_total": len(found),
-        "fragile_frames_most": max(one["fragile_rate"] for one in found),
-        "fragile_episodes_most": max(one["fragile_episodes_rate"] for one in found),
+        "fragile_honest": sum(rounding["decides"] for rounding in roundings),
+        "fragile_honest_total": len(roundings),
+        "fragile_frames_most": max(rounding["fragile_rate"] for rounding in roundings),
+        "fragile_episodes_most": max(rounding["fragile_episodes_rate"] for rounding in roundings),
     }

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.gamed_case import GamedCase
 from drone_rl.config.commands import ShiftSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import certificate_path, fingerprint, shifts_path
@@ -27,50 +26,45 @@ _AXIS, _VALUE = "dead_rows", 12.0
 """A perturbation under which the policy fails although the forged file says that it is good."""
 _TRIVIAL = {"lateral_bound": 0.5}
 _EPISODES = 300
+Forge = Callable[[Policy], dict[str, Any]]
+"""Return the content of a forged certificate of a policy."""
 
 
-def cases(folder: Path) -> list[GamedCase]:
-    """Return all cases; each writes its files when it runs.
+def cases(folder: Path) -> dict[str, Callable[[], bool]]:
+    """Return for each case whether it is judged good; each writes its files when it runs.
 
     Args:
         folder: Each case writes policy and forged file into its own subfolder.
     """
-    forged: dict[str, Callable[[Policy], dict[str, Any]]] = {
-        "a certificate of one box without steps": lambda policy: one_box(policy, {}),
-        "a certificate of one box with plausible steps": lambda policy: one_box(
-            policy, steps_of(policy)
+
+    def proved(case: str, name: str, forge: Forge, **options: Any) -> Callable[[], bool]:
+        return functools.partial(_is_proved, folder / case, name, forge, **options)
+
+    def plausible(policy: Policy) -> dict[str, Any]:
+        return one_box(policy, steps_of(policy))
+
+    one_sided = "right_and_forward"
+    return {
+        "a certificate of one box without steps": proved(
+            "empty", one_sided, lambda policy: one_box(policy, {})
         ),
-        "a certificate of one box with next to no steps": lambda policy: one_box(
-            policy, dict.fromkeys(steps_of(policy), 1e-12)
+        "a certificate of one box with plausible steps": proved("box", one_sided, plausible),
+        "the certificate of another policy under this name": proved("name", one_sided, _renamed),
+        "the certificate of another policy with this hash": proved("hash", one_sided, _rehashed),
+        "a certificate of a policy that fails in corners only": proved("rare", "good", plausible),
+        "a certificate that nobody re-checks": proved(
+            "unchecked", one_sided, plausible, certificate_flights=0
         ),
-        "the certificate of another policy under this name": _renamed,
-        "the certificate of another policy with this hash": _rehashed,
+        "a certificate that one rollout re-checks": proved(
+            "few", one_sided, plausible, certificate_flights=1
+        ),
+        "an invented operating domain": lambda: _is_covered(folder / "domain", "good"),
+        "an invented operating domain of a one-sided policy": lambda: _is_covered(
+            folder / "one_sided", one_sided
+        ),
+        "flying straight in a trivial task": lambda: _is_good("forward"),
+        "a good policy in a trivial task": lambda: _is_good("good"),
     }
-    found = [
-        GamedCase(name, functools.partial(_is_proved, folder / str(i), "right_and_forward", forge))
-        for i, (name, forge) in enumerate(forged.items())
-    ]
-    plausible = forged["a certificate of one box with plausible steps"]
-    rare = functools.partial(_is_proved, folder / "rare", "good", plausible)
-    unchecked = functools.partial(
-        _is_proved, folder / "unchecked", "right_and_forward", plausible, certificate_flights=0
-    )
-    few = functools.partial(
-        _is_proved, folder / "few", "right_and_forward", plausible, certificate_flights=1
-    )
-    return [
-        *found,
-        GamedCase("a certificate of a policy that fails in corners only", rare),
-        GamedCase("a certificate that nobody re-checks", unchecked),
-        GamedCase("a certificate that one rollout re-checks", few),
-        GamedCase("an invented operating domain", lambda: _is_covered(folder / "domain", "good")),
-        GamedCase(
-            "an invented operating domain of a one-sided policy",
-            lambda: _is_covered(folder / "one_sided", "right_and_forward"),
-        ),
-        GamedCase("flying straight in a trivial task", lambda: _is_good("forward")),
-        GamedCase("a good policy in a trivial task", lambda: _is_good("good")),
-    ]
 
 
 def one_box(policy: Policy, steps: dict[str, float]) -> dict[str, Any]:
@@ -140,28 +134,17 @@ def steps_of(policy: Policy, total: float = 0.98, high: float | None = None) -> 
 
 
 def forged_shifts(policy: Policy, folder: Path) -> dict[str, Any]:
-    """Return a consistent `shifts.json` that states success under every perturbation.
+    """Return a `shifts.json` whose domain states that the policy is good under every strength.
 
     Args:
         policy: The policy that the file names.
         folder: Folder of the honest measurement that is changed.
     """
-    options: dict[str, Any] = {
-        "axes": [_AXIS],
-        "modes": ["constant"],
-        "domain": False,
-        "episodes": 20,
-    }
-    honest = shifts(policy, progress=silent, **options)
+    honest = shifts(
+        policy, axes=[_AXIS], modes=["constant"], domain=False, episodes=20, progress=silent
+    )
     honest.save(folder)
     data = json.loads((folder / "shifts.json").read_text())
-    won = _always_won(data["plain"], 20)
-    data["plain"] |= won
-    along = data["axes"][_AXIS]
-    for level in (*along["levels"], data["together"]):
-        level |= {"oracle": data["plain"]["oracle"], "impossible": False, "refused": None}
-        level["modes"] = {"constant": {**won, "unchanged": False}}
-    along["areas"] = {"constant": 1.0}
     subject = make_evaluated_policy(policy, ShiftSettings())
     (axis,) = find_axes([_AXIS], subject)
     with closing(PairedEvaluator(subject, 1, data["settings"]["seed"])) as evaluator:
@@ -181,21 +164,6 @@ class _ForgedProber(Prober):
         """See `Prober`."""
         counts = {"success": 1.0, "fragile": 0, "worst": None}
         return {"good": True, "bad": False, "refused": None, **counts}
-
-
-def _always_won(plain: dict[str, Any], episodes: int) -> dict[str, Any]:
-    """Return the figures of a policy that succeeds in all episodes, like the oracle."""
-    mean = {"mean": 1.0, "lower95": 0.9, "upper95": 1.0, "count": episodes}
-    ends = dict.fromkeys(plain["ends"], 0)
-    return {
-        "success": plain["oracle"],
-        "difference": {"mean": 0.0, "lower95": -0.1, "upper95": 0.1, "count": episodes},
-        "paired": {"lost": 0, "gained": 0, "p": 1.0},
-        "shares": {
-            name: {**mean, "count": share["count"]} for name, share in plain["shares"].items()
-        },
-        "ends": {**ends, "all_cubes": episodes},
-    }
 
 
 def _copy_shipped(name: str, folder: Path) -> Policy:
@@ -222,13 +190,11 @@ def _rehashed(policy: Policy) -> dict[str, Any]:
     return data
 
 
-def _is_proved(
-    folder: Path, name: str, forge: Callable[[Policy], dict[str, Any]], **options: Any
-) -> bool:
+def _is_proved(folder: Path, name: str, forge: Forge, **options: Any) -> bool:
     policy = _copy_shipped(name, folder)
     certificate_path(policy.path).write_text(json.dumps(forge(policy)))
-    done = judge(policy, episodes=20, sampled=False, progress=silent, **options)
-    return done.verdict.is_proved or done.status("proved") == 0
+    judged = judge(policy, episodes=20, sampled=False, progress=silent, **options)
+    return judged.verdict.is_proved or judged.status("proved") == 0
 
 
 def _is_covered(folder: Path, name: str) -> bool:
@@ -237,12 +203,12 @@ def _is_covered(folder: Path, name: str) -> bool:
     required = folder / "required_domain.json"
     required.write_text(json.dumps({_AXIS: {"high": _VALUE, "unit": "rows"}}))
     try:
-        done = judge(policy, require_domain=required, progress=silent)
+        judged = judge(policy, require_domain=required, progress=silent)
     except InputError:
         return False
-    return done.status() == 0
+    return judged.status() == 0
 
 
 def _is_good(name: str) -> bool:
-    done = judge(name, task=_TRIVIAL, progress=silent)
-    return done.status("good") == 0 or done.status() == 0
+    judged = judge(name, task=_TRIVIAL, progress=silent)
+    return judged.status("good") == 0 or judged.status() == 0

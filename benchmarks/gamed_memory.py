@@ -14,10 +14,8 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor
 
-from benchmarks.gamed_case import GamedCase
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.config import TaskSettings
-from drone_rl.config.commands import HeldOutSettings
 from drone_rl.config.networks import Mlp
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies import MLP
@@ -25,17 +23,15 @@ from drone_rl.policies.actor import exploring
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import ExternalPolicy, policy_from
 from drone_rl.policies.policy import BasePolicy, load_policy
-from drone_rl.policies.zoo import describe, read_policy
+from drone_rl.policies.zoo import describe
 from drone_rl.policies.zoo.files import exported_bytes
 from drone_rl.sim.actions import Move
 from drone_rl.trust.evaluate import evaluate
-from drone_rl.trust.export import export
 from drone_rl.trust.judge import judge
 from drone_rl.trust.shifts import shifts
-from drone_rl.trust.verdict import judge_for_selection
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
-from drone_rl.utils.seeding import Stream, root_seed
+from drone_rl.utils.seeding import Stream
 
 KNOWN_SEED = 0
 """The default of version 0.1."""
@@ -129,7 +125,7 @@ def step_playback(recording: Recording) -> Logits:
     return logits
 
 
-def write_memorising_policy(path: Path, *, stream: Stream = Stream.REPORT) -> Path:
+def write_memorising_policy(path: Path) -> Path:
     """Write a valid policy file with an MLP that is fitted to recorded frames.
 
     Its hidden layer has random weights. Its output layer interpolates: a good policy's actions on
@@ -137,14 +133,13 @@ def write_memorising_policy(path: Path, *, stream: Stream = Stream.REPORT) -> Pa
 
     Args:
         path: Path of the file, ending in .safetensors.
-        stream: Stream of the environments to memorise.
 
     Returns:
         The path.
     """
     described = describe(TrainSettings(task=TASK, network=Mlp(hidden=(WIDTH,))))
-    known = record(EPISODES, stream=stream)
-    other = record(COUNTEREXAMPLES, seed=KNOWN_SEED + 1, stream=stream)
+    known = record(EPISODES)
+    other = record(COUNTEREXAMPLES, seed=KNOWN_SEED + 1)
     frames, actions = _examples(known, other)
     generator = torch.Generator().manual_seed(0)
     network = MLP(frames.shape[1:], len(Move), hidden=(WIDTH,), generator=generator)
@@ -220,57 +215,30 @@ def _conditions(make: Callable[[], BasePolicy | Path], seed: int | None) -> bool
     return bool(done.numbers["domain"]["plain"]["good"])
 
 
-def _choice(make: Callable[[], Path], seed: int | None) -> bool:
-    root = None if seed is None else root_seed(seed)
-    verdict, _ = judge_for_selection(make(), EPISODES, "cpu", seed=root)
-    return verdict["exit_code"] == 0
-
-
-def _card(make: Callable[[], Path], seed: int | None) -> bool:
-    path = make()
-    target = path.with_name("exported.safetensors")
-    export(load_policy(path), target, HeldOutSettings(episodes=EPISODES, seed=seed))
-    return read_policy(target)["verdict"]["exit_code"] == 0
-
-
 def judgements(folder: Path) -> dict[str, Judgement]:
     """Return the analysis that each adversarial policy attacks, by name.
 
     Args:
-        folder: Folder of the policy files; created if missing.
+        folder: Folder of the policy file; created if missing.
     """
     folder.mkdir(parents=True, exist_ok=True)
-
-    @functools.cache
-    def callable_of(make: Callable[[Recording], Logits], stream: Stream) -> ExternalPolicy:
-        return _memorising(make, stream)
-
-    @functools.cache
-    def file_of(stream: Stream) -> Path:
-        return write_memorising_policy(folder / f"{stream.name.lower()}.safetensors", stream=stream)
-
-    report = functools.partial(callable_of, frame_lookup, Stream.REPORT)
-    shifted = functools.partial(callable_of, frame_lookup, Stream.SHIFTED)
-    steps = functools.partial(callable_of, step_playback, Stream.REPORT)
-    written, chosen = (functools.partial(file_of, s) for s in (Stream.REPORT, Stream.CHOICE))
+    remember = functools.cache(_memorising)
+    by_frame = functools.partial(remember, frame_lookup, Stream.REPORT)
+    by_step = functools.partial(remember, step_playback, Stream.REPORT)
+    shifted = functools.partial(remember, frame_lookup, Stream.SHIFTED)
+    written = functools.partial(write_memorising_policy, folder / "memory.safetensors")
     return {
-        "verdict, callable that looks frames up": functools.partial(_verdict, report),
-        "verdict, callable that counts steps": functools.partial(_verdict, steps),
+        "verdict, callable that looks frames up": functools.partial(_verdict, by_frame),
+        "verdict, callable that counts steps": functools.partial(_verdict, by_step),
         "verdict, file of an MLP": functools.partial(_verdict, written),
-        "evaluate, callable that looks frames up": functools.partial(_evaluation, report),
+        "evaluate, callable that looks frames up": functools.partial(_evaluation, by_frame),
         "shifts, callable that looks frames up": functools.partial(_conditions, shifted),
-        "choice in a sweep, file of an MLP": functools.partial(_choice, chosen),
-        "export, file of an MLP": functools.partial(_card, written),
     }
 
 
-def cases(folder: Path) -> list[GamedCase]:
-    """Return the cases: each adversarial policy with the default seed.
-
-    Args:
-        folder: Folder of the policy files; created if missing.
-    """
-    return [
-        GamedCase(f"memory: {name}", functools.partial(judgement, None))
+def cases(folder: Path) -> dict[str, Callable[[], bool]]:
+    """Return for each adversarial policy whether it is judged good with the default seed."""
+    return {
+        f"memory: {name}": functools.partial(judgement, None)
         for name, judgement in judgements(folder).items()
-    ]
+    }

@@ -85,10 +85,10 @@ def make_policies(absent: Tensor, observations: Tensor, targets: Tensor) -> list
         observations: Training images. Shape: (T, C, h, w).
         targets: An expert's actions for these images. Shape: (T,).
     """
-    found = []
+    policies = []
     for i, (name, window) in enumerate(WINDOWS.items()):
         sign = -1.0 if i % 2 else 1.0
-        found += [
+        policies += [
             KnownMapPolicy(f"{name}, linear, flat", linear(absent, [window], 0.5 * sign)),
             KnownMapPolicy(
                 f"{name}, convolution, steep", convolution(absent, [window], -5.0 * sign)
@@ -98,13 +98,13 @@ def make_policies(absent: Tensor, observations: Tensor, targets: Tensor) -> list
     for first, second in ((0, 4), (1, 3), (5, 2), (6, 1)):
         windows = [WINDOWS[names[first]], WINDOWS[names[second]]]
         network = hidden_layer(absent, windows)
-        found.append(KnownMapPolicy(f"{names[first]} and {names[second]}", network))
+        policies.append(KnownMapPolicy(f"{names[first]} and {names[second]}", network))
     for name in ("left", "right", "small"):
-        found.append(KnownMapPolicy(f"dark things, {name}", detector(absent, WINDOWS[name])))
+        policies.append(KnownMapPolicy(f"dark things, {name}", detector(absent, WINDOWS[name])))
     for seed, name in enumerate(("left", "right", "left edge", "ground, right")):
         network = trained(WINDOWS[name], observations, targets, seed)
-        found.append(KnownMapPolicy(f"{name}, trained", network))
-    return found + blind(absent)
+        policies.append(KnownMapPolicy(f"{name}, trained", network))
+    return policies + blind(absent)
 
 
 def linear(absent: Tensor, windows: Sequence[Window], scale: float) -> PolicyNetwork:

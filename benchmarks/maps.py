@@ -45,10 +45,10 @@ def bench_maps(setup: Setup) -> dict[str, Any]:
         greedy = probabilities(network, seen).argmax(-1)
         return measure(network, greedy, seen, others, absent, episode)
 
-    known = make_policies(absent, seen, expert(scenes, state))
-    known = known[::7] if setup.quick else known
-    failed = {p.name: failed_tests(trial(p.network)) for p in known}
-    seeing = [p for p in known if not p.is_blind]
+    planted = make_policies(absent, seen, expert(scenes, state))
+    planted = planted[::7] if setup.quick else planted
+    failed = {p.name: failed_tests(trial(p.network)) for p in planted}
+    seeing = [p for p in planted if not p.is_blind]
     policies = {p.name: p.network for p in seeing[:: 3 if setup.quick else 2]}
     policies |= shipped(absent) if not setup.quick else {}
     policies |= untrained(absent, 1 if setup.quick else 4)
@@ -62,8 +62,8 @@ def bench_maps(setup: Setup) -> dict[str, Any]:
         "planted_maps_found": float(np.mean([not failed[p.name] for p in seeing])),
         "planted_maps_total": len(seeing),
         "planted_maps_missed": {p.name: failed[p.name] for p in seeing if failed[p.name]},
-        "planted_maps_blind_trusted": sum(not failed[p.name] for p in known if p.is_blind),
-        "planted_maps_blind_total": len(known) - len(seeing),
+        "planted_maps_blind_trusted": sum(not failed[p.name] for p in planted if p.is_blind),
+        "planted_maps_blind_total": len(planted) - len(seeing),
         "maps_s": time.perf_counter() - begin,
     }
 

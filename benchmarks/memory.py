@@ -31,10 +31,12 @@ def bench_memory(setup: Setup) -> dict[str, Any]:
     settling, frames = 1_000 if setup.quick else SETTLING_FRAMES, setup.memory_frames
     arguments = [str(folder / "memory"), str(settling + frames), setup.device]
     command = [sys.executable, "-m", __name__, *arguments]
-    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-    if done.returncode != 0:
-        raise RuntimeError(f"the training of the memory benchmark failed: status {done.returncode}")
-    measured = json.loads(done.stdout)
+    process = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    if process.returncode != 0:
+        raise RuntimeError(
+            f"the training of the memory benchmark failed: status {process.returncode}"
+        )
+    measured = json.loads(process.stdout)
     return {
         "peak_memory_mib": measured["peak"],
         "memory_growth_mib_per_million_frames": growth(measured["samples"], settling),

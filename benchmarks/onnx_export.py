@@ -16,9 +16,9 @@ def bench_onnx(setup: Setup) -> dict[str, float]:
     folder = setup.runs / "onnx"
     folder.mkdir(parents=True, exist_ok=True)
     names = [name for name in policy_names() if load_policy(name).description.frames == 1]
-    found = [export_onnx(n, folder / f"{n}.onnx") for n in names[: 1 if setup.quick else None]]
+    agreements = [export_onnx(n, folder / f"{n}.onnx") for n in names[: 1 if setup.quick else None]]
     return {
-        "onnx_max_difference": max(f.difference for f in found),
-        "onnx_actions_differ": sum(f.actions_differ for f in found),
-        "onnx_frames": sum(f.frames for f in found),
+        "onnx_max_difference": max(f.difference for f in agreements),
+        "onnx_actions_differ": sum(f.actions_differ for f in agreements),
+        "onnx_frames": sum(f.frames for f in agreements),
     }

@@ -80,14 +80,18 @@ def bench_original(setup: Setup) -> dict[str, Any]:
 
 def trainings(quick: bool) -> dict[str, list[str]]:
     """Return the settings of each training by its name."""
-    found: dict[str, list[str]] = {}
+    settings: dict[str, list[str]] = {}
     for schedule, rate in itertools.product(SCHEDULES, RATES):
         frozen = schedule == "step_decay" or rate == max(RATES)
         most = 20 if quick else FROZEN if frozen else EPISODES
-        own = [f"scheduler={schedule}", f"optimizer.lr={rate:g}", f"trainer.total_episodes={most}"]
-        found[f"{schedule} {rate:g}"] = ["experiment=original", *own]
-    found[DEFAULT] = ["trainer.total_episodes=100"] if quick else []
-    return found
+        overrides = [
+            f"scheduler={schedule}",
+            f"optimizer.lr={rate:g}",
+            f"trainer.total_episodes={most}",
+        ]
+        settings[f"{schedule} {rate:g}"] = ["experiment=original", *overrides]
+    settings[DEFAULT] = ["trainer.total_episodes=100"] if quick else []
+    return settings
 
 
 def train_seeds(folder: Path, settings: Sequence[str], seeds: Sequence[int]) -> list[Any]:
@@ -122,8 +126,8 @@ def read_curve(run: Path) -> Curve:
         rows = [
             (int(r["episodes"]), float(r["train/running_reward"])) for r in csv.DictReader(file)
         ]
-    chosen = {round(len(rows) ** (i / 200)) - 1 for i in range(201)}
-    return [rows[i] for i in sorted(chosen)]
+    indices = {round(len(rows) ** (i / 200)) - 1 for i in range(201)}
+    return [rows[i] for i in sorted(indices)]
 
 
 def plot(curves: Mapping[str, Sequence[tuple[Mapping[str, Any], Curve]]], path: Path) -> None:

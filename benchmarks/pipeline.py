@@ -75,10 +75,10 @@ def rate(work: Callable[[], int], seconds: float) -> float:
         work: Function that returns the number of items that it processed.
         seconds: Minimum duration.
     """
-    done, begin = 0, time.perf_counter()
+    count, begin = 0, time.perf_counter()
     while time.perf_counter() - begin < seconds:
-        done += work()
-    return done / (time.perf_counter() - begin)
+        count += work()
+    return count / (time.perf_counter() - begin)
 
 
 def paired(

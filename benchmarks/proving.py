@@ -1,42 +1,17 @@
 """Proofs of shipped and newly trained policies: time, decided fraction, and correctness."""
 
-import statistics
 import time
 from pathlib import Path
 from typing import Any
 
-import torch
-
 from benchmarks import commands
 from benchmarks.benchmark import Setup
 from drone_rl.config.training import TrainerSettings
-from drone_rl.policies import ImageNetwork
 from drone_rl.policies.policy import load_policy
 from drone_rl.training.train import train
 from drone_rl.utils.progress import silent
 from drone_rl.verification.check import Check, check
 from drone_rl.verification.prove import Proof, prove
-
-REFERENCE_IMAGES_PER_S = 148_000
-"""Images per second of the default network on the reference machine of the proof times."""
-_BATCH, _TIMES = 1024, 15
-
-
-@torch.no_grad()
-def network_images_per_s(network: ImageNetwork, shape: tuple[int, ...]) -> float:
-    """Return the images per second of a network's forward pass, with torch's number of threads.
-
-    Args:
-        network: Any network.
-        shape: Shape of an image, (C, H, W).
-    """
-    images, seconds = torch.rand(_BATCH, *shape), []
-    for _ in range(_TIMES):
-        begin = time.perf_counter()
-        network(images)
-        seconds.append(time.perf_counter() - begin)
-    return _BATCH / statistics.median(seconds)
-
 
 EPISODES = 105_000
 """Episodes that check all certificates together; the requirement is 100,000."""
@@ -47,17 +22,11 @@ def bench_prove(setup: Setup) -> dict[str, Any]:
 
     Returns:
         "proof_two_s" of the policy "good" with two cubes; "proof_three_s", "proof_success",
-        "proof_lost" and "proof_undecided" of each seed's policy with three cubes;
-        "proof_network_pictures_per_s", the speed of the network alone, and the times scaled to
-        148,000 images per second; the number of certificates that the checker accepts, and of its
-        episodes that contradict them.
+        "proof_lost" and "proof_undecided" of each seed's policy with three cubes; the number of
+        certificates that the checker accepts, and of its episodes that contradict them.
     """
     folder = setup.runs / "prove"
     two, three = (1, 1) if setup.quick else (2, 3)
-    policy = load_policy("good")
-    camera = policy.description.camera
-    images_per_s = network_images_per_s(policy.make_network(), (1, camera.height, camera.width))
-    slower = REFERENCE_IMAGES_PER_S / images_per_s
     good, good_s = _timed("good", two, folder / "good")
     proofs, seconds = {"good": good}, []
     for seed in setup.seeds:
@@ -74,16 +43,13 @@ def bench_prove(setup: Setup) -> dict[str, Any]:
     return {
         "proof_two_s": good_s,
         "proof_three_s": seconds,
-        "proof_network_pictures_per_s": images_per_s,
-        "proof_two_scaled_s": good_s / slower,
-        "proof_three_scaled_s": [taken / slower for taken in seconds],
         "proof_success": [proof.success for proof in trained],
         "proof_lost": [proof.lost for proof in trained],
         "proof_undecided": max(proof.undecided for proof in trained),
         "proof_undecided_each": [proof.undecided for proof in trained],
-        "proof_contradicted": sum(done.findings.contradicted for done in checks),
-        "proof_flights": sum(sum(done.findings.flights.values()) for done in checks),
-        "proof_checked": sum(done.accepted for done in checks),
+        "proof_contradicted": sum(check.findings.contradicted for check in checks),
+        "proof_flights": sum(sum(check.findings.flights.values()) for check in checks),
+        "proof_checked": sum(check.accepted for check in checks),
         "proof_checked_total": len(checks),
     }
 

@@ -107,7 +107,7 @@ BENCHMARKS: dict[str, Benchmark] = {
         *_parts("adversarial_maps", "known_map_policies"),
     ),
     "explain": _benchmark(bench_explain, "adversarial", *_EXPLAINING, "conf"),
-    "verdicts": _benchmark(bench_verdicts, "adversarial", *_JUDGING, *_parts("scripted_policies")),
+    "trust": _benchmark(bench_verdicts, "adversarial", *_JUDGING, *_parts("scripted_policies")),
     "fragile_honest": _benchmark(bench_fragile_honest, "adversarial", *_TRAINING, *_JUDGING),
     "shifts": _benchmark(bench_shifts, "adversarial", *_JUDGING),
     "domain_axes": _benchmark(bench_domain_axes, "adversarial", *_JUDGING),
@@ -142,7 +142,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "peers": _benchmark(bench_peers, "libraries", *_COMMANDS, *_parts("peers")),
     "gymnasium": _benchmark(bench_gymnasium, "libraries", *_RENDERING),
     "flight_speed": _benchmark(bench_flight_speed, "flight", *_COLLECTING),
-    "flight_parity": _benchmark(bench_flight_parity, "flight", "sim"),
+    "flight_parity": _benchmark(bench_flight_parity, "flight", "sim", *_parts("forces_kernel")),
     "flight_paths": _benchmark(bench_flight_paths, "flight", "sim", "flight/commands"),
     "flight_moves": _benchmark(
         bench_experiment, "flight", *_SOLVING, experiment="flight", num_seeds=5

@@ -197,14 +197,14 @@ def bench_render_truth(setup: Setup) -> dict[str, Any]:
     """
     command = [sys.executable, "-m", "benchmarks.render_truth", "50" if setup.quick else "1000"]
     environment = {**os.environ, "MUJOCO_GL": "egl"}
-    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
-    if done.returncode != 0:
-        reason = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
+    process = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    if process.returncode != 0:
+        reason = (process.stderr.strip().splitlines() or [f"exit status {process.returncode}"])[-1]
         raise InputError(
             f"render_truth needs OpenGL by EGL, which failed ({reason[:200]}); install a driver "
             "such as libegl-mesa0"
         )
-    return json.loads(done.stdout.strip().splitlines()[-1])
+    return json.loads(process.stdout.strip().splitlines()[-1])
 
 
 def _windows(values: NDArray[Any]) -> NDArray[Any]:

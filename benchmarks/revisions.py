@@ -67,9 +67,9 @@ def extract(revision: str, target: Path) -> Path:
     archive = target.with_suffix(".tar")
     archive.parent.mkdir(parents=True, exist_ok=True)
     command = ["git", "archive", "--output", str(archive), revision]
-    done = subprocess.run(command, cwd=_ROOT, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise InputError(f"git has no revision {revision}: {done.stderr.strip()}")
+    process = subprocess.run(command, cwd=_ROOT, capture_output=True, text=True, check=False)
+    if process.returncode:
+        raise InputError(f"git has no revision {revision}: {process.stderr.strip()}")
     with tarfile.open(archive) as files:
         files.extractall(target, filter="data")
     archive.unlink()
@@ -94,5 +94,5 @@ def compare(pairs: Sequence[Pair]) -> dict[str, float]:
         for key in before.keys() & after.keys():
             low, high = (before, after) if key in COSTS else (after, before)
             ratios.setdefault(key, []).append(high[key] / low[key])
-    known = (key for key in (*COSTS, *RATES) if key in ratios)
-    return {key: statistics.median(ratios[key]) for key in known}
+    keys = (key for key in (*COSTS, *RATES) if key in ratios)
+    return {key: statistics.median(ratios[key]) for key in keys}

@@ -98,10 +98,10 @@ def success_rates(
             dataclasses.replace(axis, strengths=axis.strengths[:strengths])
             for axis in find_axes(None, evaluator.subject)
         ]
-        found = compare(evaluator, subjects, axes, possible_share=settings.possible_share)
+        rates = compare(evaluator, subjects, axes, possible_share=settings.possible_share)
     finally:
         evaluator.close()
-    return {Path(name): shares for name, shares in found.items()}
+    return {Path(name): shares for name, shares in rates.items()}
 
 
 def _plain_spec(run: Path, settings: ShiftSettings) -> EvaluatedPolicy:

@@ -115,14 +115,14 @@ def compare(
         name: lambda s=s: PolicyAgent(s.network, s.transforms, evaluator.episodes)
         for name, s in subjects.items()
     }
-    found = {name: {PLAIN: _share(evaluator, Condition(), make())} for name, make in makers.items()}
+    rates = {name: {PLAIN: _share(evaluator, Condition(), make())} for name, make in makers.items()}
     for axis in axes:
         conditions = [axis.make(strength, evaluator.subject) for strength in axis.strengths]
         possible = [c for c in conditions if _is_possible(evaluator, c, possible_share)]
         for name, make in makers.items():
             if possible:
-                found[name][axis.name] = mean([_share(evaluator, c, make()) for c in possible])
-    return found
+                rates[name][axis.name] = mean([_share(evaluator, c, make()) for c in possible])
+    return rates
 
 
 def by_kind(shares: Mapping[str, float], kinds: Iterable[str]) -> dict[str, float]:

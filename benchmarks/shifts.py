@@ -23,12 +23,12 @@ def bench_shifts(setup: Setup) -> dict[str, Any]:
     settings = ShiftSettings(seed=0, modes=("constant",))
     suite = shifts("good", settings, episodes=episodes, domain=False, progress=silent)
     seconds = time.perf_counter() - begin
-    found = {
+    figures = {
         "shift_suite_s": seconds,
         "shift_suite_axes": len(suite.numbers["axes"]),
         "shift_area": suite.area,
     }
     if not setup.quick:
         complete = shifts("good", settings, strengths=[5], progress=silent)
-        found["shift_domain"] = complete.sentence
-    return found
+        figures["shift_domain"] = complete.sentence
+    return figures

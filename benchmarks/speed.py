@@ -178,7 +178,7 @@ def _dm_control_rate(quality: str, seconds: float) -> float | None:
     """Return the frames per second of dm_control; None without EGL."""
     command = [sys.executable, "-m", "benchmarks.dm_control", quality, str(seconds)]
     environment = {**os.environ, "MUJOCO_GL": "egl"}
-    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
-    if done.returncode != 0:
+    process = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    if process.returncode != 0:
         return None
-    return json.loads(done.stdout.strip().splitlines()[-1])["frames_per_second"]
+    return json.loads(process.stdout.strip().splitlines()[-1])["frames_per_second"]

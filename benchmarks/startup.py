@@ -11,8 +11,6 @@ from benchmarks.benchmark import Setup
 from benchmarks.commands import PROGRAM, call
 
 _IMPORT = "import time; t = time.perf_counter(); import {}; print(time.perf_counter() - t)"
-TORCH_S = 1.0
-"""Seconds of `import torch` on the reference machine."""
 _POLL_S = 0.005
 """Seconds between two checks for the first update."""
 
@@ -23,8 +21,7 @@ def bench_startup(setup: Setup) -> dict[str, float]:
     Returns:
         "import_s" of the package, "start_to_first_update_s" of `drone-rl train`, "first_compile_s"
         (additional time without cached kernels), "verdict_s" of `drone-rl verdict policy=good`
-        with its 400 episodes; "import_torch_s", a measure of the machine's speed, and the three
-        times scaled to a machine on which it is 1 s.
+        with its 400 episodes; "import_torch_s", a measure of the machine's speed.
     """
     folder = setup.runs / "startup"
     times = range(1 if setup.quick else 3)
@@ -33,17 +30,13 @@ def bench_startup(setup: Setup) -> dict[str, float]:
     cold = first_update_seconds(folder / "cold", setup.device, folder / "kernels")
     updates = [first_update_seconds(folder / f"update_{i}", setup.device) for i in times]
     verdicts = [verdict_seconds(folder / f"verdict_{i}", setup.device) for i in times]
-    torch_s = statistics.median(import_seconds("torch") for _ in times)
-    update_s, verdict_s = statistics.median(updates), statistics.median(verdicts)
+    update_s = statistics.median(updates)
     return {
         "import_s": statistics.median(import_seconds() for _ in times),
         "start_to_first_update_s": update_s,
         "first_compile_s": cold - update_s,
-        "verdict_s": verdict_s,
-        "import_torch_s": torch_s,
-        "start_to_first_update_scaled_s": update_s * TORCH_S / torch_s,
-        "first_compile_scaled_s": (cold - update_s) * TORCH_S / torch_s,
-        "verdict_scaled_s": verdict_s * TORCH_S / torch_s,
+        "verdict_s": statistics.median(verdicts),
+        "import_torch_s": statistics.median(import_seconds("torch") for _ in times),
     }
 
 

@@ -1,12 +1,10 @@
-"""Sweeps: speed-up of parallel runs, overhead of the launcher, and kills."""
+"""Sweeps: speed-up of parallel runs, and kills."""
 
 import contextlib
 import json
 import os
-import runpy
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -16,20 +14,14 @@ import numpy as np
 from benchmarks.benchmark import Setup
 from benchmarks.commands import PROGRAM, call
 from drone_rl.sweeps.manifest import THREADS
-from drone_rl.training import CheckpointCallback, CsvCallback, LoggerCallback
 from drone_rl.utils.checkpoint import load_checkpoint
-
-_BARE = (sys.executable, "-m", "benchmarks.sweeps")
 
 
 def bench_sweeps(setup: Setup) -> dict[str, Any]:
-    """Measure the same trainings as single commands, in a sweep, and in a sweep of two jobs.
-
-    Single ("bare") trainings write no metrics, events and checkpoints before their end.
+    """Measure the same trainings in a sweep one at a time and two at a time.
 
     Returns:
-        Seconds of each, the speed-up of two parallel jobs, and the relative overhead of launcher
-        and logging.
+        Seconds of each, and the speed-up of two parallel jobs.
     """
     folder = setup.runs
     seeds, episodes = (2, 20) if setup.quick else (4, 250)
@@ -40,13 +32,8 @@ def bench_sweeps(setup: Setup) -> dict[str, Any]:
         "trainer.target_share=null",
         f"device={setup.device}",
     ]
-    bare = sum(
-        _seconds(_BARE, *training, f"seed={i}", f"hydra.run.dir={folder}/bare_{i}")
-        for i in range(seeds)
-    )
     one, two = (
         _seconds(
-            PROGRAM,
             "-m",
             *training,
             f"seed=range({seeds})",
@@ -56,11 +43,9 @@ def bench_sweeps(setup: Setup) -> dict[str, Any]:
         for jobs in (1, 2)
     )
     return {
-        "sweep_bare_s": bare,
         "sweep_one_at_a_time_s": one,
         "sweep_two_at_once_s": two,
         "sweep_speedup": one / two,
-        "launcher_overhead": one / bare - 1,
     }
 
 
@@ -83,7 +68,7 @@ def bench_kills(setup: Setup) -> dict[str, Any]:
         f"device={setup.device}",
     ]
     whole, killed = folder / "never_killed", folder / "killed"
-    seconds = _seconds(PROGRAM, "-m", *settings, f"hydra.sweep.dir={whole}")
+    seconds = _seconds("-m", *settings, f"hydra.sweep.dir={whole}")
     again = (*PROGRAM, "train", "-m", *settings, f"hydra.sweep.dir={killed}")
     kills, delays = 0, np.random.default_rng(0).uniform(0.2, 1.0, 3) * seconds / 3
     for delay in delays:
@@ -93,15 +78,15 @@ def bench_kills(setup: Setup) -> dict[str, Any]:
         kills += sweep.poll() is None
         _kill_processes(str(killed))
         sweep.wait()
-    _seconds(PROGRAM, "-m", *settings, f"hydra.sweep.dir={killed}")
+    _seconds("-m", *settings, f"hydra.sweep.dir={killed}")
     same = [_outcome(run) == _outcome(killed / run.name) for run in sorted(whole.glob("[0-9]*"))]
     return {"sweep_kills": kills, "sweep_runs": count, "sweep_runs_same_after_kills": sum(same)}
 
 
-def _seconds(program: tuple[str, ...], *args: str) -> float:
+def _seconds(*args: str) -> float:
     """Return the time of one command."""
     begin = time.perf_counter()
-    call("train", *args, program=program, environment=THREADS)
+    call("train", *args, environment=THREADS)
     return time.perf_counter() - begin
 
 
@@ -121,14 +106,3 @@ def _outcome(run: Path) -> tuple[dict[str, Any], dict[str, list]]:
     result.pop("verdict", None)
     policy = load_checkpoint(run / "checkpoints" / "last.pt")["policy"]
     return result, {name: values.tolist() for name, values in policy.items()}
-
-
-def _train_bare() -> None:
-    """Run `drone-rl` without writing files between the first and the last update."""
-    for callback in (CsvCallback, LoggerCallback, CheckpointCallback):
-        setattr(callback, "on_update", lambda *_: None)  # noqa: B010 (a method replaced on purpose)
-    runpy.run_module("drone_rl.cli.main", run_name="__main__", alter_sys=True)
-
-
-if __name__ == "__main__":
-    _train_bare()

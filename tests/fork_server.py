@@ -16,7 +16,7 @@ from drone_rl.utils.unloaded_compiler import leave_compiler_unloaded
 
 _MORE = (
     *("cli.hydra.messages", "cli.hydra.help", "training.train", "trust.export"),
-    *("evaluation.evaluate", "evaluation.video"),
+    *("trust.evaluate", "trust.video"),
 )
 
 

@@ -39,18 +39,18 @@ def bench_peers(setup: Setup) -> dict[str, Any]:
         for start in _trainings(folder / "starts", 0, quick=True).values():
             start(seed=setup.seeds[0])
     trainings = _trainings(folder, setup.episodes, setup.quick)
-    found: dict[str, dict[str, list]] = {name: {} for name in trainings}
+    measured: dict[str, dict[str, list]] = {name: {} for name in trainings}
     for seed in setup.seeds[:3]:
         for name, measure in trainings.items():
             for key, value in measure(seed=seed).items():
-                found[name].setdefault(key, []).append(value)
+                measured[name].setdefault(key, []).append(value)
     plot(
-        {name: values.pop("curve") for name, values in found.items()},
+        {name: values.pop("curve") for name, values in measured.items()},
         folder.parent.parent / "peers.png",
     )
-    means = {name: statistics.mean(values["seconds"]) for name, values in found.items()}
+    means = {name: statistics.mean(values["seconds"]) for name, values in measured.items()}
     best = min(means[name] for name in THEIRS)
-    return {"peers": found, "solve_over_best_peer": means["reinforce"] / best}
+    return {"peers": measured, "solve_over_best_peer": means["reinforce"] / best}
 
 
 def _trainings(folder: Path, episodes: int, quick: bool) -> dict[str, Callable[..., Measured]]:
@@ -86,14 +86,14 @@ def train_ours(arguments: Sequence[str], *, seed: int, episodes: int, folder: Pa
     seconds, result = train(run, *arguments, f"seed={seed}")
     columns, start = Training(run, "", result).metrics(), seconds - result["seconds"]
     ends = [start + at for at in columns["seconds"]]
-    found = {
+    measured = {
         "seconds": seconds,
         "seconds_without_imports": result["seconds"],
         "frames": result["frames"],
         "is_solved": result["reason"] == "solved",
         "curve": [*zip(ends, columns["train/running_reward"], strict=True)],
     }
-    return found | ({"success_lower95": success_lower95(run, episodes)} if episodes else {})
+    return measured | ({"success_lower95": success_lower95(run, episodes)} if episodes else {})
 
 
 def train_theirs(

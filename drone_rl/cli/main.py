@@ -141,7 +141,8 @@ def _run_all(steps: list[tuple[str, list[str]]]) -> int:
 
 def find_command(name: str) -> Any:
     """Return the settings class of a command, such as `SweepReportCommand`."""
-    return getattr(importlib.import_module(f"drone_rl.cli.{COMMANDS[name]}"), TABLE[name]["class"])
+    module = importlib.import_module(f"drone_rl.cli.{COMMANDS[name]}")
+    return getattr(module, f"{name.title().replace('-', '')}Command")
 
 
 if __name__ == "__main__":

@@ -173,16 +173,11 @@ def mcnemar(before: Tensor, after: Tensor) -> dict[str, Any]:
     Returns:
         "lost": pairs with success only before, "gained": only after; "p": the p-value.
     """
-    lost, gained = int((before > after).sum()), int((after > before).sum())
-    return {"lost": lost, "gained": gained, "p": mcnemar_p(lost, gained)}
-
-
-def mcnemar_p(lost: int, gained: int) -> float:
-    """Return the p-value of `mcnemar` from its counts."""
     from scipy.special import bdtr  # slow to import
 
+    lost, gained = int((before > after).sum()), int((after > before).sum())
     tail = float(bdtr(min(lost, gained), lost + gained, 0.5)) if lost + gained else 0.5
-    return min(1.0, 2 * tail)
+    return {"lost": lost, "gained": gained, "p": min(1.0, 2 * tail)}
 
 
 def area(positions: Sequence[float], shares: Sequence[float]) -> float:

@@ -204,7 +204,7 @@ def _open(evidence: Evidence) -> str:
 
 
 def depends_on_rounding(evidence: Evidence) -> bool:
-    """Return whether the episodes are enough, but rounding can change the kind."""
+    """Return whether the episodes are enough, but too many decisions depend on rounding."""
     return bool((evidence.get("rounding") or {}).get("decides"))
 
 
@@ -338,7 +338,7 @@ SENTENCES = (
     ),
     Sentence(
         "rounding",
-        "the episodes are enough, but rounding can change the kind",
+        "the episodes are enough, but too many decisions depend on rounding",
         lambda e: not e["certain"] and depends_on_rounding(e),
         _rounding,
     ),

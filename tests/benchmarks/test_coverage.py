@@ -1,8 +1,21 @@
+"""Coverage of intervals by enumeration, and rates of certain but wrong verdicts."""
+
 import numpy as np
 import pytest
-from scipy.stats import binom
 
-from benchmarks import coverage, simulated_policies
+from benchmarks import coverage, exact_coverage, simulated_policies
+from benchmarks.exact_coverage import Truth
+from benchmarks.simulated_policies import (
+    A,
+    L,
+    R,
+    SimulatedPolicy,
+    _join,
+    _mixture,
+    judge_samples,
+    policies,
+)
+from drone_rl.trust.rule import Rule, VerdictKind
 from drone_rl.utils.intervals import proportion
 
 
@@ -16,65 +29,100 @@ def test_coverage_is_exact():
     assert three.mean == pytest.approx(0.65)
 
 
-def test_all_outcomes_are_enumerated_once():
-    found = list(coverage._compositions(4, 3))
-    assert len(found) == len(set(found)) == 15
-    assert all(sum(row) == 4 and min(row) >= 0 for row in found)
-
-
 def test_an_interval_that_assumes_independent_cubes_is_detected():
     """An interval that counts three cubes of an episode as three trials covers 75%."""
 
     def holds(values):
-        found = proportion(int(3 * values.sum()), 3 * len(values))
-        return found["lower95"] <= 0.9 <= found["upper95"]
+        interval = proportion(int(3 * values.sum()), 3 * len(values))
+        return interval["lower95"] <= 0.9 <= interval["upper95"]
 
-    covered = coverage.coverage(coverage.OUTCOMES["all or nothing, 9 of 10"], 100, holds)
-    assert covered < 0.8
-
-
-def test_a_bootstrap_of_five_episodes_is_detected():
-    rng = np.random.default_rng(0)
-    outcome = coverage.OUTCOMES["all or nothing, 9 of 10"]
-
-    def holds(values):
-        draws = rng.choice(values, (500, len(values))).mean(1)
-        return bool(np.quantile(draws, 0.025) <= 0.9 <= np.quantile(draws, 0.975))
-
-    assert coverage.coverage(outcome, 5, holds) < 0.6
+    assert coverage.coverage(coverage.OUTCOMES["all or nothing, 9 of 10"], 100, holds) < 0.8
 
 
 def test_every_kind_of_dependence_is_a_distribution():
-    assert len(coverage.OUTCOMES) >= 8
     for outcome in [*coverage.OUTCOMES.values(), *coverage.TIMES.values()]:
         assert sum(outcome.probabilities) == pytest.approx(1.0)
         assert len(outcome.values) == len(outcome.probabilities)
-    assert all(
-        o.low <= min(o.values) <= max(o.values) <= o.high for o in coverage.OUTCOMES.values()
-    )
-    assert coverage.OUTCOMES["independent cubes"].mean == pytest.approx(0.9)
+    for outcome in coverage.OUTCOMES.values():
+        assert outcome.low <= min(outcome.values) <= max(outcome.values) <= outcome.high
 
 
 def test_coverage_of_proportions_is_the_minimum_over_true_rates():
     """With one episode the interval of no success ends at 0.975, where coverage is lowest."""
     rows = list(coverage._proportions(quick=True))
-    assert [row["episodes"] for row in rows] == [1, 2, 5]
     assert rows[0]["coverage"] == pytest.approx(0.975, abs=1e-6)
 
 
-def test_coverage_of_medians():
-    rows = list(coverage._medians(quick=True))
-    assert rows[0]["coverage"] == pytest.approx(1 - 2 / 2**6)
-    assert rows[0]["coverage"] == pytest.approx(binom.cdf(5, 6, 0.5) - binom.cdf(0, 6, 0.5))
-    assert coverage._median(coverage.TIMES["times, a third never"]) == 2.0
-    assert all(row["coverage"] >= 0.945 for row in rows)
-
-
-def test_every_interval_covers_at_least_its_level(monkeypatch):
-    some = dict([*simulated_policies.policies().items()][::3])
+def test_every_interval_covers_at_least_its_level(setup, monkeypatch):
+    some = dict([*policies().items()][::3])
     monkeypatch.setattr(simulated_policies, "policies", lambda: some)
-    found = coverage.bench_coverage(quick=True)
-    assert found["interval_coverage_min"] >= 0.945
-    assert found["interval_coverage_least"] in found["interval_coverage"]
-    assert {row["interval"] for row in found["interval_coverage"]} == {"mean", "share", "median"}
-    assert found["false_certain_rate"] <= 0.05
+    figures = coverage.bench_coverage(setup)
+    assert figures["interval_coverage_min"] >= 0.945
+    assert {row["interval"] for row in figures["interval_coverage"]} == {"mean", "share", "median"}
+    assert figures["false_certain_rate"] <= 0.05
+
+
+def test_types_and_their_probabilities():
+    half = _mixture(0.25, (L, R), (1, 1), (0, 1))
+    assert half.types == {((L, R), (1, 1), False): 0.25, ((L, R), (0, 1), False): 0.75}
+    joined = _join((0.5, half), (0.5, _mixture(1.0, (A, A), (1, 1), (1, 1))))
+    assert joined.types[(L, R), (0, 1), False] == 0.375
+
+
+def test_quantities_of_an_episode_type():
+    policy = SimulatedPolicy({((L, A), (1, 0), False): 1.0}, forward_share=0.3)
+    values = (float(value[0]) for value in policy.observed)
+    observed = dict(zip(Rule().quantities, values, strict=True))
+    assert observed["success"] == pytest.approx(-0.9)
+    assert (observed["collected left"], observed["collected ahead"]) == (1.0, 0.0)
+    assert np.isnan(observed["collected right"])
+    assert observed["above random"] == pytest.approx(0.5 - 1 / 6)
+    assert observed["above forward"] == pytest.approx(0.5 - 1 / 6 - 5 / 6 * 0.3)
+
+
+def test_policies_are_on_both_sides_of_every_threshold():
+    kinds = {name: policy.kind for name, policy in policies().items()}
+    for name in {name.rsplit(" ", 1)[0] for name in kinds}:
+        assert len({kinds[f"{name} {shift}"] for shift in ("-0.03", "+0.03")}) == 2, name
+    assert set(kinds.values()) >= {*VerdictKind} - {VerdictKind.ONE_SIDED_LEFT}
+    assert kinds["all or nothing, success +0.00"] is VerdictKind.NONE  # exactly 0.9 is not more
+
+
+def test_intervals_that_are_too_narrow_are_detected(monkeypatch):
+    """At a true rate of 0.9, a rule that trusts the mean is often certain and wrong."""
+    exact = simulated_policies.estimate
+
+    def narrow(*args):
+        quantity = exact(*args)
+        middle = quantity.lower if quantity.value is None else quantity.value
+        return quantity._replace(lower=middle - 0.001, upper=middle + 0.001)
+
+    policy = policies()["all or nothing, success +0.00"]
+    counts = np.random.default_rng(0).multinomial(400, policy.shares, 100)
+    assert judge_samples(policy, counts).count(VerdictKind.GOOD) == 0
+    monkeypatch.setattr(simulated_policies, "estimate", narrow)
+    assert judge_samples(policy, counts).count(VerdictKind.GOOD) > 20
+
+
+@pytest.mark.parametrize(
+    ("success", "undecided", "is_covered"),
+    [
+        (0.6, 0.0, True),  # intervals are closed
+        (0.61, 0.0, False),
+        (0.39, 0.0, False),
+        (0.39, 0.02, True),  # undecided placements can move the rate into the interval
+        (0.3, 0.05, False),
+    ],
+)
+def test_an_interval_covers_every_possible_rate(success, undecided, is_covered):
+    interval = {"lower95": 0.4, "upper95": 0.6}
+    assert Truth(success, undecided).is_covered(interval) == is_covered
+
+
+def test_verdicts_cover_the_exact_rate_of_a_shipped_policy(setup):
+    """The policy right_and_forward collects cubes at y from -6 to 1.65 of -6 to 6."""
+    figures = exact_coverage.bench_exact_coverage(setup)
+    assert figures["verdict_coverage_exact_total"] == 3
+    (row,) = figures["verdict_coverage_exact_policies"]
+    assert row["success"] + row["undecided"] / 2 == pytest.approx(7.65 / 12, abs=1e-4)
+    assert row["held"] == figures["verdict_coverage_exact_held"] >= 2

@@ -1,69 +1,92 @@
-import json
-from pathlib import Path
+"""Verdicts on policies whose flaws are known: the kind, and whether it is certain."""
+
+import functools
+
+import pytest
+import torch
 
 from benchmarks import verdicts
-from benchmarks.scripted_policies import SCRIPTS
+from benchmarks.scripted_policies import SCRIPTS, ScriptedPolicy
+from drone_rl.collectors.complete_episodes import run_episodes
+from drone_rl.envs import DroneEnv
+from drone_rl.trust.baselines import run_baselines
+from drone_rl.trust.verdict import apply_rule
+from drone_rl.utils.seeding import RootSeed, Stream
+
+EPISODES = 400
+KINDS = {
+    "good": ["all cubes", "all cubes, slowly", "loses one episode in 50", "all of five cubes"],
+    "poor": [
+        "first cube only, then leaves", "turns the wrong way", "finds one cube of ten beside it",
+        "straight on in a narrow field", "straight on among large cubes",
+    ],
+    "one-sided (right)": ["blind on its left", "finds one cube of ten on its left"],
+    "one-sided (left)": ["blind on its right"],
+    "good, but trivial": [
+        "all cubes where none stand aside", "straight on where none stand aside",
+    ],
+    "none of these": [
+        "first cube only, then straight on", "dithers at the third cube", "dodges cubes ahead",
+        "sees 4 m sideways", "blind to higher cubes", "half blind on its right",
+        "finds one cube of three beside it", "asleep at the fifth cube",
+    ],
+    "not certain": [
+        "loses one episode in 13", "all or nothing, nine in ten", "no time for all cubes",
+        "leaves at once, every other time", "finds three cubes of ten on its left",
+    ],
+}  # fmt: skip
+PHRASES = {
+    "dithers at the third cube": "third cube: in all 400 episodes; 100% of all end at the step",
+    "sees 4 m sideways": "with cubes 4 to 6 m to its side: in all 221 episodes",
+    "blind on its left": "can't be trusted with cubes on its left",
+    "loses one episode in 50": "second cube: in 9 of 400",
+    "straight on in a narrow field": "no better than flying straight on",
+}
+"""The finding that a reader needs, for some of them."""
 
 
-def entry(kind, certain, truth):
-    return {"kind": kind, "certain": certain, "is": truth}
+@functools.cache
+def baselines(task):
+    env = DroneEnv(EPISODES, task, pixels=False, stream=Stream.REPORT)
+    return run_baselines(EPISODES, task, env.state_dict(), EPISODES)
+
+
+def run(name, greedy=True):
+    env = DroneEnv(EPISODES, SCRIPTS[name].settings, pixels=False, stream=Stream.REPORT)
+    policy = ScriptedPolicy(SCRIPTS[name], torch.Generator().manual_seed(0))
+    return run_episodes(env, policy, EPISODES, greedy=greedy)
+
+
+def judge(name, sampled=None):
+    task = SCRIPTS[name].settings
+    return apply_rule(run(name), baselines(task), sampled=sampled, seed=RootSeed(0, False))
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [(k, name) for k, names in KINDS.items() for name in names]
+)
+def test_a_known_flaw_decides_the_verdict(kind, name):
+    verdict = judge(name)
+    assert (verdict.kind.value if verdict.certain else "not certain") == kind, verdict.sentence
+    assert PHRASES.get(name, "") in verdict.sentence
+
+
+def test_sampled_actions_of_an_uncertain_policy_fail():
+    verdict = judge("sure of nothing", run("sure of nothing", greedy=False))
+    assert (verdict.kind.value, verdict.certain) == ("good", True)
+    assert "in 17.0% of episodes" in verdict.sentence
+
+
+def test_seeking_equals_the_oracle():
+    ours, oracle = run("all cubes"), baselines(SCRIPTS["all cubes"].settings)["oracle"]
+    assert torch.equal(ours.length, oracle.length)
+    assert torch.equal(ours.goals.reached, oracle.goals.reached)
 
 
 def test_right_and_certain_verdicts_are_counted():
-    found = verdicts.count(
-        {
-            "right": entry("good", True, "good"),
-            "wrong": entry("good", True, "poor"),
-            "open": entry("good", False, "poor"),
-        }
+    rows = {"right": ("good", True, "good"), "wrong": ("good", True, "poor"),
+            "open": ("good", False, "poor")}  # fmt: skip
+    figures = verdicts.count(
+        {name: dict(zip(("kind", "certain", "is"), row, strict=True)) for name, row in rows.items()}
     )
-    figures = [found[f"verdicts_{name}"] for name in ("right", "certain", "total")]
-    assert figures == [1, 2, 3]
-
-
-def test_enough_policies_are_judged():
-    trained = len(verdicts.RATES) * len(verdicts.SEEDS)
-    assert len(SCRIPTS) + len(verdicts.SHIPPED) + len(verdicts.BASELINES) + trained >= 50
-
-
-def test_the_true_kind_comes_from_other_environments(monkeypatch):
-    random_states = []
-    run_baselines = verdicts.run_baselines
-
-    def record(num_envs, task, state, episodes):
-        random_states.append(state["random_states"][0])
-        return run_baselines(20, task, {"random_states": state["random_states"][:20]}, episodes)
-
-    monkeypatch.setattr(verdicts, "run_baselines", record)
-    monkeypatch.setattr(verdicts, "_NUM_ENVS", 20)
-    monkeypatch.setattr(verdicts, "_sizes", lambda quick: (20, 40))
-    verdicts._baselines.cache_clear()
-    found = verdicts._judge_script(SCRIPTS["turns the wrong way"], quick=True)
-    verdicts._baselines.cache_clear()
-    assert found == {"kind": "poor", "certain": False, "is": "poor"}
-    assert len(random_states) == 2
-    assert random_states[0] != random_states[1]
-
-
-def test_each_policy_is_trained_and_judged_twice(monkeypatch, tmp_path):
-    called = []
-
-    def call(*args, statuses=(0,)):
-        called.append(args)
-        folder = Path(args[-1].removeprefix("hydra.run.dir="))
-        if args[0] == "verdict":
-            folder.mkdir(parents=True)
-            truth = "poor" if "seed=1" in args else "good"
-            (folder / "verdict.json").write_text(json.dumps({"kind": truth, "certain": True}))
-            assert set(statuses) == {0, 10, 11, 12, 13, 18}
-
-    monkeypatch.setattr(verdicts, "call", call)
-    monkeypatch.setattr(verdicts, "SCRIPTS", {})
-    found = verdicts.bench_verdicts(tmp_path, "cpu", quick=False)
-    assert found["verdicts"]["lr=0.007 seed=2"] == entry("good", True, "poor")
-    assert (found["verdicts_right"], found["verdicts_certain"]) == (0, 20)
-    judged = [args for args in called if args[0] == "verdict"]
-    assert [args[2] for args in judged[:2]] == ["episodes=400", "episodes=5000"]
-    assert judged[0][1] == judged[1][1] == "policy=good"
-    assert sum(args[0] == "train" for args in called) == 12
-    assert judged[-1][1] == f"policy={tmp_path / 'verdict_0.01_3' / 'checkpoints' / 'last.pt'}"
+    assert [figures[f"verdicts_{name}"] for name in ("right", "certain", "total")] == [1, 2, 3]

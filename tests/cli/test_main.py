@@ -99,7 +99,7 @@ def test_each_command_has_a_class_a_file_and_help(command):
     assert issubclass(settings, CommandSettings) and settings().paths.outputs == "outputs"
     assert f"\n  {command} " in USAGE
     assert (conf_dir() / f"{command.replace('-', '_')}.yaml").is_file()
-    assert TABLE[command].keys() == {"module", "class", "about", "settings", "examples", "next"}
+    assert TABLE[command].keys() == {"module", "about", "settings", "examples", "next"}
 
 
 @pytest.mark.parametrize("args", [["--help"], ["export", "--help"], ["policies", "most=0"]])
@@ -134,7 +134,7 @@ def test_a_full_disk_is_one_line_with_path_and_remedy(tmp_path, limit):
     assert "full" in line and "File too large" in line and "free some space" in line
 
 
-def test_a_demo_goes_on_with_the_policy_that_it_trained(monkeypatch):
+def test_a_demo_evaluates_the_policy_that_it_trained(monkeypatch):
     ran = []
 
     def note(name, command, overrides):

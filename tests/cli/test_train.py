@@ -130,15 +130,6 @@ def test_a_refused_resume_changes_nothing(run, in_process, tmp_path, wrong):
     assert contents(folder) == before
 
 
-def test_an_accepted_resume_notes_its_settings(run, in_process, tmp_path):
-    folder = shutil.copytree(run, tmp_path / "copy")
-    longer = "trainer.total_frames=500"
-    assert in_process("train", f"resume={folder}", longer, "logger=tensorboard").returncode == 0
-    assert list(folder.glob("tensorboard/events*"))
-    noted = read_overrides(folder)
-    assert longer in noted and "logger=tensorboard" in noted
-
-
 def test_a_refused_sweep_changes_nothing(in_process, tmp_path):
     (tmp_path / "s" / "0").mkdir(parents=True)
     (tmp_path / "s" / "0" / "run.yaml").write_text("")

@@ -1,7 +1,7 @@
 import pytest
 
 from drone_rl.config.commands import BODIES, MODES, BodiesSettings, ProvableSettings, ShiftSettings
-from drone_rl.trust.perturbations import Mode
+from drone_rl.trust.perturbations import PerturbationMode
 from drone_rl.utils.errors import InputError
 
 
@@ -27,7 +27,7 @@ def test_values_of_bodies_out_of_bounds(told, message):
 
 
 def test_modes_of_shifts():
-    assert [*MODES] == [mode.value for mode in Mode]
+    assert [*MODES] == [mode.value for mode in PerturbationMode]
     assert ShiftSettings().modes == MODES
 
 

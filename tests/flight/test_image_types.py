@@ -1,10 +1,19 @@
+import hashlib
 import math
 
 import pytest
 import torch
 
 from drone_rl.config import CameraSettings
-from drone_rl.flight.image_types import ImageRequest, ImageType, images, palette, pixels
+from drone_rl.flight.image_types import (
+    ImageRequest,
+    ImageType,
+    images,
+    palette,
+    pixels,
+    segmentation_ids,
+)
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state
@@ -91,15 +100,6 @@ def test_scene_images_equal_the_renderers(worlds):
     torch.testing.assert_close(reds, found[..., 0].float() / 255)
 
 
-@pytest.mark.parametrize("kind", list(ImageType))
-def test_all_types_have_the_same_shapes(worlds, kind):
-    found = image(worlds, worlds.state[:1], "1", kind, height=6, width=8)
-    assert (tuple(found.shape), found.dtype) == ((1, 6, 8, 3), torch.uint8)
-    found = image(worlds, worlds.state[:1], 1, int(kind), height=6, width=8, as_float=True)
-    assert (tuple(found.shape), found.dtype) == ((1, 6, 8), torch.float32)
-    assert found.isfinite().all()
-
-
 def test_ground_viewed_from_above(worlds):
     """The bottom camera is 0.9 m above ground; rays at 4 of 7.5 pixels are longer."""
     requests = [ImageRequest("bottom_center", kind, as_float=True) for kind in range(1, 5)]
@@ -142,8 +142,23 @@ def test_invalid_requests_raise(worlds):
         images(worlds, worlds.state, [])
 
 
-def test_default_request():
-    request = ImageRequest()
-    assert (request.camera, request.image_type) == ("front_center", ImageType.SCENE)
-    assert request.as_float is False
-    assert [kind.value for kind in ImageType] == list(range(7))
+FIRST = [[0, 0, 0], [153, 108, 6], [112, 105, 191], [89, 121, 72], [190, 225, 64], [206, 190, 59]]
+
+
+def test_palette_is_airsims():
+    colors = palette()
+    assert (tuple(colors.shape), colors.dtype) == ((256, 3), torch.uint8)
+    assert colors[:6].tolist() == FIRST
+    assert colors[255].tolist() == [255, 255, 255]
+    digest = hashlib.sha256(bytes(colors.flatten().tolist())).hexdigest()
+    assert digest == "b7217dcebb91d590f6174c4ee7395e3fab3e7edde839d004789fd146a1f5de5e"
+
+
+def test_ids_follow_from_names():
+    """G, r, o, u, n, d: 103 + 114 + 111 + 117 + 110 + 100 = 655; 660 - 512 = 148."""
+    scene = Worlds(1).scene
+    ids = segmentation_ids(scene)
+    assert len(ids) == scene.model.ngeom + 1 and ids[-1] == 0  # of the sky
+    grounds = scene.geoms(SemanticClass.GROUND)
+    assert ids[grounds].tolist() == [148] * len(grounds)
+    assert len(set(ids[scene.geoms(SemanticClass.TARGET)].tolist())) == 1

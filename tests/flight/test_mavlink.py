@@ -1,8 +1,9 @@
 """The bridge against an autopilot of a thread, over a pseudo-terminal and over TCP."""
 
+import math
 import os
 import pty
-import sys
+import socket
 import time
 
 import numpy as np
@@ -12,7 +13,17 @@ from drone_rl.config import DynamicsSettings
 from drone_rl.flight.in_the_loop.control import AT_REST
 from drone_rl.flight.in_the_loop.drone import DroneInTheLoop, FlightControllerError
 from drone_rl.flight.in_the_loop.instruments import Readings
-from drone_rl.flight.mavlink import Link, MavlinkBridge, SerialLink, TcpLink
+from drone_rl.flight.mavlink import (
+    FIELD,
+    Link,
+    MavlinkBridge,
+    SerialLink,
+    TcpLink,
+    gps_fields,
+    rotor_outputs,
+    sensor_fields,
+)
+from drone_rl.sim.coordinates import GeoPoint
 from drone_rl.utils.errors import InputError
 from tests.flight.simple_body import SimpleBody
 
@@ -143,9 +154,123 @@ def test_noise_is_no_message(stubs):
     os.close(far)
 
 
-def test_without_the_extra(monkeypatch):
-    monkeypatch.setitem(sys.modules, "pymavlink.dialects.v20.common", None)
-    link = TcpLink(0)
-    with pytest.raises(InputError, match=r"pip install -e '\.\[hil\]'"):
-        MavlinkBridge(link)
+@pytest.fixture
+def terminal():
+    far, near = pty.openpty()
+    yield far, os.ttyname(near)
+    for number in (far, near):
+        try:
+            os.close(number)
+        except OSError:
+            continue
+
+
+def test_serial_links_change_no_byte(terminal):
+    far, name = terminal
+    link = SerialLink(name)
+    assert link.patience == 1.0
+    every = bytes(range(256))
+    link.write(every)
+    assert os.read(far, 1024) == every
+    os.write(far, every)
+    assert link.read(5.0) == every
+    assert link.read(0.0) == b""
     link.close()
+
+
+def test_a_serial_link_that_is_full(terminal):
+    far, name = terminal
+    link = SerialLink(name, patience=0.1)
+    with pytest.raises(FlightControllerError, match="accepts no more bytes"):
+        link.write(b"x" * 1_000_000)
+    link.close()
+    assert os.read(far, 1)
+
+
+def test_serial_ports_that_are_none(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="doesn't exist"):
+        SerialLink(str(tmp_path / "none"))
+    with pytest.raises(InputError, match="is no serial port"):
+        SerialLink(str(tmp_path / "file"))
+    with pytest.raises(InputError, match="baud=12345 is no serial speed"):
+        SerialLink(str(tmp_path / "file"), baud=12345)
+    with pytest.raises(InputError, match="baud=0 is no serial speed"):
+        SerialLink(str(tmp_path / "file"), baud=0)
+    with pytest.raises(InputError, match="can't be opened"):
+        SerialLink(str(tmp_path))
+
+
+def test_tcp_links():
+    link = TcpLink(0)
+    with pytest.raises(FlightControllerError, match="call accept first"):
+        link.read(0.0)
+    with pytest.raises(
+        FlightControllerError, match=r"no autopilot connected to port \d+ in 0.01 s"
+    ):
+        link.accept(0.01)
+    with pytest.raises(FlightControllerError, match="no autopilot connected"):
+        link.accept(0.0)
+    with socket.create_connection(("127.0.0.1", link.port)) as far:
+        link.accept(5.0)
+        link.write(b"abc")
+        assert far.recv(16) == b"abc"
+        assert link.read(0.0) == b""
+        far.sendall(b"def")
+        assert link.read(5.0) == b"def"
+    with pytest.raises(FlightControllerError, match="the autopilot is gone"):
+        link.read(5.0)
+    link.close()
+
+
+HALF = math.sqrt(0.5)
+READINGS = Readings(
+    time=1.25,
+    position=np.array([0.0, 0.0, 2.5]),
+    velocity=np.array([3.0, -4.0, 0.5]),  # 3 m/s north, 4 east, half up
+    attitude=np.array([1.0, 0.0, 0.0, 0.0]),
+    rates=np.array([0.1, 0.2, 0.3]),
+    force=np.array([1.0, 2.0, 9.0]),
+    home=GeoPoint(48.0, 11.0, 100.0),
+)
+
+
+def test_what_is_sensed_is_forward_right_down():
+    fields = sensor_fields(READINGS)
+    assert [fields[f"{a}acc"] for a in "xyz"] == [1.0, -2.0, -9.0]
+    assert [fields[f"{a}gyro"] for a in "xyz"] == [0.1, -0.2, -0.3]
+    assert fields["time_usec"] == 1_250_000
+    assert fields["pressure_alt"] == 102.5
+    assert fields["abs_pressure"] == pytest.approx(1000.99, abs=0.05)
+
+
+def test_the_field_turns_against_the_drone():
+    assert [sensor_fields(READINGS)[f"{a}mag"] for a in "xyz"] == pytest.approx(FIELD)
+    west = Readings(**{**vars(READINGS), "attitude": np.array([HALF, 0.0, 0.0, HALF])})
+    fields = sensor_fields(west)  # north is on its right, and what was east is behind it
+    assert [fields[f"{a}mag"] for a in "xyz"] == pytest.approx([-FIELD[1], FIELD[0], FIELD[2]])
+
+
+def test_gps():
+    fields = gps_fields(READINGS)
+    assert (fields["lat"], fields["lon"], fields["alt"]) == (480_000_000, 110_000_000, 102_500)
+    assert (fields["vn"], fields["ve"], fields["vd"]) == (300, 400, -50)
+    assert fields["vel"] == 500
+    assert fields["cog"] == 5313  # atan2(4, 3)
+
+
+def test_speeds_that_no_field_holds_are_the_greatest_that_do():
+    fast = Readings(**{**vars(READINGS), "velocity": np.array([1e4, 1e4, 1e4])})
+    fields = gps_fields(fast)
+    assert (fields["vn"], fields["ve"], fields["vd"], fields["vel"]) == (
+        32767,
+        -32768,
+        -32768,
+        65534,
+    )
+
+
+def test_rotors():
+    controls = [0.1, 2.0, -1.0, math.nan, *[0.5] * 12]
+    assert rotor_outputs(controls, 128).tolist() == [0.1, 1.0, 0.0, 0.0]
+    assert rotor_outputs(controls, 0).tolist() == [0.0] * 4

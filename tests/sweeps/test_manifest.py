@@ -21,7 +21,7 @@ def begin(folder, runs, **settings):
     return open_sweep(folder, ["drone-rl", "train", "-m", "a=1,2"], settings, runs)
 
 
-def test_what_is_written_is_read_again(tmp_path, make_runs):
+def test_a_manifest_is_read_as_written(tmp_path, make_runs):
     runs = make_runs("a=1", "a=2")
     begin(tmp_path, runs, seed=0)
     sweep = read_sweep(tmp_path)

@@ -94,7 +94,7 @@ def test_the_latest_is_the_newest(tmp_path):
     assert find_sweep(sweeps[0]).folder == sweeps[0]
 
 
-def test_there_is_none(tmp_path):
+def test_no_sweep(tmp_path):
     with pytest.raises(InputError, match="drone-rl train -m first"):
         find_sweep("latest", tmp_path)
 
@@ -120,8 +120,9 @@ def test_the_sentences_in_order():
     ]
 
 
-def test_a_report_needs_no_torch():
-    code = "import sys, drone_rl.sweeps.report; assert 'torch' not in sys.modules"
+def test_a_report_and_the_plugins_of_hydra_need_no_torch():
+    modules = "drone_rl.sweeps.report, drone_rl.cli.train, hydra_plugins.drone_rl"
+    code = f"import sys, {modules}; assert 'torch' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 

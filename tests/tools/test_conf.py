@@ -6,7 +6,7 @@ import yaml
 
 from drone_rl.utils.schema import Real
 from drone_rl.utils.settings import Settings
-from tools.conf import describe, generated_files, main, make_text
+from tools.conf import describe, main, make_text
 
 
 def test_the_generated_files_are_current(capsys):
@@ -57,10 +57,3 @@ def test_a_stale_file_is_reported_and_rewritten(tmp_path, monkeypatch):
     assert main(["--check"]) == 1 and "old" in path.read_text()
     assert main([]) == 0 and "old" not in path.read_text()
     assert main(["--check"]) == 0
-
-
-def test_every_group_has_generated_files():
-    from drone_rl.utils.settings import conf_dir
-
-    groups = {path.parent.name for path, _ in generated_files(conf_dir())}
-    assert {"task", "camera", "network", "returns", "objective", "trainer"} <= groups

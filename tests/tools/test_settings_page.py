@@ -7,17 +7,10 @@ import pytest
 from drone_rl.cli.hydra.composition import GROUPS, PARTS, SEVERAL
 from drone_rl.cli.main import COMMANDS, find_command
 from drone_rl.config import DynamicsSettings
-from drone_rl.config.networks import SmallCnn
-from drone_rl.config.transforms import Crop
 from drone_rl.utils.schema import OneOf, Real, Several, Whole
 from drone_rl.utils.settings import Settings, kinds_of
-from tools.readme.__main__ import ROOT
 from tools.readme.settings import (
-    first_comment,
-    list_choices,
     list_commands,
-    list_parts,
-    list_presets,
     make_table,
     meanings,
 )
@@ -88,14 +81,6 @@ def test_every_setting_has_a_meaning_and_seconds_a_suffix(cls):
         assert (unit == "s") == name.endswith("_s") or is_physics, name
 
 
-def test_variants_are_listed_below_their_parts():
-    text = list_parts()
-    network = text.partition("### network")[2].partition("### ")[0]
-    assert "**`small_cnn`** Network for small images" in network
-    assert make_table(SmallCnn, "network.") in network
-    assert make_table(Crop, "transforms.crop.") in text  # transforms can be repeated
-
-
 def test_commands_link_to_their_groups():
     train = list_commands().partition("### drone-rl train")[2].partition("### ")[0]
     assert "| `camera` | [camera](#camera) |  |  |" in train
@@ -103,37 +88,3 @@ def test_commands_link_to_their_groups():
         "| `transforms` | [transforms](#transforms) |  | `gray`, `resize`, `standardize`" in train
     )
     assert "changes to the policy's [task](#task)" in list_commands()
-
-
-def test_choices_are_the_files_of_a_group(tmp_path):
-    for path in (
-        "train.yaml",
-        "task/b.yaml",
-        "task/a.yaml",
-        "hydra/x.yaml",
-        "hydra/sweeper/c.yaml",
-    ):
-        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / path).touch()
-    assert list_choices(tmp_path).splitlines()[2:] == [
-        *("| `hydra/sweeper` | `c` |", "| `task` | `a`, `b` |")
-    ]
-    assert "| `camera` | `frame`, `large`, `medium`, `small`, `tiny` |" in list_choices(
-        ROOT / "conf"
-    )
-
-
-def test_presets_are_described_by_their_first_comment(tmp_path):
-    for group in ("experiment", "sweep"):
-        (tmp_path / group).mkdir()
-    file = tmp_path / "experiment" / "deep.yaml"
-    file.write_text(
-        "# @package _global_\n# drone-rl train experiment=deep: far\n# down.\nx: 1\n# y\n"
-    )
-    assert first_comment(file) == "drone-rl train experiment=deep: far down."
-    assert list_presets(tmp_path).splitlines()[2:] == [
-        "| `drone-rl train experiment=deep` | far down. |"
-    ]
-    assert len(list_presets(ROOT / "conf").splitlines()) == 2 + sum(
-        len(list((ROOT / "conf" / group).glob("*.yaml"))) for group in ("experiment", "sweep")
-    )

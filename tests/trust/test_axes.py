@@ -9,7 +9,6 @@ from drone_rl.config import BaseTaskSettings, PillarsSettings
 from drone_rl.sim.rendering.appearance import Appearance
 from drone_rl.trust.axes import AXES, FACTORS, GROUPS, INVERSE, LINEAR, Axis, check_axes, find_axes
 from drone_rl.trust.perturbations import Condition
-from drone_rl.trust.shifts_text import NAMES
 from drone_rl.utils.errors import InputError
 from tests.trust.subjects import subject
 
@@ -24,10 +23,6 @@ def test_strengths_increase(axis):
             a for a, s in zip(away, axis.strengths, strict=True) if side * axis.position(s) > 0
         ]
         assert one_way == sorted(one_way)
-
-
-def test_every_axis_has_a_label():
-    assert set(NAMES) == set(AXES)
 
 
 def test_values_are_in_units_of_the_task():

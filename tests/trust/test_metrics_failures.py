@@ -110,20 +110,6 @@ def test_failures_of_another_task():
     assert table["largest"]["by"] == "side"  # of the ends, time is what is expected
 
 
-def test_expected_end_is_the_largest_without_other_classes():
-    """Both episodes end before the post that they miss comes up, so that it has no side."""
-    goals = Goals(
-        reached=torch.tensor([[True, False], [True, False]]),
-        stratum=torch.tensor([[0, -1], [1, -1]]),
-        world=torch.zeros(2, 1),
-    )
-    ends = torch.tensor([End.TIME, End.TIME])
-    largest = failure_table(CompleteEpisodes(Posts(), goals, ends, torch.tensor([12, 12])))[
-        "largest"
-    ]
-    assert (largest["by"], largest["value"], largest["failed"]) == ("end", "time", 2)
-
-
 def test_all_goals_without_success_is_a_failure():
     goals = Goals(
         reached=torch.ones(2, 2, dtype=torch.bool),

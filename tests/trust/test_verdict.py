@@ -7,20 +7,25 @@ import torch
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import drone_rl
 from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.policies.baselines import constant_policy, oracle_policy
+from drone_rl.policies.policy import Policy
 from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.trust.rounding_sensitivity import Rounding
 from drone_rl.trust.rule import Rule, VerdictKind
-from drone_rl.trust.verdict import apply_rule, judge_policy, measure, observe
+from drone_rl.trust.verdict import apply_rule, judge_for_selection, judge_policy, measure, observe
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds, proportion
+from drone_rl.utils.progress import silent
+from drone_rl.utils.seeding import Stream
 from tests.fake_flight import floating
 from tests.second_task import Posts
+from tests.training.test_train import TINY
 
 LEFT, AHEAD, RIGHT = Side
 SHARED = HealthCheck.function_scoped_fixture
@@ -311,3 +316,27 @@ def test_unusable_vocabulary_is_refused(monkeypatch):
     env = DroneEnv(2, Wordy(), pixels=False)
     with pytest.raises(InputError, match=r"terms\.tested="):
         judge_policy(env, constant_policy(Move.LEFT), 2)
+
+
+@pytest.fixture
+def trained(tmp_path):
+    """The folder of a training that was not judged."""
+    return drone_rl.train(TINY, folder=tmp_path / "run", progress=silent).folder
+
+
+def test_selection_has_its_own_environments(trained, monkeypatch):
+    asked = {}
+
+    def note(self, num_envs, **kwargs):
+        asked.update(kwargs, num_envs=num_envs)
+        raise InputError("enough")
+
+    monkeypatch.setattr(Policy, "make_env", note)
+    with pytest.raises(InputError, match="enough"):
+        judge_for_selection(trained / "checkpoints" / "last.pt", 5, "cpu", "mujoco_warp")
+    where = {"device": "cpu", "renderer": "mujoco_warp"}
+    seed = asked.pop("seed")
+    assert asked == {"stream": Stream.CHOICE, "num_envs": 5, **where}
+    with pytest.raises(InputError, match="enough"):
+        judge_for_selection(trained / "checkpoints" / "last.pt", 5, "cpu")
+    assert asked["seed"] != seed, "both are fresh"

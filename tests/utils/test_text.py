@@ -1,6 +1,6 @@
 import pytest
-from drone_rl.evaluation.evaluate import EVALUATION
 
+from drone_rl.trust.evaluate import EVALUATION
 from drone_rl.utils.text import (
     CHECK,
     Sentence,

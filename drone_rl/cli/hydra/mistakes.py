@@ -240,17 +240,19 @@ class CommandLine:
         name, _, value = text.partition("=")
         exists = name.lstrip("+") in self.keys
         yield f"{name}.{value}" if "=" in value else text
-        for meant in [name.lstrip("+")] if exists else similar(name, self.keys):
+        names = [name.lstrip("+")] if exists else [*similar(name, self.keys)]
+        for meant in names:
             if "=" in meant:
                 yield meant
                 continue
-            offered = choices(self.conf, meant) if meant in self.groups else ()
+            is_choice = meant in self.groups and "," not in value
+            offered = choices(self.conf, meant) if is_choice else ()
             for variant in (*_variants(value), *difflib.get_close_matches(value, offered, 1)):
                 yield f"{meant}={variant}"
             if self._parsed(text) is None:
                 yield f"{meant}={quoted(value)}"
-            if not exists:
-                yield f"{meant}={_ANY}"
+        if not exists:
+            yield from (f"{meant}={_ANY}" for meant in names)
 
     def _choice_with(self, key: str) -> str | None:
         """Return the first other choice of a group whose file has a setting, as an override."""
@@ -278,8 +280,8 @@ def similar(name: str, keys: Collection[str]) -> Iterator[str]:
     if word in keys:
         yield word
     yield from alike(word)
-    yield from alike(last)
     yield from (key for key in keys if group and key.startswith(word))
+    yield from alike(last)
     yield from difflib.get_close_matches(word, [k for k in keys if k not in group], 1, 0.8)
     for part in difflib.get_close_matches(last, [*by_last, *OTHER_NAMES["settings"]], 1, 0.8):
         yield from alike(part)

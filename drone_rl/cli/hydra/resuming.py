@@ -10,26 +10,10 @@ import yaml
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import OmegaConf
 
-import drone_rl
 from drone_rl.sweeps.manifest import is_sweep, quoted, sweep_name
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import last_of, refuse_links, trained_policies, write_atomically
 from drone_rl.utils.overrides import must_be_typed, taken_over
-
-_SHIPPED = Path(drone_rl.__file__).parent / "policies" / "zoo"
-"""Folder of the shipped policies, whose package imports torch."""
-
-
-def refuse_policies(overrides: Sequence[str]) -> None:
-    """Raise an `InputError` for `policy=` with an existing policy, which other commands take."""
-    shipped = {path.stem for path in _SHIPPED.glob("*.safetensors")}
-    for value in (o.removeprefix("policy=") for o in overrides if o.startswith("policy=")):
-        if value in ("latest", *shipped) or "/" in value:
-            raise InputError(
-                f"policy={value}: drone-rl train makes a new policy; resume=RUN continues the run "
-                "of one, and network=NAME chooses its network"
-            )
-
 
 _FOLDER = "hydra.sweep.dir=${paths.outputs}/${hydra.job.config_name}/multiruns/"
 _NO_EARLY_FILES = ("hydra.output_subdir=null", "++hydra.job_logging.handlers.file.delay=true")
@@ -42,35 +26,32 @@ def complete(overrides: Sequence[str]) -> list[str]:
     """Add the folder of a sweep, or the folder and settings of a resumed run, to a command line.
 
     Raises:
-        InputError: There is no run to resume, `policy=` names a policy, or the run has a setting
-            that may not come from a file.
+        InputError: There is no run to resume, or it has a setting that may not come from a file.
     """
-    typed = [*overrides]
-    refuse_policies(typed)
-    folders = [o.split("=", 1)[1] for o in typed if o.startswith("resume=")]
-    if is_sweep(typed) and folders:
+    folders = [o.split("=", 1)[1] for o in overrides if o.startswith("resume=")]
+    if is_sweep(overrides) and folders:
         raise InputError(
             "resume= continues one run, not with -m; to continue a sweep, repeat its command"
         )
-    if is_sweep(typed):
-        is_named = any(o.startswith("hydra.sweep.dir=") for o in typed)
-        return typed if is_named else [*typed, _FOLDER + sweep_name(typed)]
+    if is_sweep(overrides):
+        is_named = any(o.startswith("hydra.sweep.dir=") for o in overrides)
+        return [*overrides] if is_named else [*overrides, _FOLDER + sweep_name(overrides)]
     if not folders or folders[-1] in ("", "null"):
-        return typed
-    if any(o.startswith("hydra.run.dir=") for o in typed):
-        return [*typed, *_NO_EARLY_FILES]  # a sweep's command line has all settings
+        return [*overrides]
+    if any(o.startswith("hydra.run.dir=") for o in overrides):
+        return [*overrides, *_NO_EARLY_FILES]  # a sweep's command line has all settings
     folder = Path(_unquoted(folders[-1]))
     if folders[-1] == "latest":
-        folder = _newest_run(_outputs(typed))
+        folder = _newest_run(_outputs(overrides))
     if not _is_run(folder):
         above = next(filter(_is_run, folder.parents), None)
         remedy = "the folder of a run" if above is None else f"its folder, {_resume(above)}"
         raise InputError(f"resume={folder} has no checkpoints/last.pt; give {remedy}")
     refuse_links(folder)
-    kept = taken_over(folder, typed)
-    plain = [_resume(folder) if o.startswith("resume=") else o for o in typed]
-    own = ["hydra.mode=RUN", f"hydra.run.dir={quoted(str(folder))}", *_NO_EARLY_FILES]
-    return [*kept, *plain, *own]
+    kept = taken_over(folder, overrides)
+    plain = [_resume(folder) if o.startswith("resume=") else o for o in overrides]
+    place = ["hydra.mode=RUN", f"hydra.run.dir={quoted(str(folder))}", *_NO_EARLY_FILES]
+    return [*kept, *plain, *place]
 
 
 def spare_run(overrides: Sequence[str]) -> list[str]:
@@ -78,8 +59,8 @@ def spare_run(overrides: Sequence[str]) -> list[str]:
 
     `resume=` and model cards read them; those of another command, or a refused one, are not its.
     """
-    given = [o.partition("=")[2] for o in overrides if o.startswith("hydra.run.dir=")]
-    is_run = bool(given) and _is_run(Path(_unquoted(given[-1])))
+    folders = [o.partition("=")[2] for o in overrides if o.startswith("hydra.run.dir=")]
+    is_run = bool(folders) and _is_run(Path(_unquoted(folders[-1])))
     is_kept = not is_run or _NO_EARLY_FILES[0] in overrides
     return [*overrides] if is_kept else [*overrides, _NO_EARLY_FILES[0]]
 

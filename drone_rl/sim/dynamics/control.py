@@ -11,6 +11,9 @@ from drone_rl.sim.actions import DIRECTIONS, MOVES
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.dynamics.state import FlightState
 
+X, Y, HEADING, Z = range(4)
+"""Axes of `Goals`; the first two are roll and pitch if their mode is an angle or a rate."""
+
 
 class Mode(enum.IntEnum):
     """Quantity that an axis's goal sets; the controllers below it in the cascade set the rest."""
@@ -53,7 +56,7 @@ class Goals:
     def reference_after(self, seconds: float, body: FlightState) -> Tensor:
         """Return `FlightState.reference` after `seconds` of a command; `body` has the drones."""
         has_target = [mode is Mode.POSITION for mode in self.modes]
-        has_target[2] = self.modes[2] is Mode.ANGLE
+        has_target[HEADING] = self.modes[HEADING] is Mode.ANGLE
         target = self.values + seconds * self.drifts
         return torch.where(torch.tensor(has_target), target, body.settled().reference)
 

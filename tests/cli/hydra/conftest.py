@@ -48,8 +48,8 @@ def settings(config):
     """The settings of a command, without loggers, whose folder only a run knows."""
     known = commands()
 
-    def read(name, *told):
+    def read(name, *words):
         without = ["logger=csv"] if name == "train" else []
-        return read_settings(known[name], config(name, [*without, *told]))
+        return read_settings(known[name], config(name, [*without, *words]))
 
     return read

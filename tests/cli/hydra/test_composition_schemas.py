@@ -2,7 +2,6 @@
 
 import dataclasses
 import itertools
-import re
 import typing
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from drone_rl.config import DynamicsSettings, PillarsSettings, TaskSettings
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.zoo import describe
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.settings import kinds_of, snake_case, types_of
+from drone_rl.utils.settings import kinds_of, types_of
 from tests.cli.hydra.conftest import commands
 
 CONF = Path(__file__).parents[3] / "conf"
@@ -57,14 +56,6 @@ def test_every_setting_of_a_command_is_typed(command, config):
 
 
 PARTS = {**composition.PARTS, **composition.SEVERAL}
-
-
-@pytest.mark.parametrize("part", PARTS.values(), ids=lambda part: part.__name__)
-def test_every_variant_has_a_file(part):
-    text = "".join(path.read_text() for path in CONF.rglob("*.yaml"))
-    for variant in part.variants():
-        name = snake_case(variant)
-        assert re.search(rf"\bbase_{name}\b", text) or f": {name}" in text, name
 
 
 def together(*groups):

@@ -7,7 +7,6 @@ import threading
 
 import pytest
 from hydra.core.hydra_config import HydraConfig
-from hydra.errors import HydraException
 
 from drone_rl.cli.hydra.messages import file_error, guarded, is_output_closed, one_line
 from drone_rl.utils.errors import InputError
@@ -18,11 +17,6 @@ def raised(error, cause=None):
         raise error from cause
     except type(error) as caught:
         return caught
-
-
-def test_an_input_error_has_precedence():
-    ours = InputError("seed=-1 is out of range; give 0 or more")
-    assert one_line(raised(HydraException("Error in\ncall"), ours)) == str(ours)
 
 
 def test_control_characters_are_removed():

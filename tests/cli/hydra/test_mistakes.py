@@ -50,6 +50,8 @@ def message(line):
         ("train task.max_steps=9", "task.step_limit=9"),
         ("train max_iterations=10", "trainer.total_frames=VALUE"),
         ("train hydra.run.dri=x", "hydra.run.dir=x"),
+        ("train policy=mlp", "network=mlp"),
+        ("train policy=runs/a", "resume=runs/a"),
         ("train +seed=1", "seed=1"),
         # settings of another choice
         ("train objective.epochs=3", "objective=ppo objective.epochs=3"),

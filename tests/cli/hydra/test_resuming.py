@@ -14,7 +14,6 @@ from drone_rl.cli.hydra.resuming import (
     check_folder,
     complete,
     note_settings,
-    refuse_policies,
     resume_command,
 )
 from drone_rl.utils.errors import InputError
@@ -27,27 +26,27 @@ def run(tmp_path):
     (tmp_path / "checkpoints").mkdir()
     (tmp_path / "checkpoints" / "last.pt").write_bytes(b"")
     (tmp_path / ".hydra").mkdir()
-    told = ["network=mlp", "network.hidden=[8]", "seed=3"]
-    (tmp_path / ".hydra" / "overrides.yaml").write_text(yaml.safe_dump(told))
+    words = ["network=mlp", "network.hidden=[8]", "seed=3"]
+    (tmp_path / ".hydra" / "overrides.yaml").write_text(yaml.safe_dump(words))
     return tmp_path
 
 
-def test_one_training_is_left_as_it_is():
+def test_a_single_run_is_unchanged():
     assert complete(["seed=1", "network=mlp"]) == ["seed=1", "network=mlp"]
 
 
-def test_a_run_that_goes_on_takes_over_its_settings(run):
-    told = [f"resume={run}", "seed=3"]
-    assert complete(told) == [
+def test_a_resumed_run_takes_its_recorded_settings(run):
+    words = [f"resume={run}", "seed=3"]
+    assert complete(words) == [
         *("network=mlp", "network.hidden=[8]"),
-        *told,
+        *words,
         *("hydra.mode=RUN", f"hydra.run.dir='{run}'"),
         *("hydra.output_subdir=null", "++hydra.job_logging.handlers.file.delay=true"),
     ]
 
 
 @pytest.mark.parametrize("again", ["network=small_cnn"])
-def test_what_is_told_anew_is_not_taken_over(run, again):
+def test_typed_settings_replace_recorded_ones(run, again):
     found = complete([f"resume={run}", again])
     assert "network=mlp" not in found
     assert "network=small_cnn" in found
@@ -85,7 +84,7 @@ def test_a_folder_whose_name_hydra_would_parse_is_quoted(run):
     assert str(parsed) == str(odd)
 
 
-def test_a_run_goes_on_in_its_own_folder(tmp_path, monkeypatch):
+def test_a_run_is_resumed_in_its_own_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     check_folder("run", tmp_path / "run")
     with pytest.raises(InputError, match=r"hydra.run.dir=.*other differs; omit"):
@@ -101,10 +100,10 @@ def typed(monkeypatch):
 
 
 def test_settings_are_noted_as_hydra_would(run, typed):
-    told = ["resume=x", "task.cube_color=[0.1, 0.2]", "seed=3", "experiment=smoke"]
-    typed.extend(told)
+    words = ["resume=x", "task.cube_color=[0.1, 0.2]", "seed=3", "experiment=smoke"]
+    typed.extend(words)
     note_settings(run)
-    assert read_overrides(run) == told
+    assert read_overrides(run) == words
 
 
 def test_the_command_to_resume_repeats_what_no_file_may_set(typed, tmp_path):
@@ -114,18 +113,12 @@ def test_the_command_to_resume_repeats_what_no_file_may_set(typed, tmp_path):
     assert words == ["drone-rl", "train", folder, "logger.tensorboard.log_dir=/a b"]
 
 
-def test_no_run_to_go_on_with(tmp_path):
+def test_resume_without_a_run(tmp_path):
     with pytest.raises(InputError, match="folder of a run"):
         complete([f"resume={tmp_path}"])
 
 
-def test_a_path_in_a_run_is_answered_with_the_run(run):
+def test_a_path_in_a_run_suggests_the_run(run):
     for path in ("checkpoints", "checkpoints/last.pt", "checkpoints/policy.safetensors"):
         with pytest.raises(InputError, match=f"; give its folder, resume={run}$"):
             complete([f"resume={run}/{path}"])
-
-
-@pytest.mark.parametrize("value", ["good", "latest", "outputs/train/runs/x"])
-def test_a_trained_policy_is_no_setting_of_a_training(value):
-    with pytest.raises(InputError, match=f"policy={value}: .*resume=RUN .*network=NAME"):
-        refuse_policies([f"policy={value}"])

@@ -114,15 +114,6 @@ def test_a_slow_reader_delays_itself_alone(start):
     slow.close()
 
 
-def test_a_slow_writer_delays_itself_alone(start):
-    server, client = start(CV)
-    with socket.create_connection(server.address, timeout=10) as slow:
-        for byte in PING:
-            slow.sendall(bytes([byte]))
-            assert client.call("ping") is True
-        assert slow.recv(100) == PONG
-
-
 def test_a_second_request_comes_at_once(start):
     """Without `TCP_QUICKACK` the client's system would hold it back for some 40 ms."""
     _, client = start(patience_s=0.1)
@@ -160,10 +151,3 @@ def test_closing_answers_requests_that_have_not_had_their_turn():
     (answer,) = (msgpack.unpackb(call.args[0]) for call in transport.write.call_args_list)
     assert answer == [1, 0, "the server has stopped; connect again", None]
     transport.close.assert_called_once()
-
-
-def test_a_request_that_is_too_long_is_named_as_such(caplog):
-    connection = Connection(MagicMock())
-    connection.connection_made(MagicMock())
-    connection.data_received(b"\xc6" + (2**31 - 1).to_bytes(4, "big") + bytes(MAX_MESSAGE))
-    assert f"a request has more than {MAX_MESSAGE} bytes" in caplog.text

@@ -6,7 +6,7 @@ import time
 import msgpack
 import pytest
 
-from drone_rl.flight.airsim.lockstep import MOST_REQUESTS, STEP, STRIDE
+from drone_rl.flight.airsim.lockstep import MOST_REQUESTS, STEP
 from tests.flight.airsim.conftest import YAW, Client
 
 IMAGE = {"camera_name": "0", "image_type": 0, "pixels_as_float": False, "compress": False}
@@ -165,7 +165,3 @@ def test_two_vehicles_are_answered_one_after_the_other(start):
     seconds = [states[i]["timestamp"] / 1e9 - start_of_2024 for i in (1, 3, 5)]
     assert seconds == pytest.approx([1.0, 1.2, 1.5], abs=0.05)
     assert msgpack.packb(fly()) == msgpack.packb(states)
-
-
-def test_stride_is_longer_than_usual_movements():
-    assert STRIDE >= 10.0

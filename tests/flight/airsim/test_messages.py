@@ -1,12 +1,15 @@
 """Values on the wire: keys in order, frames by hand, and what is refused."""
 
 import math
+import time
 
 import pytest
 import torch
 
 from drone_rl.flight.airsim import messages
-from drone_rl.flight.airsim.messages import Pose
+from drone_rl.flight.airsim.calls import Calls, remark
+from drone_rl.flight.airsim.messages import MAX_NAME, Pose
+from drone_rl.flight.airsim.patterns import matching
 from drone_rl.utils.errors import InputError
 from tests.flight.airsim.conftest import pose
 
@@ -101,3 +104,61 @@ def test_yaw_modes():
     assert held[0] == "forward_only" and not held[1].is_rate
     turned = messages.read_yaw_mode({"is_rate": False, "yaw_or_rate": 270.0}, 0)
     assert turned[1].yaw_or_rate == -90.0
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        "(a+)+b",
+        "(a|aa)*b",
+        "a?a?a?a?a?a",
+        "(a*){9}",
+        ".*.*.*.*b",
+        "(.*|b)(.*|c)(.*|d)(.*|e)",
+        "(?:a*)+",
+    ],
+)
+def test_searches_that_could_take_forever_are_refused(pattern):
+    with pytest.raises(InputError, match="repeats too much; give at most 3"):
+        matching(pattern, ["a" * 100])
+
+
+def test_the_slowest_search_that_is_allowed_ends():
+    begin = time.monotonic()
+    assert matching(".*.*.*b", ["a" * MAX_NAME] * 20) == []
+    assert time.monotonic() - begin < 5.0
+
+
+def test_calls_are_counted_and_remarks_are_logged_once(caplog):
+    calls = Calls()
+    for _ in range(3):
+        with calls.call("me", "simSetWeatherParameter"):
+            remark("no snow")
+    with calls.call("me", "ping"):
+        pass
+    assert str(calls).splitlines() == [
+        "4 calls: simSetWeatherParameter 3, ping 1",
+        "without effect, or with a part of it:",
+        "  3 x simSetWeatherParameter: no snow",
+    ]
+    assert [record.getMessage() for record in caplog.records] == [
+        "me: simSetWeatherParameter: no snow"
+    ]
+
+
+def test_a_remark_outside_of_a_call_is_no_error():
+    remark("nobody asks")
+    assert str(Calls()) == "0 calls"
+
+
+def test_clients_write_no_lines_of_their_own(caplog):
+    calls = Calls()
+    with calls.call("me", "evil\n\x1b[31m"):
+        remark("a\r\nb\u2028\ud800")
+    expected = r"evil\n\x1b[31m: a\r\nb\u2028\ud800"
+    assert [record.getMessage() for record in caplog.records] == [f"me: {expected}"]
+    assert str(calls).splitlines() == [
+        r"1 calls: evil\n\x1b[31m 1",
+        "without effect, or with a part of it:",
+        f"  1 x {expected}",
+    ]

@@ -29,24 +29,6 @@ def test_a_port_in_use_is_one_error():
         serve(scene="empty", port=server.address[1])
 
 
-def test_wrong_settings_are_refused(tmp_path):
-    for given, message in (
-        ({"clock": "fast"}, "clock='fast' is unknown"),
-        ({"port": 70000}, "port=70000 is out of range"),
-        ({"seed": -1}, "seed=-1 is out of range"),
-        ({"scene": "moon"}, "scene=moon is unknown"),
-        ({"settings": tmp_path / "none.json"}, "can't be read"),
-    ):
-        with pytest.raises(InputError, match=message):
-            serve(**given)
-
-
-def test_a_wrong_patience_is_refused_before_a_renderer_is_made(monkeypatch):
-    monkeypatch.setattr("drone_rl.flight.airsim.serving.make_simulation", None)
-    with pytest.raises(InputError, match="patience_s=-1"):
-        serve(patience_s=-1)
-
-
 def test_a_server_whose_thread_has_ended_closes_its_simulation(monkeypatch):
     closed = []
     monkeypatch.setattr(Simulation, "close", lambda self: closed.append(self))

@@ -84,13 +84,3 @@ def test_ports_that_are_taken_are_named():
             check_ports()
         with pytest.raises(InputError, match="port 9003 is taken"):
             FirmwareProcess(isolated=False)
-
-
-def test_a_shared_network_is_warned_of(caplog):
-    try:
-        check_ports()
-    except InputError:
-        pytest.skip("ports are in use")
-    with FirmwareProcess(isolated=False) as process:
-        assert process.shared == "not requested"
-    assert "this machine's network" in caplog.text

@@ -1,6 +1,5 @@
 """The supervisor alone, as a program."""
 
-import io
 import json
 import socket
 import subprocess
@@ -63,17 +62,6 @@ def test_what_it_keeps_ends_when_it_is_killed(tmp_path):
     ours.close()
 
 
-def test_what_can_not_be_is_an_answer(tmp_path):
-    ours, lines, process, _ = started("shared")
-    told = {"program": ["/nowhere/x"], "folder": str(tmp_path), "log": str(tmp_path / "log")}
-    assert "/nowhere/x" in ask(ours, lines, request="start", **told)["error"]
-    assert "error" in ask(ours, lines, request="connect", kind="tcp", port=1)
-    assert ask(ours, lines, request="stop") == {}
-    lines.close()
-    ours.close()
-    assert process.wait(10.0) == 0
-
-
 def test_a_stubborn_firmware_is_killed(tmp_path):
     code = "import signal, time; signal.signal(15, signal.SIG_IGN); print(1, flush=True); "
     code += "time.sleep(60)"
@@ -109,20 +97,3 @@ def test_sockets_of_each_kind():
         supervisor.make_socket("tcp", server.getsockname()[1]) as sends,
     ):
         assert sends.type == socket.SOCK_STREAM
-
-
-def test_each_request_has_an_answer_of_one_line_and_its_socket():
-    requests = [{"request": "poll"}, {"request": "connect", "kind": "bound", "port": 0}]
-    lines = io.BytesIO(b"".join(json.dumps(request).encode() + b"\n" for request in requests))
-    near, far = socket.socketpair()
-    with near, far:
-        near.settimeout(5.0)
-        supervisor.serve(far, lines)
-        text, given = b"", []
-        while text.count(b"\n") < 2:
-            part, more, _, _ = socket.recv_fds(near, 4096, 1)
-            text, given = text + part, [*given, *more]
-        assert [json.loads(line) for line in text.splitlines()] == [{"status": 0}, {}]
-        (number,) = given
-        with socket.socket(fileno=number) as sock:
-            assert sock.getsockname()[0] == "127.0.0.1"

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.config import TaskSettings
 from drone_rl.flight.commands import checks
 from drone_rl.utils.errors import InputError
 
@@ -26,19 +25,6 @@ def test_what_is_no_finite_number_is_refused(value):
     words = r"^x=.* is invalid; give a finite number of -1e\+06 or more, up to 1e\+06$"
     with pytest.raises(InputError, match=words):
         checks.real(value, "x")
-
-
-def test_bounds_are_told():
-    with pytest.raises(
-        InputError, match="duration=-1 is invalid; give a finite number of 0 or more"
-    ):
-        checks.duration(-1)
-    with pytest.raises(InputError, match="speed=0 is invalid; give a finite number above 0"):
-        checks.speed(0)
-    with pytest.raises(InputError, match="speed=-2 "):
-        checks.speed(-2)
-    with pytest.raises(InputError, match="z=-5 is below the ground; z points up"):
-        checks.height(-5)
 
 
 def test_so_many_numbers():
@@ -71,9 +57,3 @@ def test_what_is_no_path(path, told):
     with pytest.raises(InputError, match=told) as error:
         checks.path(path)
     assert "\n" not in str(error.value)
-
-
-def test_dynamics_of_another_type_are_named():
-    for wrong in (TaskSettings(), "good", 5):
-        with pytest.raises(InputError, match=r"^dynamics=.* is no DynamicsSettings; give changes"):
-            checks.quadrotor(wrong, {})  # pyright: ignore[reportArgumentType]

@@ -1,10 +1,13 @@
 import math
 
+import numpy as np
 import pytest
 import torch
 
-from drone_rl.flight.commands.command import hold
+from drone_rl.config import DynamicsSettings
+from drone_rl.flight.commands.command import Hover, Land, PilotError, RotateToCommand, hold
 from drone_rl.flight.commands.drone import Drone
+from drone_rl.flight.commands.pilot import Pilot
 from drone_rl.flight.commands.state import LandedState
 from drone_rl.sim.dynamics.control import rotor_goals
 from drone_rl.sim.worlds import Worlds
@@ -112,4 +115,174 @@ def test_wrong_worlds_cameras_and_requests_are_named():
         drone.picture("front")
     with pytest.raises(InputError, match="requests"):
         drone.images("front_center")  # pyright: ignore[reportArgumentType]
+    worlds.close()
+
+
+def test_time_passes_to_the_tick(hovering_pilot):
+    drone = hovering_pilot
+    drone._advance(10)
+    drone._advance(3)
+    assert drone.body.ticks.item() == 13
+
+
+def test_what_lasts_is_done_when_its_time_is_over(hovering_pilot):
+    drone = hovering_pilot
+    future = drone._start("hover", Hover(drone.body, 0.1), False)
+    drone._advance(28)
+    assert not future.done
+    drone._advance(7)
+    assert future.result() is True
+    assert future.elapsed == pytest.approx(0.105)
+
+
+def test_what_should_have_come_to_an_end_has_failed(hovering_pilot):
+    drone = hovering_pilot
+    future = drone._start("rotate", RotateToCommand(drone.body, 3.0, 0.01, 0.1), False)
+    assert future.result() is False
+    assert not future.cancelled
+
+
+def test_the_next_command_ends_the_one_before(hovering_pilot):
+    drone = hovering_pilot
+    first = drone.move_by_velocity(1, 0, duration=9, z=5, wait=False)
+    drone._advance(10)
+    second = drone._start("hover", Hover(drone.body, 1.0), False)
+    assert (first.cancelled, first.result()) == (True, False)
+    assert drone.running is second
+    assert second.result() is True
+    assert drone.running is None
+
+
+def test_after_a_velocity_it_stays_where_it_is_60_ms_later(hovering_pilot):
+    drone = hovering_pilot
+    drone.move_by_velocity(2, 0, duration=2, z=5, wait=False).result()
+    place = drone.body.position[0, 0].item()
+    drone._advance(20)
+    later = drone.body.position[0, 0].item()
+    assert later > place + 0.05
+    drone._advance(3000)
+    x = drone.body.position[0, 0].item()
+    assert x == pytest.approx(later, abs=0.05)
+
+
+def test_after_landing_its_rotors_idle(hovering_pilot):
+    drone = hovering_pilot
+    drone.body.position[0, 2] = 0.5
+    assert drone._start("land", Land(drone.body, 20.0), False).result() is True
+    assert not drone._is_flying
+    drone._advance(50)
+    assert drone.body.rotors.max() < 0.1
+
+
+def test_a_lost_drone_does_nothing_more(hovering_pilot):
+    drone = hovering_pilot
+    future = drone.move_by_velocity(1, 0, duration=9, z=5, wait=False)
+    drone.body.velocity[0, 0] = torch.nan
+    assert future.result() is False
+
+
+def test_it_begins_on_the_ground_disarmed(quadrotor):
+    pilot = Pilot(quadrotor, start=(3, -2), yaw=30)
+    state = pilot.state
+    assert state.position == (3, -2, 0.3)
+    assert state.attitude.yaw == pytest.approx(30)
+    assert (state.armed, state.landed, state.collision) == (False, "landed", None)
+    assert (pilot.time, pilot.running) == (0.0, None)
+
+
+def test_settings_one_by_one():
+    pilot = Pilot(DynamicsSettings(mass=1.2), wind=[5, 0, 0])
+    assert pilot.settings.wind == (5.0, 0.0, 0.0)
+    assert (pilot.settings.mass, pilot.settings.mode) == (1.2, "simple_flight")
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"wind": [math.nan, 0, 0]}, "wind"),
+        ({"mass": -1}, "mass=-1"),
+        ({"mass": 3}, "too small to control"),
+        ({"wings": 2}, "wings is unknown"),
+        ({"start": (0, 0, 5)}, r"start=\(0, 0, 5\) is invalid; give 2 numbers"),
+        ({"start": 5}, "start=5 is invalid"),
+        ({"start": 5, "mode": "computer_vision"}, "start=5 is invalid"),
+        ({"seed": 0.5}, "seed=0.5"),
+        ({"sensors": True}, "sensors=True is no SensorSettings"),
+        ({"yaw": "north"}, "yaw='north'"),
+        ({"start": (0, math.inf)}, r"start\[1\]=inf"),
+    ],
+)
+def test_what_can_be_no_drone(given, told):
+    with pytest.raises(InputError, match=told):
+        Pilot(**given)
+
+
+def test_a_drone_with_strong_rotors_counts_as_flying():
+    pilot = Pilot(mass=0.1)  # hovers at 6% of the thrust
+    pilot.arm()
+    assert pilot.take_off()
+    assert pilot.state.landed == "flying"
+    assert pilot.move_to(2, 0, 3, speed=2)
+    assert pilot.land() and pilot.state.landed == "landed"
+
+
+def test_what_does_not_go_together(quadrotor):
+    with pytest.raises(InputError, match="mass and a Quadrotor are given"):
+        Pilot(quadrotor, mass=1.1)
+    with pytest.raises(InputError, match="worlds has 2 worlds"):
+        Pilot(worlds=Worlds(2))
+
+
+def test_no_arming_and_no_disarming_in_the_air(flying):
+    with pytest.raises(PilotError, match="can't disarm in the air"):
+        flying.disarm()
+    flying.disarm(force=True)
+    assert not flying.state.armed
+    flying.advance(0.1)
+    with pytest.raises(PilotError, match="can't arm in the air"):
+        flying.arm()
+    flying.advance(5.0)
+    assert flying.state.landed == "landed"
+    flying.arm()
+    assert flying.state.armed
+
+
+def test_commands_of_a_drone_that_is_not_armed_or_does_not_fly():
+    pilot = Pilot()
+    for command in (pilot.take_off, pilot.land, pilot.go_home, pilot.hover):
+        with pytest.raises(PilotError, match=r"isn't armed; call arm\(\) first"):
+            command()
+    pilot.arm()
+    with pytest.raises(PilotError, match=r"hover: the drone is on the ground; call take_off"):
+        pilot.hover()
+
+
+def test_a_lost_drone_is_told_nothing(flying):
+    flying.body.velocity[0, 0] = math.nan
+    flying.advance(0.1)
+    assert flying.state.lost
+    with pytest.raises(PilotError, match="simulation has diverged; make a new Pilot"):
+        flying.hover()
+
+
+def test_the_running_command_ends_with_the_block(flying):
+    with flying as pilot:
+        future = pilot.hover(9.0, wait=False)
+        assert pilot.running is future
+    assert future.cancelled
+
+
+def test_cancelling(flying):
+    future = flying.move_to(9, 0, 3, wait=False)
+    flying.advance(0.5)
+    flying.cancel()
+    assert (future.cancelled, flying.running) == (True, None)
+
+
+def test_in_a_world_it_is_the_drone_of_that_world_unless_another_is_given():
+    heavy = DynamicsSettings(mode="simple_flight", mass=1.25)
+    worlds = Worlds(1, dynamics=heavy)
+    worlds.reset(torch.tensor([0]), [np.random.RandomState(0)])
+    assert Pilot(worlds=worlds).settings.mass == 1.25
+    assert Pilot(heavy.replace(mass=1.1), worlds=worlds).settings.mass == 1.1
     worlds.close()

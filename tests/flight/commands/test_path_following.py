@@ -1,7 +1,21 @@
+import math
+
 import pytest
 import torch
 
+from benchmarks.flight_paths import fly_command
+from drone_rl.config import DynamicsSettings
 from drone_rl.flight.commands import path_following as of
+from drone_rl.flight.commands.path_following import (
+    Drivetrain,
+    GoHomeCommand,
+    PathCommand,
+    TakeoffCommand,
+    YawControl,
+    YawMode,
+)
+from drone_rl.sim.dynamics import Mode, Quadrotor
+from drone_rl.utils.errors import InputError
 
 
 def rows(*values):
@@ -62,3 +76,72 @@ def test_a_part_keeps_to_one_way_through_a_crossing():
 def test_distances(paths):
     assert of.distance_from(paths, rows([2, -1, 1], [3, 4, 1])).tolist() == [1, 5]
     assert of.distance_from(paths, rows([-3, -4, 1], [0, 3, 6])).tolist() == [5, 5]
+
+
+LEFT = torch.tensor([[0.0, 2.0, 5.0]], dtype=torch.float64)
+
+
+@pytest.fixture
+def body(hovering):
+    """A drone with a heading of 0.3."""
+    found = hovering((0, 0, 5))
+    found.attitude[0] = found.attitude.new_tensor([math.cos(0.15), 0, 0, math.sin(0.15)])
+    return found
+
+
+def test_the_heading_is_held_by_default(body):
+    yaw_control = YawControl(body)
+    assert (yaw_control.mode, yaw_control.goal(LEFT).item()) == (Mode.ANGLE, pytest.approx(0.3))
+
+
+def test_an_angle_and_a_rate(body):
+    angle = YawControl(body, "max_degree_of_freedom", YawMode(False, -90.0))
+    assert angle.mode == Mode.ANGLE
+    assert angle.goal(LEFT).item() == pytest.approx(math.pi / 2)
+    rate = YawControl(body, "max_degree_of_freedom", YawMode(True, 180.0))
+    assert (rate.mode, rate.goal(LEFT).item()) == (Mode.RATE, pytest.approx(-math.pi))
+
+
+def test_forward_only_looks_where_it_goes_and_else_where_it_looked(body):
+    yaw_control = YawControl(body, Drivetrain.FORWARD_ONLY, YawMode(False, -45.0))
+    up = torch.tensor([[0.0, 0.0, 5.0]], dtype=torch.float64)
+    assert yaw_control.goal(up).item() == pytest.approx(0.3)
+    assert yaw_control.goal(LEFT).item() == pytest.approx(math.radians(135))
+    assert yaw_control.goal(up).item() == pytest.approx(math.radians(135))
+
+
+def test_what_does_not_go_together(body):
+    with pytest.raises(InputError, match="direction of travel; give is_rate=False"):
+        YawControl(body, "forward_only", YawMode(True, 10.0))
+    with pytest.raises(InputError, match="drivetrain='sideways' is unknown; give forward_only, "):
+        YawControl(body, "sideways")
+    with pytest.raises(InputError, match=r"yaw_mode=\(False, 9\) is not a YawMode"):
+        YawControl(body, "forward_only", (False, 9))
+    with pytest.raises(InputError, match="yaw_or_rate=nan"):
+        YawMode(False, math.nan)
+
+
+def test_whether_it_is_a_rate_is_true_or_false():
+    with pytest.raises(InputError, match="is_rate='no' is neither true nor false"):
+        YawMode(is_rate="no", yaw_or_rate=45)
+
+
+def test_over_its_home_first_and_down_then(quadrotor, hovering):
+    home = torch.tensor([[[0.0, 0.0, 1.5]]], dtype=torch.float64)
+    body = hovering((5, 0, 1.5))
+    command = GoHomeCommand(PathCommand(body, home, 2.0, 20.0), 20.0)
+    assert command.limit == 40.0
+    states, done = fly_command(quadrotor, body, command)
+    x, _, z = torch.cat([state.position for state in states]).unbind(-1)
+    assert done.item() == len(states) - 1
+    assert x[z < 1.4].max() < 0.5
+    assert (states[-1].position - home[0] + torch.tensor([0, 0, 1.2])).norm() < 0.05
+
+
+@pytest.mark.parametrize("wind", [0.0, 5.0])
+def test_two_metres_up_whatever_the_wind(wind, hovering):
+    body = hovering((1, 2, 0.3))
+    air = Quadrotor(DynamicsSettings(mode="simple_flight", wind=(wind, 0.0, 0.0)))
+    states, done = fly_command(air, body, TakeoffCommand(body, 20.0))
+    assert 3.8 < done.item() * 0.021 < 6.0  # 1.9 m at 0.5 m/s, and braking
+    assert states[-1].position[0, 2].item() == pytest.approx(2.2, abs=0.02)

@@ -6,9 +6,11 @@ import torch
 
 from drone_rl.config import CameraSettings, DynamicsSettings, PillarsSettings
 from drone_rl.flight.commands.command import PilotError
-from drone_rl.flight.commands.pilot import Pilot
+from drone_rl.flight.commands.path_following import YawMode
+from drone_rl.flight.commands.pilot import Pilot, Sticks
 from drone_rl.flight.image_types import ImageRequest, ImageType
 from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.errors import InputError
 
 
 def test_a_whole_flight_in_wind():
@@ -81,8 +83,150 @@ def test_what_stands_in_its_worlds_is_in_the_way():
     assert pilot.trajectory.positions[:, 0].max() < x
 
 
-def test_without_worlds_there_is_nothing_to_see(flying):
-    with pytest.raises(PilotError, match="picture: there is nothing to render; give worlds"):
-        flying.picture()
-    with pytest.raises(PilotError, match="images: there is nothing to render; give worlds"):
-        flying.images([ImageRequest()])
+def test_taking_off_and_landing():
+    pilot = Pilot(start=(1, 1))
+    pilot.arm()
+    assert pilot.take_off() is True
+    pilot.advance(3.0)
+    assert pilot.state.position == pytest.approx((1, 1, 2.3), abs=0.02)
+    assert pilot.state.landed == "flying"
+    assert pilot.land() is True
+    assert pilot.state.landed == "landed"
+    assert pilot.state.position == pytest.approx((1, 1, 0.3), abs=0.02)
+    pilot.disarm()
+    assert not pilot.state.armed
+
+
+def test_nobody_takes_off_while_moving(flying):
+    flying.move_by_velocity(1, 0, 0, 1)
+    with pytest.raises(PilotError, match="can't take off while moving at 0"):
+        flying.take_off()
+
+
+def test_there_is_too_little_time(flying):
+    assert flying.land(timeout=1.0) is False
+    assert flying.state.landed == "flying"
+
+
+def test_hovering_stays(flying):
+    flying.advance(3.0)
+    before = flying.time
+    assert flying.hover(2.1) is True
+    assert flying.time == pytest.approx(before + 2.1)
+    assert flying.state.position == pytest.approx((0, 0, 2.3), abs=0.02)
+
+
+def test_going_home(flying):
+    assert flying.move_to(4, 3, 2.3, speed=2) is True
+    assert flying.go_home(speed=2) is True
+    assert flying.state.landed == "landed"
+    assert flying.state.position == pytest.approx((0, 0, 0.3), abs=0.05)
+
+
+def test_going_home_takes_no_longer_than_it_may(flying):
+    before = flying.time
+    assert flying.go_home(timeout=1.05) is False
+    assert flying.time == pytest.approx(before + 1.05, abs=0.021)
+
+
+def test_the_same_commands_give_the_same_flight():
+    def fly(seed):
+        with Pilot(gusts=2.0, seed=seed) as pilot:
+            pilot.arm()
+            pilot.take_off()
+            return pilot.state.position
+
+    assert fly(1) == fly(1)
+    assert fly(1) != fly(2)
+
+
+def test_by_velocity(flying):
+    assert flying.move_by_velocity(0, 2, 0, 5, z=4) is True
+    assert flying.state.velocity == pytest.approx((0, 2, 0), abs=0.1)
+    assert flying.state.position[2] == pytest.approx(4, abs=0.1)
+    flying.move_by_velocity(0, 0, 1, 2)
+    assert flying.state.velocity[2] == pytest.approx(1, abs=0.05)
+
+
+def test_along_a_path_whose_end_is_held(flying):
+    assert flying.move_along([(2, 0, 2), (2, 3, 3)], speed=1) is True
+    assert math.dist(flying.state.position, (2, 3, 3)) <= 0.5
+    flying.advance(5.0)
+    assert flying.state.position == pytest.approx((2, 3, 3), abs=0.05)
+
+
+def test_to_a_place_and_to_a_height(flying):
+    assert flying.move_to(3, 0, 2, speed=2, drivetrain="forward_only") is True
+    assert flying.move_to_z(4) is True
+    flying.advance(5.0)
+    assert flying.state.position[2] == pytest.approx(4, abs=0.02)
+
+
+def test_turning(flying):
+    assert flying.rotate_to(-90, margin=1) is True
+    assert flying.state.attitude.yaw == pytest.approx(-90, abs=1)
+    assert flying.rotate_by(90, 1) is True
+    assert flying.state.attitude.yaw > -40
+    assert flying.rotate_to(90, timeout=0.1) is False
+
+
+def test_sticks_are_read_while_time_passes(flying):
+    flight = flying.move_by_manual(4, 4, 1, 4, wait=False)
+    flying.sticks = Sticks(pitch=0.5)
+    flying.advance(2.0)
+    assert flying.state.velocity[0] > 1.5
+    flying.sticks = Sticks(roll=0.5)
+    assert flight.result() is True
+    assert flying.state.velocity[1] < -1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "choices", "told"),
+    [
+        ("move_along", ([],), {}, "path has no points"),
+        ("move_along", ([(0, 0, math.nan)],), {}, "nan"),
+        ("move_to", (1, 2, -3), {}, "below the ground"),
+        ("move_to", (1, 2, 3), {"speed": 0}, "speed=0"),
+        ("move_to", (1, 2, 3), {"speed": -1}, "speed=-1"),
+        ("move_to", (1, 2, 3), {"lookahead": 0}, "lookahead=0 is too short"),
+        ("move_to", (1, 2, 3), {"adaptive_lookahead": math.nan}, "adaptive_lookahead=nan"),
+        ("move_to", (1, 2, 3), {"timeout": -1}, "timeout=-1"),
+        (
+            "move_to",
+            (1, 2, 3),
+            {"drivetrain": "forward_only", "yaw_mode": YawMode(True, 5)},
+            "turns at a rate",
+        ),
+        ("move_by_velocity", (math.inf, 0), {}, "vx=inf"),
+        ("move_by_velocity", (1, 0), {"duration": -1}, "duration=-1"),
+        ("move_by_velocity", (1, 0, 1), {"z": 3}, "z=3 and vz=1 are both given"),
+        ("move_by_velocity", (1, 0), {"frame": "moon"}, "frame='moon'"),
+        ("move_by_angle", (91, 0, 1), {}, "roll=91"),
+        ("move_by_angle", (0, 0, 1), {"z": 3, "throttle": 0.5}, "z=3 and throttle=0.5"),
+        ("move_by_angle", (0, 0, 1), {"yaw": 3, "yaw_rate": 2}, "yaw=3 and yaw_rate=2"),
+        ("move_by_angle", (0, 0, 1), {"throttle": 1.5}, "throttle=1.5"),
+        ("move_by_rates", (0, math.nan, 0, 1), {}, "pitch=nan"),
+        ("move_by_rotors", ([0.5] * 3, 1), {}, "give 4 numbers"),
+        ("move_by_rotors", ([0.5, 0.5, 2, 0.5], 1), {}, r"shares\[2\]=2"),
+        ("rotate_to", (math.nan,), {}, "yaw=nan"),
+        ("rotate_to", (9,), {"margin": 0}, "margin=0"),
+        ("rotate_to", (9,), {"timeout": -1}, "timeout=-1"),
+        ("rotate_by", (9, -1), {}, "duration=-1"),
+        ("move_by_manual", (0, 1, 1, 1), {}, "vx_max=0"),
+        ("move_by_manual", (1, 1, -1, 1), {}, "z_max=-1 is invalid; give a finite number of 0"),
+    ],
+)
+def test_what_is_refused_before_anything_moves(flying, name, given, choices, told):
+    before = flying.time
+    with pytest.raises(InputError, match=told) as error:
+        getattr(flying, name)(*given, **choices)
+    assert not isinstance(error.value, PilotError)
+    assert "\n" not in str(error.value)
+    assert flying.time == before
+
+
+def test_nothing_moves_before_it_has_taken_off():
+    pilot = Pilot()
+    pilot.arm()
+    with pytest.raises(PilotError, match="move_along: the drone is on the ground"):
+        pilot.move_to(1, 2, 3)

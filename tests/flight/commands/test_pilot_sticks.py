@@ -51,8 +51,3 @@ def test_a_stick_out_of_range_is_an_error():
         InputError, match=r"roll=1\.1 is invalid; give a finite number of -1 or more"
     ):
         Sticks(roll=1.1)
-
-
-def test_sticks_are_in_the_middle_by_default():
-    sticks = Sticks()
-    assert (sticks.pitch, sticks.roll, sticks.throttle, sticks.yaw) == (0.0, 0.0, 0.0, 0.0)

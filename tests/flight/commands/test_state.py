@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 import torch
 
+from drone_rl.config.sensors import GpsSettings, SensorSettings
 from drone_rl.flight.commands.computer_vision import _attitude
-from drone_rl.flight.commands.state import Collision, LandedState, PilotState
-from drone_rl.sim.coordinates import Attitude, to_simulator
+from drone_rl.flight.commands.pilot import Pilot
+from drone_rl.flight.commands.state import Collision, LandedState, PilotState, Sensors, Trajectory
+from drone_rl.sim.coordinates import HOME, Attitude, to_simulator
+from drone_rl.sim.dynamics import FlightState
 from drone_rl.sim.dynamics.state import DEPTH, GROUND, NORMAL, THING
 
 HALF = math.sqrt(0.5)
@@ -57,3 +60,82 @@ def test_speed():
         0.0, (0, 0, 0), (2, 3, 6), Attitude(0, 0, 0), LandedState.FLYING, True, False, None
     )
     assert state.speed == 7.0
+
+
+PERFECT = SensorSettings(gps=GpsSettings(latency=0.0)).perfect
+
+
+def test_a_drone_that_lies_still_feels_gravity_alone():
+    body = FlightState.at_rest(torch.tensor([[0.0, 0.0, 0.3]], dtype=torch.float64))
+    sensors = Sensors(body, PERFECT)
+    sensors.update(body, 0.5)
+    assert sensors.time == 0.5
+    felt = sensors.imu()
+    assert felt.specific_force[0].tolist() == pytest.approx([0.0, 0.0, 9.81])
+    assert felt.angular_velocity[0].tolist() == [0.0, 0.0, 0.0]
+    assert float(sensors.magnetometer().field.norm()) == pytest.approx(0.5, abs=0.1)  # gauss
+
+
+def test_of_a_flight_they_tell_height_place_and_touch():
+    pilot = Pilot(sensors=PERFECT)
+    on_the_ground = float(pilot.sensors.barometer().altitude[0])
+    assert not pilot.sensors.gps().is_valid[0]  # within its first second
+    pilot.arm()
+    pilot.take_off()
+    pilot.move_to(4, 0, 2, speed=3)
+    pilot.advance(1.5)
+    x, _, z = pilot.state.position
+    risen = float(pilot.sensors.barometer().altitude[0]) - on_the_ground
+    assert risen == pytest.approx(z - 0.3, abs=0.1)
+    place = pilot.sensors.gps()
+    north = math.radians(float(place.place[0, 0]) - HOME.latitude) * 6.37e6
+    assert place.is_valid[0] and north == pytest.approx(x, abs=0.3)
+    assert pilot.sensors.time == pytest.approx(pilot.time)
+    pilot.land()
+    touched = pilot.sensors.collision()
+    assert touched.has_collided[0] and int(touched.contact.thing[0]) == GROUND
+
+
+def test_a_touch_is_news_once():
+    pilot = Pilot(sensors=PERFECT)
+    pilot.advance(0.1)
+    pilot.sensors.collision()
+    pilot.arm()
+    pilot.take_off()
+    pilot.sensors.collision()
+    pilot.advance(0.5)
+    assert not pilot.sensors.collision().has_collided[0]
+
+
+def test_noise_is_the_seeds():
+    told = []
+    for seed in (1, 1, 2):
+        pilot = Pilot(seed=seed, sensors=SensorSettings())
+        pilot.advance(0.2)
+        told.append(float(pilot.sensors.barometer().pressure[0]))
+    assert told[0] == told[1] != told[2]
+
+
+def test_where_nobody_asked_they_are_turned_on_by_the_first_look():
+    pilot, other = Pilot(), Pilot(sensors=SensorSettings())
+    for each in (pilot, other):
+        each.advance(1.0)
+    assert pilot._sensors is None
+    assert pilot.sensors.time == 0.0 and pilot.sensors is pilot.sensors
+    assert pilot.sensors.settings == SensorSettings()
+    assert (pilot.body.numbers == other.body.numbers).all()
+
+
+def test_it_grows(hovering):
+    way = Trajectory()
+    assert (len(way), way.positions.shape) == (0, (0, 3))
+    body = hovering((1, 2, 3))
+    way.append(0.5, body)
+    body.position[0, 0] = 9.0  # what is noted stays
+    body.velocity[0, 1] = 4.0
+    way.append(0.75, body)
+    assert way.times.tolist() == [0.5, 0.75]
+    assert way.positions.tolist() == [[1, 2, 3], [9, 2, 3]]
+    assert way.velocities.tolist() == [[0, 0, 0], [0, 4, 0]]
+    assert way.attitudes.tolist() == [[1, 0, 0, 0]] * 2
+    assert way.rotors.shape == (2, 4)

@@ -42,34 +42,6 @@ def test_the_observation_has_the_grays_of_the_camera(make_flight):
     assert abs(shown[..., 0] - gray).max() < 12  # the transform's weights differ a little
 
 
-def test_images_that_did_not_change_are_encoded_once(make_flight, monkeypatch):
-    flight, count = make_flight(), []
-    render = flight.world.render
-    monkeypatch.setattr(
-        flight.world, "render", lambda camera: count.append(camera) or render(camera)
-    )
-    frames = [flight.frame() for _ in range(3)]
-    assert count == ["front_center"]
-    assert decode(frames[0])[1] == decode(frames[2])[1]
-    flight.handle({"type": "camera", "camera": "chase"})
-    flight.frame()
-    flight.handle({"type": "set", "name": "light", "value": 0.5})
-    flight.frame()
-    assert count == ["front_center", "chase", "chase"]
-
-
-def test_what_does_not_change_is_said_once(make_flight, tmp_path):
-    hello = make_flight().hello()
-    assert hello["policy"] == "good" and hello["actions"] == ["forward", "left", "right"]
-    assert hello["order"] == [1, 0, 2] and hello["total"] == 3
-    assert hello["size"] == 2.5  # metres
-    assert hello["discrete"] and not hello["dynamics"]
-    assert hello["demonstrations"] == str(tmp_path / "demonstrations")
-    pillars = make_flight("pillars_good").hello()
-    assert pillars["total"] is None
-    assert (pillars["object"], pillars["goal"], pillars["reached"]) == ("pillar", "row", "passed")
-
-
 def test_the_policy_collects_the_cubes_and_the_next_episode_begins(make_flight):
     flight = make_flight()
     flight.handle({"type": "pilot", "pilot": "policy"})
@@ -218,25 +190,3 @@ def test_heat_is_laid_over_the_observation_of_a_trusted_method(make_flight):
     assert state["saliency"] == expected
     hot = np.asarray(Image.open(io.BytesIO(images["observation"]))).astype(int)
     assert (hot[..., 0] - hot[..., 2]).max() > 60  # warm colors, where all was gray
-
-
-def test_the_tests_of_heat_maps_begin_when_they_are_wanted(make_flight, monkeypatch):
-    flight, started = make_flight(), []
-    monkeypatch.setattr(flight.saliency, "start", lambda: started.append(True))
-    run(flight, 0.1)
-    assert started == []
-    flight.handle({"type": "saliency", "on": True})
-    run(flight, 0.025)
-    assert started == [True] and state_of(flight)["saliency"]["on"]
-
-
-def test_free_flight_looks_some_times_a_second(make_flight, monkeypatch):
-    flight = make_flight(mode="simple_flight")
-    looks, see = [], flight.world.see
-    monkeypatch.setattr(flight.world, "see", lambda: looks.append(True) or see())
-    now = [100.0]
-    monkeypatch.setattr("drone_rl.flight.fly_page.flight.time.monotonic", lambda: now[0])
-    for _ in range(40):
-        now[0] += 0.025
-        flight.frame()
-    assert 8 <= len(looks) <= 12

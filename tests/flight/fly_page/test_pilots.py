@@ -5,7 +5,6 @@ import math
 import pytest
 import torch
 
-from drone_rl.flight.fly_page import pilots
 from drone_rl.flight.fly_page.pilots import Controls, make_pilot
 from drone_rl.sim.dynamics import FlightState
 
@@ -53,14 +52,6 @@ def test_opposite_keys_cancel_and_sticks_add():
     assert controls.presses[-1] == "down"  # beyond half its way a stick is a key, too
     controls.hold(["forward"])
     assert controls.axes[0] == 1.0
-
-
-def test_presses_that_nobody_uses_do_not_pile_up():
-    controls = Controls()
-    for _ in range(1000):
-        controls.hold(["forward"])
-        controls.hold([])
-    assert len(controls.presses) == 8
 
 
 def test_the_policy_acts_at_the_speed(make_world):
@@ -208,18 +199,6 @@ def test_the_drone_lands_and_takes_off(make_world):
     assert place(world)[2] > 4.0
 
 
-def test_landing_is_not_braking(make_world):
-    world, controls = make_world(), Controls()
-    pilot = make_pilot("simple_flight", world, Steps().note)
-    controls.hold(["forward"])
-    fly(pilot, controls, 1.0)
-    controls.hold([])
-    fly(pilot, controls, 0.1)
-    pilot.land()
-    fly(pilot, controls, 16.0)
-    assert place(world)[2] == pytest.approx(0.3, abs=0.05)
-
-
 def test_wind_drifts_a_braking_drone_and_can_change(make_world):
     world, controls = make_world(), Controls()
     pilot = make_pilot("simple_flight", world, Steps().note)
@@ -238,26 +217,6 @@ def test_it_takes_over_a_flying_drone_with_its_speed(make_world):
     assert speed[0] > 1.0
     make_pilot("simple_flight", world, steps.note)
     assert world.body.velocity[0].tolist() == speed
-
-
-def test_computer_vision_drones_begin_to_hover_in_flight(make_world):
-    world, controls = make_world(), Controls()
-    make_pilot("computer_vision", world, Steps().note)
-    pilot = make_pilot("simple_flight", world, Steps().note)
-    fly(pilot, controls, 1.0)
-    assert place(world)[2] == pytest.approx(2.5, abs=0.05)
-
-
-def test_a_person_collects_a_cube_in_flight(make_world):
-    world, controls = make_world(), Controls()
-    pilot = make_pilot("simple_flight", world, Steps().note)
-    x, y, z = world.objects[0]
-    start = torch.tensor([[x - 6.0, y, z]]).double()
-    world.move(world.body.moved(start))
-    pilot = pilots.VelocityPilot(world)
-    controls.hold(["forward"])
-    fly(pilot, controls, 4.0)
-    assert world.goals[0] == 1
 
 
 def test_pillars_stop_a_flying_drone(make_world):

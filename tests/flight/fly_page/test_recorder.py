@@ -2,11 +2,9 @@
 
 import sys
 import types
-from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
 from tests.flight.fly_page.test_flight import run, state_of
 
@@ -102,15 +100,6 @@ def test_a_demonstration_has_one_flyer_one_episode_and_one_wind(make_flight, wri
     assert flight.recorder.is_on
 
 
-def test_free_flight_is_not_recorded_nor_said_to_be(make_flight, written):
-    flight = make_flight()
-    flight.handle({"type": "record", "on": True})
-    press(flight, "forward")
-    flight.handle({"type": "mode", "mode": "simple_flight"})
-    assert not flight.recorder.is_on
-    assert len(written) == 1
-
-
 def test_closing_writes_what_was_recorded(make_flight, written):
     flight = make_flight()
     flight.handle({"type": "record", "on": True})
@@ -142,14 +131,6 @@ def test_a_folder_that_cannot_be_written_is_reported_and_ends_recording(
     assert "can't be written" in state["recording"]["problem"]
 
 
-def test_nothing_is_written_without_steps(make_flight, written):
-    flight = make_flight()
-    flight.handle({"type": "record", "on": True})
-    flight.handle({"type": "reset"})
-    flight.handle({"type": "record", "on": False})
-    assert written == []
-
-
 def test_files_are_demonstrations_that_a_training_reads(make_flight, tmp_path):
     demonstrations = pytest.importorskip("drone_rl.training.demonstrations")
     flight = make_flight()
@@ -159,14 +140,3 @@ def test_files_are_demonstrations_that_a_training_reads(make_flight, tmp_path):
     conditions = demonstrations.FlightConditions(*flight.world.conditions)
     (read,) = demonstrations.read_demonstrations(tmp_path / "demonstrations", conditions)
     assert read.actions.tolist() == [0, 2] and read.pilot == "person"
-
-
-def test_continuous_actions_keep_their_shape(make_flight, written):
-    flight = make_flight("flight_velocity")
-    flight.recorder.is_on = True
-    action = torch.tensor([[1.0, 0.0, -0.5]])
-    flight.recorder.note(flight.world.see().frame, action, 0.0)
-    flight.recorder.finish("person")
-    ((folder, one),) = written
-    assert isinstance(folder, Path) and one["actions"].tolist() == [[1.0, 0.0, -0.5]]
-    assert one["actions"].dtype == np.float32

@@ -1,22 +1,14 @@
 """Live heat maps: the tests in another process, and maps of a trusted method."""
 
-import functools
-import time
-import types
-from unittest.mock import patch
-
 import pytest
 import torch
 
 import drone_rl
-from drone_rl.config import TASKS
 from drone_rl.explanations import trust
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.flight.fly_page import saliency
 from drone_rl.flight.fly_page.saliency import LiveSaliency, find_trusted
-from drone_rl.sim.tasks.task import MAKERS, as_settings
-from tests.second_task import Posts
 
 
 def test_the_tests_are_those_of_the_report(monkeypatch):
@@ -74,27 +66,3 @@ def test_a_policy_that_cannot_be_explained_says_why(monkeypatch):
     monkeypatch.setattr(saliency.os, "nice", lambda more: more)
     saliency._work(sent, None, [])
     assert sent == [(None, "task=x cannot be explained")]
-
-
-def test_a_process_that_fails_is_noticed(caplog):
-    broken = types.SimpleNamespace(name="broken", make_env=functools.partial(int, "no number"))
-    live = LiveSaliency(types.SimpleNamespace(policy=broken))
-    live.start()
-    live.start()  # once is enough
-    assert live.state == "testing"
-    until = time.monotonic() + 120
-    while live.state == "testing" and time.monotonic() < until:
-        live.poll()
-        time.sleep(0.05)
-    assert live.state == "failed" and live.method is None
-    assert live.problem == "the process ended early"
-    assert "policy broken can't be tested" in caplog.text
-
-
-def test_a_task_that_no_other_process_can_load_is_told():
-    with patch.dict(TASKS), patch.dict(MAKERS):
-        policy = types.SimpleNamespace(name="mine", task=as_settings(Posts()))
-        live = LiveSaliency(types.SimpleNamespace(policy=policy))
-        live.start()
-    assert live.state == "failed" and "another process" in live.problem
-    live.close()

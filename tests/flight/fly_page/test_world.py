@@ -169,15 +169,6 @@ def test_the_policys_own_wind_is_the_first_one(make_world):
     assert world.flight_dynamics.wind == pytest.approx((2.0, 0.0, 1.0), abs=1e-12)
 
 
-def test_wind_leaves_a_drone_without_dynamics_alone(make_world):
-    world = make_world()
-    world.set_wind(5.0, 0.0)
-    assert not world.has_dynamics and world.conditions[2].wind == (0.0, 0.0, 0.0)
-    assert world.flight_dynamics.mode == "simple_flight"
-    world.step(FORWARD)
-    assert world.body.position[0].tolist() == [1.0, 0.0, 2.5]
-
-
 def test_light_scales_images_of_all_cameras(make_world):
     world = make_world()
     whole, seen = world.render("front_center").double(), world.see().frame.double()
@@ -189,15 +180,6 @@ def test_light_scales_images_of_all_cameras(make_world):
     assert (world.see().frame - 0.5 * seen).abs().max() <= 1.0
     world.set_light(1.0)
     assert torch.equal(world.render("front_center").double(), whole)
-
-
-def test_light_multiplies_the_exposure_of_an_appearance_that_varies(make_world):
-    policy = drone_rl.load_policy("good")
-    varied = policy.in_appearance(policy.description.appearance.replace(exposure=(0.5, 0.8)))
-    world = make_world(varied)
-    whole = world.render("front_center").double()
-    world.set_light(0.5)
-    assert (world.render("front_center") - 0.5 * whole).abs().max() <= 1.0
 
 
 @pytest.mark.parametrize("camera", ["front_left", "bottom_center", "back_center", "chase"])
@@ -216,20 +198,6 @@ def test_an_action_lasts_as_long_as_its_move_takes(make_world, policy, speed, se
     assert make_world(policy).seconds(speed) == pytest.approx(seconds)
 
 
-def test_speeds_without_dynamics_have_a_time_step(make_world):
-    policy = drone_rl.load_policy("flight_velocity").in_dynamics(mode="computer_vision")
-    world = make_world(policy)
-    assert world.seconds(3.0) == pytest.approx(0.198)
-    world.step(torch.tensor([[1.0, 0.0, 0.0]]))
-    assert float(world.body.position[0, 0]) == pytest.approx(0.198 * policy.actions.forward_speed)
-
-
-def test_goals_are_unknown_where_a_task_does_not_count_them(make_world, monkeypatch):
-    world = make_world()
-    monkeypatch.setattr(world, "task", Unexplained())
-    assert world.goals is None
-
-
 class Unexplained:
     """A task whose goals can't be counted."""
 
@@ -242,9 +210,3 @@ class Unexplained:
 def test_demonstrations_note_the_exact_wind_of_the_policy(make_world, wind):
     policy = drone_rl.load_policy("flight").in_dynamics(wind=wind)
     assert make_world(policy).conditions[2] == policy.dynamics
-
-
-def test_a_slider_sets_a_wind_that_a_training_can_have(make_world):
-    world = make_world("flight")
-    world.set_wind(4.0, 90.0)
-    assert world.conditions[2].wind == (0.0, 4.0, 0.0)

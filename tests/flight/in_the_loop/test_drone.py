@@ -99,10 +99,3 @@ def test_a_motion_that_diverges():
 
     with pytest.raises(FlightControllerError, match=r"diverged after 0\.001 s"):
         drone(body=Broken()).hold(module.AT_REST, 0.1)
-
-
-def test_thrust_and_weight_of_these_tests():
-    body = SimpleBody()
-    hovering = body.push(body.start(), torch.full((1, 4), HOVER + 0.01, dtype=torch.float64), 1)
-    expected = 0.001 * 4 * 0.01 * SETTINGS.rotor_thrust / SETTINGS.mass
-    assert hovering.velocity[0, 2] == pytest.approx(expected)

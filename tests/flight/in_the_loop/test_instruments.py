@@ -13,7 +13,6 @@ from drone_rl.flight.in_the_loop.instruments import (
 )
 from drone_rl.sim.coordinates import GeoPoint
 from drone_rl.sim.dynamics import BodyState
-from tests.flight.simple_body import SimpleBody
 
 HALF = math.sqrt(0.5)
 LEFT = np.array([HALF, 0.0, 0.0, HALF])  # a quarter turn to the left
@@ -80,16 +79,6 @@ def test_place_and_altitude_are_counted_from_home():
     assert readings.place.tolist() == [50.0, 8.0, 105.0]
     assert readings.altitude == 105.0
     assert readings.pressure == pressure_at(105.0)
-
-
-def test_the_body_of_these_tests_falls_and_turns_as_it_should():
-    body = SimpleBody()
-    high = body.start()
-    high.position = torch.tensor([[0.0, 0.0, 50.0]], dtype=torch.float64)
-    fallen = body.push(high, torch.zeros(1, 4), 1000)
-    assert fallen.velocity[0, 2] == pytest.approx(-9.81)
-    turning = body.push(high, torch.tensor([[0.5, 0.5, 0.6, 0.6]], dtype=torch.float64), 1)
-    assert turning.angular_velocity[0, 2] == pytest.approx(0.001 * 0.055562 * 0.2 / 0.01428)
 
 
 def test_the_heading_of_a_tilted_drone_is_where_its_nose_points():

@@ -1,12 +1,10 @@
 """Pictures pixel by pixel, of frames made by hand."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from PIL import Image
 
-from drone_rl.sim.vocabulary import SHOWN_MOVES, ShownActions
+from drone_rl.sim.vocabulary import ShownActions
 from drone_rl.trust.plots import images as pictures
 from drone_rl.trust.plots.images import ROW, indicator
 from drone_rl.utils.palette import INK, MUTED, PAPER
@@ -107,12 +105,3 @@ def test_actions_have_a_row_each():
     assert np.ptp(columns) == pytest.approx(0.6 * 144, abs=1)
     others, _ = bars(picture, MUTED).nonzero()
     assert others.min() > ROW
-
-
-def test_bars_start_right_of_the_longest_name():
-    """Names of 24 letters are longer than half of a small image."""
-    names = ("a" * 24, "left", "right")
-    long = indicator([1.0, 0.5, 0.5], 0, 240, dataclasses.replace(SHOWN_MOVES, names=names))
-    short = indicator([1.0, 0.5, 0.5], 0, 240)
-    _, columns = bars(long, MUTED).nonzero()
-    assert columns.min() > 160 and bars(short, MUTED).nonzero()[1].min() == 120

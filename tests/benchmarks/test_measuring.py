@@ -1,0 +1,138 @@
+"""Statistics of times, rates and memory by hand, and trainings of a few frames."""
+
+import dataclasses
+import json
+
+import pytest
+import torch
+import yaml
+
+from benchmarks import memory, pipeline, revisions, scaling, speed, startup, sweeps, training
+from benchmarks.memory import growth
+from benchmarks.pipeline import make_drone_env, paired, random_walk, rate
+from drone_rl.config import AppearanceSettings
+from drone_rl.config.configuration import from_config
+from drone_rl.utils.settings import conf_dir
+from tests.forked import run_module_forked
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """Simulate the clock; return a factory of functions that take given seconds."""
+    now = [0.0]
+    monkeypatch.setattr(pipeline.time, "perf_counter", lambda: now[0])
+
+    def work(items, *seconds):
+        left = list(seconds)
+
+        def run():
+            now[0] += left.pop(0) if len(left) > 1 else left[0]
+            return items
+
+        return run
+
+    return work
+
+
+def test_rate_repeats_work_until_the_time_is_up(clock):
+    assert rate(clock(6, 2.0), seconds=5.0) == 18 / 6.0
+
+
+def test_a_drift_of_the_machine_does_not_change_the_ratio(clock):
+    # each round takes twice as long as the previous one; the ratio stays 3
+    slower = (1.0, 2.0, 4.0)
+    first, second, ratio = paired(clock(30, *slower), clock(10, *slower), seconds=0.5, rounds=3)
+    assert (first, second, ratio) == (15.0, 5.0, 3.0)
+
+
+def test_random_walk_continues_after_the_end_of_an_episode():
+    env = make_drone_env(2, "cpu", num_cubes=1)
+    assert random_walk(env, 40) == 80
+    env.close()
+
+
+def test_memory_growth_ignores_samples_before_settling():
+    """2 MiB in 20,000 frames after settling."""
+    samples = [(0, 300.0), (50, 500.0), (100, 600.0), (10_100, 601.0), (20_100, 602.0)]
+    assert growth(samples, 100) == pytest.approx(100.0)
+    assert growth(samples[:4], 100) is None
+
+
+def test_the_memory_of_a_training_is_recorded(setup, monkeypatch):
+    monkeypatch.setattr(memory.subprocess, "run", run_module_forked)
+    figures = memory.bench_memory(setup)
+    assert 200 < figures["peak_memory_mib"] < 4096
+    assert isinstance(figures["memory_growth_mib_per_million_frames"], float)
+
+
+def test_r_squared_is_one_for_a_straight_line_only():
+    assert scaling._r_squared({1: 3.0, 2: 5.0, 4: 9.0}) == pytest.approx(1.0)
+    # the fit to 0, 0, 3 at 0, 1, 2 has residual sum of squares 1.5; the total is 6
+    assert scaling._r_squared({0: 0.0, 1: 0.0, 2: 3.0}) == pytest.approx(1 - 1.5 / 6)
+
+
+def test_a_ratio_of_revisions_is_the_median_of_pairs():
+    """The machine's speed halves and doubles again; 22 / 20 is the median of costs."""
+    pairs = [
+        ({"explain_s": 10.0, "collector_fps": 100.0}, {"explain_s": 12.0, "collector_fps": 80.0}),
+        ({"explain_s": 20.0}, {"explain_s": 22.0, "verdict_s": 3.0}),
+        ({"explain_s": 10.0}, {"explain_s": 10.5}),
+    ]
+    ratios = revisions.compare(pairs)
+    assert ratios == pytest.approx({"explain_s": 1.1, "collector_fps": 1.25})
+
+
+def test_start_up_times_are_medians_of_three_after_a_warm_up(setup, monkeypatch):
+    seconds = iter([9.0, 12.0, 4.0, 5.0, 3.0])  # the second run compiles kernels
+    monkeypatch.setattr(startup, "first_update_seconds", lambda *_: next(seconds))
+    monkeypatch.setattr(startup, "verdict_seconds", lambda *_: 6.0)
+    monkeypatch.setattr(startup, "import_seconds", lambda name="": 2.0 if name == "torch" else 0.1)
+    figures = startup.bench_startup(dataclasses.replace(setup, quick=False))
+    assert (figures["start_to_first_update_s"], figures["first_compile_s"]) == (4.0, 8.0)
+    assert (figures["import_torch_s"], figures["verdict_s"]) == (2.0, 6.0)
+
+
+def test_a_training_that_ends_without_an_update_is_an_error(tmp_path, monkeypatch):
+    monkeypatch.setattr(startup, "PROGRAM", ("python", "-c", "raise SystemExit(3)"))
+    with pytest.raises(RuntimeError, match="status 3"):
+        startup.first_update_seconds(tmp_path / "run", "cpu")
+
+
+def test_the_measured_blocks_are_those_of_the_configuration():
+    settings = yaml.safe_load((conf_dir() / "appearance" / "blocks.yaml").read_text())
+    del settings["defaults"]
+    assert from_config(AppearanceSettings, settings) == speed.BLOCKS
+
+
+def test_a_training_is_evaluated_for_each_seed(setup, monkeypatch):
+    setup = dataclasses.replace(setup, seeds=(3, 4), quick=False)
+    runs = []
+
+    def train(run, *settings):
+        runs.append(settings)
+        return 2.0 * len(runs), {"frames": 10 * len(runs), "seconds": 0.5, "reason": "solved"}
+
+    monkeypatch.setattr(training, "train", train)
+    monkeypatch.setattr(training, "evaluate", lambda setup, run: {"lower95": 0.9})
+    figures = training.bench_solve(setup)
+    assert [settings[0] for settings in runs] == ["seed=3", "seed=4"]
+    assert (figures["time_to_solve_s"], figures["median_time_to_solve_s"]) == ([2.0, 4.0], 3.0)
+    assert figures["learning_fps"] == 30.0  # of 20 and 40
+    assert (figures["seeds_solved"], figures["success_lower95"]) == (2, [0.9, 0.9])
+    figures = training.bench_experiment(setup, "flight", num_seeds=1)
+    assert figures["flight_frames"] == [30] and "experiment=flight" in runs[-1]
+
+
+def test_results_of_a_killed_sweep_are_equal_except_for_the_time(tmp_path, monkeypatch):
+    monkeypatch.setattr(sweeps, "load_checkpoint", lambda path: torch.load(path, weights_only=True))
+
+    def outcome(weight=1.0, **result):
+        checkpoints = tmp_path / "checkpoints"
+        checkpoints.mkdir(exist_ok=True)
+        torch.save({"policy": {"w": torch.tensor([weight])}}, checkpoints / "last.pt")
+        result = {"reason": "frames", "seconds": 1.0, **result}
+        (tmp_path / "result.json").write_text(json.dumps(result))
+        return sweeps._outcome(tmp_path)
+
+    assert outcome(seconds=99.0) == outcome()
+    assert outcome(weight=1.0 + 2**-20) != outcome() != outcome(reason="solved")
