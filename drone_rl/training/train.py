@@ -34,7 +34,6 @@ from drone_rl.training.learners import NotANumberError, ReinforceLearner
 from drone_rl.training.run_folder import Judge, RunFolder, Training
 from drone_rl.training.trainer import Trainer
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.memory import bound_kernels
 from drone_rl.utils.progress import Progress
 from drone_rl.utils.provenance import num_cores
 from drone_rl.utils.seeding import Stream, as_global_stream, torch_generator
@@ -113,7 +112,6 @@ def learn(
         stack.enter_context(torch.enable_grad())
         stack.enter_context(exploring(greedy=False))
         stack.enter_context(torch_threads(limits.num_threads))  # sums depend on it
-        bound_kernels()
         with as_global_stream(stream):
             parts = components.make_collector(settings, replay)
             stack.callback(parts.collector.shutdown)
