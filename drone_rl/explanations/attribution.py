@@ -44,7 +44,6 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
         "methods": list(heats),
         "shown": methods[0],
         "film": {
-            "episode": FILMED,
             "heat_by": by,
             "key_steps": [{"step": frame - first, "why": why} for frame, why in frames],
         },

@@ -91,10 +91,12 @@ def intervene(
         "target recolored": (torch.where(visible[..., None], recolored, before), visible),
         "ground patch changed": (torch.where(ground[..., None], repainted, before), ground),
     }
-    return [
-        Intervention(name, area, _effect(network, scenes, base, frames, area), frames)
-        for name, (frames, area) in changes.items()
-    ]
+    interventions = []
+    for name, (frames, area) in changes.items():
+        effect = scenes.actions.distance(probabilities(network, scenes.transform(frames)), base)
+        effect = torch.where(area.flatten(1).any(1), effect, torch.nan).double().cpu().numpy()
+        interventions.append(Intervention(name, area, effect, frames))
+    return interventions
 
 
 def clear_frame(change: Intervention) -> int:
@@ -106,13 +108,6 @@ def clear_frame(change: Intervention) -> int:
     covered = change.area.flatten(1).double().mean(1).cpu().numpy()
     is_clear = (effect >= 0.5 * effect.max()) & (covered > 0)
     return int(np.where(is_clear, np.abs(covered - 0.05), np.inf).argmin())
-
-
-def _effect(
-    network: ImageNetwork, scenes: Scenes, base: Tensor, frames: Tensor, area: Tensor
-) -> NDArray:
-    change = scenes.actions.distance(probabilities(network, scenes.transform(frames)), base)
-    return torch.where(area.flatten(1).any(1), change, torch.nan).double().cpu().numpy()
 
 
 def to_the_middle(scenes: Scenes, state: State) -> State:

@@ -135,7 +135,7 @@ def test_statistics_of_the_data_set_by_hand():
 
 
 F, L, R = 0, 1, 2
-UP, DOWN, LEFT, RIGHT, STAY = range(5)
+UP, DOWN, TO_LEFT, TO_RIGHT, STAY = range(5)
 
 
 def flights(actions, episode):
@@ -163,7 +163,21 @@ def test_episodes_with_a_loop_are_counted_once():
 
 def test_loops_with_other_actions():
     """Up and down go nowhere; up and left is a way; staying is nothing that one can undo."""
-    moves = [UP, DOWN, UP, STAY, UP, LEFT, UP, LEFT, STAY, LEFT, RIGHT, LEFT, RIGHT]
+    moves = [
+        UP,
+        DOWN,
+        UP,
+        STAY,
+        UP,
+        TO_LEFT,
+        UP,
+        TO_LEFT,
+        STAY,
+        TO_LEFT,
+        TO_RIGHT,
+        TO_LEFT,
+        TO_RIGHT,
+    ]
     loops = find_loops(flights(moves, [0] * len(moves)), FIVE)
     assert [tuple(loop.values()) for loop in loops] == [(0, 3, 2), (9, 4, 3)]
 

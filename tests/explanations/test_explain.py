@@ -101,26 +101,22 @@ def explain(env, network, folder, settings=SMALL, **kwargs):
         )
 
 
-@pytest.mark.slow
-def test_everything_is_written_and_the_order_of_sections_changes_nothing(make_pipeline, tmp_path):
-    contents, found = [], ALL_SECTIONS
-    for name, order in (("a", list(found)), ("b", list(found)[::-1])):
+def test_the_order_of_sections_changes_no_result(make_pipeline, tmp_path):
+    names, contents = ["dataset", "evaluation", "response", "flaws", "attribution"], []
+    for order in (names, names[::-1]):
         env, actor = make_pipeline(num_envs=30, seed=2, task=TaskSettings(num_cubes=1))
-        network = actor.module[0].module
-        sections = {title: found[title] for title in order}
-        explain(env, network, tmp_path / name, sections=sections)
-        numbers = json.loads((tmp_path / name / "explanation.json").read_text())
+        network, folder = actor.module[0].module, tmp_path / order[0]
+        explain(env, network, folder, sections={name: ALL_SECTIONS[name] for name in order})
+        numbers = json.loads((folder / "explanation.json").read_text())
         del numbers["seconds"], numbers["date"]
-        arrays = np.load(tmp_path / name / "arrays.npz")
-        contents.append((numbers, {key: arrays[key] for key in arrays.files}))
+        with np.load(folder / "arrays.npz") as arrays:
+            contents.append((numbers, dict(arrays)))
         assert sum(len(m._forward_hooks) for m in network.modules()) == 0
     (numbers, arrays), (again, same) = contents
     assert numbers == again
     assert arrays.keys() == same.keys()
     assert all(np.array_equal(arrays[key], same[key], equal_nan=True) for key in arrays)
-    assert 0 <= numbers["dataset"]["entropy"]["mean"] <= 1
     assert numbers["dataset"]["episodes"] == numbers["loops"]["episodes"]["trials"] == 30
-    assert {"verdict", "tsne", "truth", "response", "asymmetry", "loops"} <= numbers.keys()
 
 
 def test_a_section_that_fails_is_left_out_with_the_reason(make_pipeline, tmp_path):

@@ -123,7 +123,7 @@ def follower(scenes):
 
 def test_a_policy_that_follows_the_target_reaches_it(scenes, starts, follower):
     found = measure_outcomes(scenes, follower, starts, np.arange(12))
-    assert found["rollout_of"] == 12
+    assert found["flights"] == 12
     assert found["collected"]["as it was"]["mean"] > 0.8
     assert found["collected"]["moved left"]["mean"] > 0.8
     assert found["follows"]["mean"] > 0.8
@@ -135,7 +135,7 @@ def test_a_constant_policy_follows_nothing(scenes, starts, action):
     found = measure_outcomes(scenes, Always(action), starts, np.arange(12))
     assert found["follows"]["mean"] == 0.0
     assert found["ground_changed"]["mean"] == 0.0
-    assert found["ground_changed"]["upper95"] < 0.5  # twelve rollout_of show no more than that
+    assert found["ground_changed"]["upper95"] < 0.5  # twelve rollouts show no more than that
     # straight on gets what stands ahead; moved by 2 m, half of that leaves the way
     if action is Move.FORWARD:
         ahead = (starts.cubes[:, 0, 1].abs() <= scenes.worlds.task.settings.touch_distance).float()

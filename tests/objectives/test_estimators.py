@@ -52,13 +52,6 @@ def test_time_baseline_ignores_steps_beyond_max_steps():
     assert estimator(long)["return_to_go"].flatten().tolist() == [0.0, 0.0, 4.0]
 
 
-def test_time_baseline_stores_the_mean_over_episodes():
-    estimator = TimeBaseline(0.5, max_steps=3, scale=False)
-    estimator(batch([0.0, 2.0, 3.0], [0, 1, 1]))  # returns 1, 2 and 3: means 2 and 2
-    assert estimator.baseline.tolist() == [2.0, 2.0, 0.0]
-    assert estimator.seen.tolist() == [True, True, False]
-
-
 PURE = {
     "TotalReward": lambda r, d: returns.total_reward(r, d),
     "RewardToGo": lambda r, d: returns.reward_to_go(r, d, 0.7),
@@ -101,12 +94,6 @@ def test_wrong_returns_of_an_estimator_of_ones_own_are_named(result, fault):
     where = rf"Own of {__file__} returns {fault} for rewards of shape \(2, 1\); return a tensor"
     with pytest.raises(InputError, match=where):
         Own(scale=False)(batch([0.0, 1.0], [0, 1]))
-
-
-@pytest.mark.parametrize("decay", [1.0, -0.1])
-def test_invalid_decay_raises(decay):
-    with pytest.raises(InputError, match=f"decay={decay}"):
-        TimeBaseline(decay=decay)
 
 
 GAMMA, LMBDA = 0.5, 0.4

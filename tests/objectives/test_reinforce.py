@@ -219,18 +219,6 @@ def test_masked_loss_equals_sliced_loss():
     )
 
 
-def test_keys_can_be_set_and_nested():
-    _, actor = make()
-    batch = make_batch()
-    loss = ReinforceLoss(actor, entropy_coeff=0.0)
-    expected = loss(batch)["loss_actor"]
-    loss.set_keys(action=("agent", "move"), return_to_go=("agent", "credit"))
-    moved = batch.exclude("action", "return_to_go")
-    moved["agent"] = {"move": batch["action"], "credit": batch["return_to_go"]}
-    torch.testing.assert_close(loss(moved)["loss_actor"], expected)
-    assert ("agent", "move") in loss.in_keys
-
-
 def test_invalid_arguments_raise():
     _, actor = make()
     with pytest.raises(InputError, match="mean, sum, episode_mean or none"):

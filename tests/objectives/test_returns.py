@@ -178,20 +178,6 @@ def test_scaling_rewards_scales_returns_or_changes_nothing(episodes, factor):
         torch.testing.assert_close(found, plain, atol=1e-3, rtol=1e-3)
 
 
-@given(EPISODES)
-@QUICK
-def test_leave_one_out_is_the_scaled_deviation_from_the_mean(episodes):
-    """g - (sum - g) / (n - 1) = (g - mean) n / (n - 1), so the sum at each step is 0."""
-    to_go = split(returns.reward_to_go(*flat(episodes), 0.9), episodes)
-    found = split(returns.leave_one_out(*flat(episodes), 0.9), episodes)
-    for t in range(max(len(e) for e in episodes)):
-        alive = [i for i, e in enumerate(episodes) if len(e) > t]
-        n, mean = len(alive), sum(to_go[i][t] for i in alive) / len(alive)
-        for i in alive:
-            wanted = (to_go[i][t] - mean) * n / (n - 1) if n > 1 else to_go[i][t]
-            assert found[i][t] == pytest.approx(wanted, abs=1e-4)
-
-
 @pytest.mark.parametrize("name", ESTIMATORS)
 def test_unfinished_tail_raises(name):
     with pytest.raises(InputError, match="complete episodes"):

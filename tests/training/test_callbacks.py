@@ -1,5 +1,4 @@
 import csv
-import logging
 import types
 
 import pytest
@@ -9,10 +8,9 @@ from drone_rl.training import (
     CheckpointCallback,
     CsvCallback,
     LoggerCallback,
-    ProgressCallback,
     callbacks,
 )
-from drone_rl.training.callbacks import CollapseCheck, ForwardProgress, Progress
+from drone_rl.training.callbacks import CollapseCheck, Progress
 from drone_rl.utils.checkpoint import load_checkpoint, save_checkpoint
 from drone_rl.utils.errors import InputError
 from tests.training_loop import run
@@ -104,21 +102,6 @@ def test_passes_over_demonstrations_have_rows_of_their_own(tmp_path):
     assert not (tmp_path / "metrics.csv").exists()
 
 
-def test_passes_are_logged_by_torchrl_and_forwarded(tmp_path):
-    logger, messages = CSVLogger("run", log_dir=str(tmp_path)), []
-    LoggerCallback([logger]).on_clone(3, 9, METRICS)
-    (path,) = tmp_path.glob("run/scalars/**/*loss*.csv")
-    assert path.read_text().strip() == "3,0.25"
-    late = LoggerCallback(lambda: [CSVLogger("late", log_dir=str(tmp_path))])
-    late.on_clone(3, 9, METRICS)
-    (path,) = tmp_path.glob("late/scalars/**/*loss*.csv")
-    assert path.read_text().strip() == "3,0.25"
-    ForwardProgress(lambda *message: messages.append(message)).on_clone(
-        3, 9, {"cloning/accuracy": 0.5}
-    )
-    assert messages == [("cloning: accuracy 0.500", 3, 9)]
-
-
 def collapse(updates, episodes=10, target=3.0):
     """A check after updates of (entropy, running reward), with so many episodes each."""
     check, progress = CollapseCheck(target), Progress()
@@ -162,29 +145,3 @@ def test_torchrl_loggers_are_supported(make_trainer, tmp_path):
     logger = CSVLogger("run", log_dir=str(tmp_path))
     run(make_trainer(callbacks=[LoggerCallback([logger])]))
     assert list(tmp_path.glob("run/scalars/**/*reward*.csv"))
-
-
-class Clock:
-    """A clock that advances only when set."""
-
-    def __init__(self, monkeypatch):
-        self.now = 1000.0
-        monkeypatch.setattr(callbacks.time, "monotonic", lambda: self.now)
-
-
-def test_progress_line_estimates_the_remaining_time(monkeypatch, caplog):
-    """70 of 100 frames remain at 10 frames/s; the estimate is never negative."""
-    caplog.set_level(logging.INFO)
-    clock, callback = Clock(monkeypatch), ProgressCallback(interval_s=5.0)
-    progress = types.SimpleNamespace(frames=30, episodes=2, running_reward=1.5)
-    training = types.SimpleNamespace(total_frames=100, progress=progress)
-    callback.on_start(training)
-    for now, frames in ((1004.9, 30), (1005.0, 30), (1009.9, 60), (1010.0, 130)):
-        clock.now, progress.frames = now, frames
-        callback.on_update(training, {"time/frames_per_second": 10.0})
-    lines = [record.getMessage() for record in caplog.records]
-    assert [line.rpartition(", ")[2] for line in lines] == [
-        "at most 7 s left",
-        "at most 0 s left",
-    ]
-    assert lines[0].startswith("frames 30, episodes 2, running reward 1.50, 10 frames/s")

@@ -7,7 +7,7 @@ import pytest
 import torch
 from torch.nn.functional import cross_entropy
 
-from drone_rl.config import ActionSettings, CameraSettings
+from drone_rl.config import CameraSettings
 from drone_rl.config.networks import Mlp
 from drone_rl.config.training import CloningSettings, TrainSettings
 from drone_rl.config.transforms import Gray, Stack, Standardize
@@ -30,7 +30,6 @@ SETTINGS = TrainSettings(
     network=Mlp(hidden=(8,)),
     cloning=CloningSettings(epochs=60, lr=0.02, minibatch_size=8),
 )
-VELOCITY = SETTINGS.replace(actions=ActionSettings(kind="velocity"))
 LEVELS = np.array([30, 130, 230], np.uint8)
 """Brightness of the images in which actions 0, 1 and 2 are taken."""
 SPEEDS = np.array([[-0.5, 0.6, 0.0], [0.0, 0.0, 0.6], [0.5, -0.6, -0.2]], np.float32)
@@ -145,17 +144,6 @@ def test_a_network_learns_the_actions_of_the_flights():
     assert [row[:2] for row in note.rows] == [(epoch, 60) for epoch in range(1, 61)]
     names = ("loss", "accuracy", "held_out_loss", "held_out_accuracy")
     assert note.rows[-1][2] == {f"cloning/{name}": done[name] for name in names}
-
-
-def test_a_network_learns_continuous_actions():
-    flights = [flight(seed, settings=VELOCITY) for seed in range(5)]
-    own = network(VELOCITY)
-    done = clone(VELOCITY, own, flights)["cloning"]
-    assert done["accuracy"] == 1.0 and done["held_out_loss"] < 0
-    frames = RecordedFrames.of(flights, "cpu")
-    observed = frames.observe(torch.arange(60), [t.make() for t in SETTINGS.transforms])
-    greedy = own.actions.greedy(own(observed)).detach()
-    assert float((greedy - frames.actions).abs().max()) < 0.2
 
 
 def test_one_epoch_is_one_step_of_adam_for_each_minibatch():

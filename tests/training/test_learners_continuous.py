@@ -8,11 +8,10 @@ from tensordict import TensorDict
 from torchrl.objectives import A2CLoss, ClipPPOLoss
 
 from drone_rl.objectives import Advantages, ReinforceLoss
-from drone_rl.objectives.estimators import LeaveOneOut
 from drone_rl.policies import MLP, ActorCritic, make_actor
 from drone_rl.policies.actor import SquashedNormal
 from drone_rl.sim.continuous_actions import ContinuousActions
-from drone_rl.training import ActorCriticLearner, ReinforceLearner
+from drone_rl.training import ActorCriticLearner
 from tests.continuous import SETTINGS, make_env
 
 ACTIONS = ContinuousActions.of(SETTINGS)
@@ -114,32 +113,3 @@ def test_reinforce_mean_gradient_equals_that_of_the_expected_reward(policy):
     assert error[0] < 0.02 * slope
     expected = torch.tensor([slope, 0, 0, 0, 0, 0])
     assert ((estimates.mean(0) - expected).abs() < 4 * error + 1e-4).all()
-
-
-@pytest.mark.parametrize("kind", [None, A2CLoss, ClipPPOLoss])
-def test_policy_converges_to_the_best_action(policy, kind):
-    """The reward is -|a - target|^2; the policy approaches the target with smaller deviations."""
-    network, actor = policy
-    target = torch.tensor([0.5, -0.3, 0.0])
-    if kind is None:
-        optimizer = torch.optim.Adam(network.parameters(), lr=0.02)
-        loss = ReinforceLoss(actor, entropy_coeff=0.0)
-        learner = ReinforceLearner(network=network, loss=loss, optimizer=optimizer)
-        estimate = LeaveOneOut(1.0, scale=False)
-    else:
-        model = ActorCritic(network, None, generator())
-        learner = learner_of(network, model, kind, epochs=2)
-        estimate = learner.estimate
-    metrics = {}
-    for _ in range(120):
-        batch = actor(TensorDict({"pixels": torch.ones(128, *SHAPE)}, [128]))
-        reward = -((batch["action"] - target) ** 2).sum(-1, keepdim=True)
-        ends = torch.ones(128, 1, dtype=torch.bool)
-        after = {"pixels": batch["pixels"], "reward": reward, "done": ends, "terminated": ends}
-        batch = batch.exclude("logits").set("next", TensorDict(after, [128]))
-        metrics = learner.update(estimate(batch if kind is None else batch.unsqueeze(1)))
-    with torch.no_grad():
-        outputs = network(torch.ones(1, *SHAPE))
-        assert (ACTIONS.greedy(outputs)[0] - target).abs().max() < 0.12
-        assert SquashedNormal(outputs).scale.max() < 0.45 < DEVIATION
-    assert all(math.isfinite(value) for value in metrics.values())

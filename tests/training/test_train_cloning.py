@@ -9,7 +9,6 @@ import torch
 import drone_rl
 from drone_rl.config import TaskSettings
 from drone_rl.config.learning import Episodes, Ppo
-from drone_rl.config.networks import Lstm
 from drone_rl.config.training import CloningSettings, TrainerSettings, TrainSettings
 from drone_rl.training.demonstrations import record_oracle
 from drone_rl.utils.errors import InputError
@@ -97,11 +96,6 @@ def test_a_resumed_run_needs_no_demonstrations(cloned, tmp_path):
         assert done.result["cloning"] == cloned[0].result["cloning"]
     with pytest.raises(InputError, match=r"^can't resume with cloning\.epochs=9: .*epochs=3"):
         drone_rl.train(folder=folder, resume=True, cloning=CloningSettings(epochs=9))
-
-
-def test_recurrent_policies_are_not_cloned(flights, tmp_path):
-    with pytest.raises(InputError, match=r"remembers earlier frames .* cloning .* set another"):
-        drone_rl.train(TINY, network=Lstm(), demonstrations=str(flights), folder=tmp_path)
 
 
 def test_a_critic_continues_from_the_clone(flights, tmp_path):

@@ -1,6 +1,5 @@
 import enum
 import signal
-import threading
 
 import pytest
 import torch
@@ -86,17 +85,6 @@ def test_signal_during_confirmation_stops_after_it(make_trainer):
     trainer = make_trainer(target=-1e6, confirm=confirm)
     assert run(trainer) == "SIGTERM"
     assert calls == [0]
-
-
-def test_other_threads_install_no_signal_handlers(make_trainer):
-    before = signal.getsignal(signal.SIGTERM)
-    seen = []
-    look = At(1, lambda _: seen.append(signal.getsignal(signal.SIGTERM)))
-    trainer = make_trainer(callbacks=[look])
-    thread = threading.Thread(target=run, args=(trainer,))
-    thread.start()
-    thread.join()
-    assert seen == [before] and trainer.progress.frames >= trainer.total_frames
 
 
 class Terminated(BaseException):
