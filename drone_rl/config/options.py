@@ -52,9 +52,8 @@ class JudgeOptions(HeldOutOptions, total=False):
 
 
 class BodiesOptions(JudgeOptions, total=False):
-    """Fields of `BodiesSettings`."""
+    """Fields of `BodiesSettings` except the policies."""
 
-    policies: Sequence[str]
     bodies: Sequence[str]
     loop_flights: int
 
@@ -134,10 +133,9 @@ class GymnasiumOptions(DeviceOptions, total=False):
     render_mode: str | None
 
 
-class DynamicsOptions(TypedDict, total=False):
-    """Fields of `DynamicsSettings`."""
+class VehicleOptions(TypedDict, total=False):
+    """Fields of `DynamicsSettings` except its mode."""
 
-    mode: str
     camera_mount: str
     control_ticks: int
     tick: float
@@ -167,8 +165,14 @@ class DynamicsOptions(TypedDict, total=False):
     position_gain: float
 
 
-class TrainOptions(TypedDict, total=False):
-    """Fields of `TrainSettings`."""
+class DynamicsOptions(VehicleOptions, total=False):
+    """Fields of `DynamicsSettings`."""
+
+    mode: str
+
+
+class UnseededTrainOptions(TypedDict, total=False):
+    """Fields of `TrainSettings` except the seed."""
 
     task: BaseTaskSettings | str | Mapping[str, Any]
     appearance: AppearanceSettings | str | Mapping[str, Any]
@@ -185,7 +189,12 @@ class TrainOptions(TypedDict, total=False):
     trainer: TrainerSettings | Mapping[str, Any]
     demonstrations: str | None
     cloning: CloningSettings | Mapping[str, Any]
-    seed: int
     device: str
     renderer: str
     evaluate_after: int
+
+
+class TrainOptions(UnseededTrainOptions, total=False):
+    """Fields of `TrainSettings`."""
+
+    seed: int

@@ -198,7 +198,7 @@ def policy_from(
     of_env: Mapping[str, Any] = getattr(network, "conditions", {})
     observations: Any = getattr(network, "observations", None)
     dynamics = of_env.get("dynamics", dynamics) if dynamics is COMPUTER_VISION else dynamics
-    appearance = Instance(AppearanceSettings).read(appearance, "appearance")
+    trained_in: AppearanceSettings = Instance(AppearanceSettings).read(appearance, "appearance")
     policy = ExternalPolicy(
         name=name or of_env.get("name") or getattr(network, "__name__", type(network).__name__),
         logits=network,
@@ -212,8 +212,8 @@ def policy_from(
         actions=of_env.get("actions", actions) if actions is MOVES_SETTINGS else actions,
         own_dynamics=dynamics,
         dynamics=dynamics,
-        own_appearance=appearance,
-        appearance=appearance,
+        own_appearance=trained_in,
+        appearance=trained_in,
     )
     policy.make_network()  # raises errors early
     if observations is None:

@@ -28,7 +28,7 @@ from drone_rl.config import (
     read_task,
 )
 from drone_rl.config.configuration import from_arguments
-from drone_rl.config.options import TrainOptions
+from drone_rl.config.options import UnseededTrainOptions
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.policies.baselines import oracle_policy
@@ -293,7 +293,7 @@ def record_oracle(
     *,
     flights: int = 30,
     seed: int = 0,
-    **changes: Unpack[TrainOptions],
+    **changes: Unpack[UnseededTrainOptions],
 ) -> list[Path]:
     """Record flights of the task's oracle, which acts by the true state.
 

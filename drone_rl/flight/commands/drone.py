@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.config.options import DynamicsOptions
+from drone_rl.config.options import VehicleOptions
 from drone_rl.config.sensors import SensorSettings
 from drone_rl.flight.commands import checks
 from drone_rl.flight.commands.command import (
@@ -68,7 +68,7 @@ class Drone:
         obstacles: Obstacles | None = None,
         worlds: Worlds | None = None,
         sensors: SensorSettings | None = None,
-        **changes: Unpack[DynamicsOptions],
+        **changes: Unpack[VehicleOptions],
     ) -> None:
         """Put a disarmed drone on the ground.
 
