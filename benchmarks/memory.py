@@ -63,6 +63,7 @@ def growth(samples: Sequence[tuple[int, float]], settling: int) -> float | None:
 def main(folder: str, frames: str, device: str) -> None:
     """Train as `drone-rl train` does and print the resident memory after each update."""
     gc.set_threshold(50_000, 50, 100)
+    os.environ.setdefault("ONEDNN_PRIMITIVE_CACHE_CAPACITY", "128")
     leave_compiler_unloaded()
     import drone_rl
     from drone_rl.config.training import TrainerSettings

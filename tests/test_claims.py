@@ -61,6 +61,7 @@ CHANGES = [
     ("report", "truth.ground", {"truth.outcomes.ground_changed.upper95": 0.4}),
     ("sweep", "runs.failed", {"failed": 0}),
     ("sweep", "best.chosen", {"best.certain": False}),
+    ("sweep", "sides.not_offered", {"sides_not_offered": 0}),
     ("shifts", "shifts.good", {"domain.ranges.sun.high_open": False}),
     ("shifts", "shifts.not", {"domain.ranges.brightness.failed.0.bad": False}),
     ("shifts", "shifts.none", {"domain.plain.good": True}, NOWHERE_GOOD),

@@ -20,8 +20,6 @@ MUTABLE = {
     "explanations.heat_maps:Explainer",
     "explanations.truth:Intervention",
     "explanations.report.explanation:Explanation",
-    "explanations.response:OutcomeMap",
-    "explanations.response:ResponseMap",
     "explanations.rollouts:RolloutDataset",
     "trust.domain:End",
     "sweeps.figures:Layout",

@@ -1,4 +1,4 @@
-"""`import drone_rl` is fast and provides all public names."""
+"""`import drone_rl` is fast and provides all public names; `python -m drone_rl`."""
 
 import subprocess
 import sys
@@ -16,7 +16,7 @@ def test_every_public_name_is_available():
     assert {"train", "load_policy", "judge", "InputError"} <= {*drone_rl.__all__}
 
 
-def test_a_public_result_shows_its_text_at_a_prompt():
+def test_the_repr_of_results_is_their_text():
     """Not the thousands of numbers in its fields."""
     classes = [c for c in map(drone_rl.__getattr__, drone_rl.__all__) if isinstance(c, type)]
     shown = [c for c in classes if hasattr(c, "_repr_html_") and c.__str__ is not object.__str__]
@@ -44,3 +44,9 @@ def test_imports_print_no_warning():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == ("", "")
+
+
+def test_python_m_drone_rl_is_the_command():
+    command = [sys.executable, "-m", "drone_rl", "--version"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout == f"drone-rl {drone_rl.__version__}\n"

@@ -114,6 +114,8 @@ def _main(args: list[str]) -> int:
 def _configure_process() -> None:
     """Set what libraries read when they are imported."""
     gc.set_threshold(50_000, 50, 100)  # imports create half a million objects and no garbage
+    # oneDNN keeps a kernel for each batch length; enough for two layers and 32 environments
+    os.environ.setdefault("ONEDNN_PRIMITIVE_CACHE_CAPACITY", "128")
     os.environ["MPLBACKEND"] = "agg"  # a notebook's backend may be missing here
     if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
         os.environ["MUJOCO_GL"] = "disabled"  # only the viewer's window needs OpenGL

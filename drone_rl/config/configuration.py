@@ -304,7 +304,7 @@ def read_other_names() -> dict[str, Any]:
 
 
 def from_arguments(
-    of: type[S], settings: S | None, changes: Mapping[str, Any], function: Callable[..., Any]
+    of: type[S], settings: S | None, changes: Mapping[str, object], function: Callable[..., Any]
 ) -> S:
     """Return a function's settings, the defaults if None, with its changes to them.
 

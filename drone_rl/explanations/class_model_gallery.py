@@ -4,7 +4,7 @@ import dataclasses
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import torch
@@ -22,7 +22,11 @@ from drone_rl.explanations.class_models import (
 from drone_rl.explanations.hooks import actions_of
 from drone_rl.explanations.rollouts import collect
 from drone_rl.explanations.scenes import Scenes
-from drone_rl.explanations.settings import ClassModelSettings, ClassModelsSettings
+from drone_rl.explanations.settings import (
+    ClassModelSettings,
+    ClassModelsOptions,
+    ClassModelsSettings,
+)
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
@@ -156,7 +160,7 @@ def class_models(
     *,
     task: Mapping[str, Any] | None = None,
     outputs: str | Path = "outputs",
-    **changes: Any,
+    **changes: Unpack[ClassModelsOptions],
 ) -> ClassModels:
     """Optimize an observation for each action of a policy (section 5.2, Eq. 18).
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from drone_rl.explanations import attribution, behavior, class_models, embedding
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.report.explanation import FORMAT, FORMAT_VERSION
-from drone_rl.explanations.settings import ExplainSettings
+from drone_rl.explanations.settings import ExplainOptions, ExplainSettings
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
@@ -94,7 +94,7 @@ def explain(
     progress: Progress | None = None,
     more_sections: Mapping[str, Section] | None = None,
     find_claim: FindClaim | None = None,
-    **changes: Any,
+    **changes: Unpack[ExplainOptions],
 ) -> Explanations:
     """Explain what policies respond to and whether they can be trusted.
 

@@ -42,7 +42,7 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     return numbers, arrays
 
 
-@dataclasses.dataclass(kw_only=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class TargetGrid:
     """Places of one target: Z up, F ahead, L sideways."""
 
@@ -53,7 +53,7 @@ class TargetGrid:
     stratum: NDArray  # (L,); the task's stratum of a target there: its side
 
 
-@dataclasses.dataclass(kw_only=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class ResponseMap(TargetGrid):
     """Action probabilities for one target at each place."""
 
@@ -62,7 +62,7 @@ class ResponseMap(TargetGrid):
     blind: NDArray  # (Z, F, L) bool; see `find_blind`
 
 
-@dataclasses.dataclass(kw_only=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class OutcomeMap(TargetGrid):
     """Whether greedy rollouts reach a target at each place."""
 

@@ -1,6 +1,6 @@
 """Settings of an explanation."""
 
-from typing import Annotated
+from typing import Annotated, TypedDict
 
 from drone_rl.config import RendererName
 from drone_rl.utils.errors import InputError
@@ -104,3 +104,37 @@ def check_perplexity(perplexity: float, count: int) -> None:
             f"perplexity={perplexity:g} does not fit {count} points; give 1 to {largest} or "
             "record more frames"
         )
+
+
+class ClassModelsOptions(TypedDict, total=False):
+    """Fields of `ClassModelsSettings`."""
+
+    maximize: str
+    parameterisation: str
+    initial: str
+    steps: int
+    step: str
+    lr: float
+    normalize: str
+    blur: float
+    clamp: bool
+    l2: float
+    jitter: int
+    starts: int
+    gallery: bool
+    episodes: int
+    seed: int | None
+
+
+class ExplainOptions(TypedDict, total=False):
+    """Fields of `ExplainSettings`."""
+
+    frames: int
+    data_episodes: int
+    episodes: int
+    good_share: float
+    layer: str | None
+    grad_cam_layer: str | None
+    perplexity: float
+    seed: int | None
+    renderer: str

@@ -23,6 +23,7 @@ from drone_rl.config import (
     settings_of,
 )
 from drone_rl.config.configuration import Changes, as_changes
+from drone_rl.config.options import DynamicsOptions
 from drone_rl.config.transforms import Frame, Gray, Rgb, Standardize, Transform, as_transforms
 from drone_rl.policies import ExternalNetwork
 from drone_rl.policies.environment import EnvOptions, make_env
@@ -83,7 +84,7 @@ class ExternalPolicy(BasePolicy):
         with prefixed_errors("task"):
             return dataclasses.replace(self, task=self.task.replace(**changed))
 
-    def in_dynamics(self, **changes: Any) -> "ExternalPolicy":
+    def in_dynamics(self, **changes: Unpack[DynamicsOptions]) -> "ExternalPolicy":
         """Return the same policy with other dynamics, such as `in_dynamics(wind=(5, 0, 0))`."""
         changed = Changes(DynamicsSettings).read(changes, "dynamics")
         with prefixed_errors("dynamics"):

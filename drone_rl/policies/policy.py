@@ -22,6 +22,7 @@ from drone_rl.config import (
     DynamicsSettings,
 )
 from drone_rl.config.configuration import Changes
+from drone_rl.config.options import DynamicsOptions
 from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transforms
 from drone_rl.policies import ImageNetwork, RecurrentNetwork, make_actor
 from drone_rl.policies.environment import EnvOptions
@@ -110,7 +111,7 @@ class BasePolicy(abc.ABC):
         """
 
     @abc.abstractmethod
-    def in_dynamics(self, **changes: Any) -> Self:
+    def in_dynamics(self, **changes: Unpack[DynamicsOptions]) -> Self:
         """Return the same policy with other dynamics: `policy.in_dynamics(mode="simple_flight")`.
 
         Raises:
@@ -243,7 +244,7 @@ class Policy(BasePolicy):
         described["task"] |= changed
         return dataclasses.replace(self, description=parse(described))
 
-    def in_dynamics(self, **changes: Any) -> "Policy":
+    def in_dynamics(self, **changes: Unpack[DynamicsOptions]) -> "Policy":
         """Return the same policy with other dynamics, as in `in_dynamics(mode="simple_flight")`."""
         changed = Changes(DynamicsSettings).read(changes, "dynamics")
         described = self.description.as_dict()

@@ -58,7 +58,7 @@ class RoundingBound:
     """Bounds for the present weights of one network."""
 
     def __init__(self, layers: list[Layer], actions: Actions) -> None:
-        self._layers, self._actions = layers, actions
+        self.layers, self._actions = layers, actions
 
     @classmethod
     def find(cls, network: nn.Module) -> Self | None:
@@ -106,7 +106,7 @@ class RoundingBound:
         largest = largest_of(pixels)
         error = _pixel_error(largest.amax().clamp(min=UNIT)).expand_as(largest)
         value = pixels
-        for layer in self._layers:
+        for layer in self.layers:
             error = layer.bound(value, error)
             value = layer(value)
         return value, error[0].nan_to_num(nan=torch.inf)
@@ -146,7 +146,7 @@ class RoundingBound:
         first = first[:, None, None, None].expand_as(value)
         error, notes = first, []
         overflows = torch.zeros(len(pixels), dtype=torch.bool, device=pixels.device)
-        for layer in self._layers:
+        for layer in self.layers:
             value, error, note = layer.run(value, error)
             overflows |= ~error.flatten(1).isfinite().all(-1)
             notes.append(note)
@@ -161,7 +161,7 @@ class RoundingBound:
         value, first, notes, overflows = self._run(pixels)
         slope = weigh(value)
         total = torch.zeros(slope.shape[:2], dtype=torch.float64, device=pixels.device)
-        for layer, note in zip(reversed(self._layers), reversed(notes), strict=True):
+        for layer, note in zip(reversed(self.layers), reversed(notes), strict=True):
             if note.local is not None:
                 total += (slope.abs() * note.local[:, None]).flatten(2).sum(-1)
             slope = layer.back(slope, note)

@@ -1,7 +1,5 @@
-"""A dm_control task for any `Task`: its rules and dynamics with a batch of one."""
+"""A dm_control task for any `Task`: one environment of `Worlds`."""
 
-import dataclasses
-import functools
 from typing import Any
 
 import numpy as np
@@ -16,19 +14,18 @@ from drone_rl.config import (
     DynamicsSettings,
 )
 from drone_rl.sim import entities
-from drone_rl.sim.dynamics import BodyState, Dynamics, draw_seeds, make_dynamics
-from drone_rl.sim.dynamics.state import twist_about_z
+from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.quiet_dm_control import composer, mjcf, observable
-from drone_rl.sim.rendering import Appearance, Poses, Raytracer, View
-from drone_rl.sim.rendering.scene import Scene, SemanticClass, compiled
-from drone_rl.sim.tasks import State, Task, as_task
-from drone_rl.sim.tasks.common import HIDDEN_DEPTH
+from drone_rl.sim.rendering import Appearance
+from drone_rl.sim.scene_model import SceneModel
+from drone_rl.sim.tasks import State, Task
 from drone_rl.sim.visual_randomization import AppearanceSampler
+from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.plugins import errors_of, place_of
 
 CONTROL_TIMESTEP_S = 0.1
 """Simulated time of one step, seconds. Computer-vision mode has no physics to depend on it."""
+_ONLY = torch.zeros(1, dtype=torch.int64)
 
 
 def seconds_per_step(dynamics: Dynamics) -> float:
@@ -39,7 +36,7 @@ def seconds_per_step(dynamics: Dynamics) -> float:
 class ComposerTask(composer.Task):
     """A field with the drone and a task's props. The discount is 0 at termination, 1 at truncation.
 
-    Dynamics move the drone, as in `Worlds`; MuJoCo's physics does not.
+    The drone moves by its dynamics, as in `worlds`; MuJoCo's physics does not move it.
     """
 
     def __init__(
@@ -69,50 +66,51 @@ class ComposerTask(composer.Task):
             InputError: A texture can't be read, camera or distractors do not fit, or dynamics with
                 actions of their own are given other ones.
         """
-        self.rules = as_task(task)
-        self.dynamics = make_dynamics(self.rules.make_dynamics, dynamics, actions)
-        self.rules.check_actions(self.dynamics.actions)
-        self.camera = camera or CameraSettings()
         self._sampler = None
         if appearance is not None and not appearance.is_minimal:
-            self._sampler = AppearanceSampler(appearance, 1, task=self.rules, camera=self.camera)
+            self._sampler = AppearanceSampler(appearance, 1, task=task, camera=camera)
             distractors = self._sampler.distractors
-        self._distractors = distractors
-        self._arena = entities.Field()
-        model: Any = self._arena.mjcf_model
-        model.option.gravity = (0, 0, 0)
-        self.drone = entities.DroneEntity(size=self.rules.drone_size, camera=self.camera)
-        self._arena.add_free_entity(self.drone)
-        with errors_of(f"task={self.rules.name}", place_of(self.rules.make_props)):
-            props = self.rules.make_props()
-        self._props = [*props, *entities.make_distractors(distractors)]
-        self._frames = [self._arena.attach(prop) for prop in self._props]
-        for frame in self._frames:
-            frame.mocap = True
+        self.worlds = Worlds(
+            1,
+            task,
+            camera,
+            dynamics=dynamics,
+            actions=actions,
+            distractors=distractors,
+            num_shards=1,
+        )
+        self.camera = self.worlds.camera
+        self._model = SceneModel(self.worlds.task, self.camera, distractors)
+        self.drone = self._model.drone
+        self._reward = 0.0
         self.appearance: Appearance | None = None
         """Appearance of the running episode; None for the task's own."""
-        self._begin(np.random.RandomState(0))
         self._task_observables: dict[str, observable.Observable] = {
             name: observable.Generic(lambda _, name=name: self._read(name))
-            for name in self.rules.observed
+            for name in self.worlds.task.observed
         }
         if pixels:
             self._task_observables["drone/front_center"] = self._camera_observable()
         for info in self._task_observables.values():
             info.enabled = True
-        self.set_timesteps(*(seconds_per_step(self.dynamics),) * 2)
+        self.set_timesteps(*(seconds_per_step(self.worlds.dynamics),) * 2)
 
     def __getstate__(self) -> dict[str, Any]:
         """Refuse to copy or pickle, which dm_control's models do not support."""
         raise InputError(
-            f"a dm_control environment of task={self.rules.name} can't be copied or pickled; "
+            f"a dm_control environment of task={self.worlds.task.name} can't be copied or pickled; "
             "call make_environment again"
         )
 
     @property
+    def state(self) -> State:
+        """State of the running episode, as a batch of one."""
+        return self.worlds.state
+
+    @property
     def root_entity(self) -> entities.Field:
         """The arena."""
-        return self._arena
+        return self._model.field
 
     @property
     def task_observables(self) -> dict[str, observable.Observable]:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -121,50 +119,36 @@ class ComposerTask(composer.Task):
 
     def action_spec(self, physics: mjcf.Physics) -> specs.Array:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the spec of the dynamics' action."""
-        entry = self.dynamics.actions.entry
+        entry = self.worlds.dynamics.actions.entry
         if entry.dtype == torch.int64 and entry.high is not None:
             return specs.DiscreteArray(int(entry.high) + 1, name="action")
         low, high = (-np.inf if v is None else v for v in (entry.low, entry.high))
         return specs.BoundedArray(entry.shape, np.float64, low, high, name="action")
-
-    def compile(self) -> Scene:
-        """Return the model that dm_control simulates, with the semantic classes of its geoms."""
-        arena: Any = self._arena.mjcf_model  # None in dm_control's annotations
-        physics = compiled(arena, f"the scene of task={self.rules.name}")
-        model = physics.model.ptr
-        classes, props = [SemanticClass.GROUND] * model.ngeom, [-1] * model.ngeom
-        for number, entity in [(-1, self.drone), *enumerate(self._props)]:
-            for geom in physics.bind(entity.mjcf_model.find_all("geom")).element_id:
-                classes[geom], props[geom] = entity.semantic_class, number
-        return Scene(model, tuple(classes), tuple(props), entities.SKY_COLOR)
 
     def initialize_episode(
         self, physics: mjcf.Physics, random_state: np.random.RandomState
     ) -> None:
         """Put the drone at its origin and the props where they are sampled."""
         if self._sampler is not None:
-            self._sampler.reset(torch.arange(1), [random_state])
+            self._sampler.reset(_ONLY, [random_state])
             self.appearance = self._sampler.current() or self._sampler.middle
-        self._begin(random_state)
+        self.worlds.reset(_ONLY, [random_state])
+        self._reward = 0.0
         self._show(physics)
 
     def before_step(
         self, physics: mjcf.Physics, action: np.ndarray, random_state: np.random.RandomState
     ) -> None:
-        """Move the drone."""
-        entry = self.dynamics.actions.entry
+        """Move the drone and apply the task's rules."""
+        entry = self.worlds.dynamics.actions.entry
         actions = torch.as_tensor(action).reshape(1, *entry.shape).to(entry.dtype)
-        around = [self.rules.obstacles(self.state)] if self.dynamics.needs_obstacles else []
         self.state.body = self._locate(physics)
-        self._body = self.dynamics.step(self.state.body, actions, *around)
-        self._show(physics)
+        self._reward = float(self.worlds.step(_ONLY, actions))
 
     def after_step(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
-        """Apply the task's rules."""
-        self.state, reward = self.rules.step(self.state, self._locate(physics))
-        self._body, self._reward = self.state.body, float(reward)
+        """Show the new state, whatever MuJoCo's physics did."""
         self._show(physics)
-        physics.forward()  # what is observed next must not show things that have just vanished
+        physics.forward()
 
     def get_reward(self, physics: mjcf.Physics) -> float:
         """Return the reward of the last step."""
@@ -176,38 +160,28 @@ class ComposerTask(composer.Task):
 
     def get_discount(self, physics: mjcf.Physics) -> float:
         """Return 0 if the episode terminated, else 1."""
-        return 1.0 if int(self.state.end_reason) in (0, self.rules.truncation) else 0.0
-
-    def _begin(self, random_state: np.random.RandomState) -> None:
-        origin = torch.tensor([self.rules.origin], dtype=torch.float64)
-        sampled = self.rules.sample(random_state)
-        seeds = [draw_seeds([random_state])] if self.dynamics.is_random else []
-        self.state: State = self.rules.start(sampled[None], self.dynamics.start(origin, *seeds))
-        """State of the running episode, as a batch of one."""
-        self._body, self._reward = self.state.body, 0.0
+        return 1.0 - float(self.worlds.ends()[0])
 
     def _locate(self, physics: mjcf.Physics) -> BodyState:
         """Return the drone at MuJoCo's pose, which users may have set."""
-        body, expected = self._body, camera_attitude(self.dynamics, self._body)
+        body, attitude = self.state.body, self.worlds.poses(self.state).attitude
         place, turn = (torch.from_numpy(np.array(p))[None] for p in self.drone.get_pose(physics))
-        cosine = torch.cosine_similarity(turn, expected).abs()  # MuJoCo normalizes quaternions
+        cosine = torch.cosine_similarity(turn, attitude).abs()  # MuJoCo normalizes quaternions
         is_same = bool(cosine > 1.0 - 1e-12) and torch.equal(place, body.position)
         return body if is_same else body.moved(place, turn)
 
-    def _poses(self) -> Poses:
-        state = dataclasses.replace(self.state, body=self._body)
-        return poses_of(self.rules, self.dynamics, state, self._distractors, self.appearance)
-
     def _show(self, physics: mjcf.Physics) -> None:
-        poses = self._poses()
+        poses = self.worlds.poses(self.state, self.appearance)
         self.drone.set_pose(physics, poses.position[0].numpy(), poses.attitude[0].numpy())
-        for frame, place in zip(self._frames, poses.props[0], strict=True):
+        for frame, place in zip(self._model.frames, poses.props[0], strict=True):
             physics.bind(frame).mocap_pos = place.numpy()
 
     def _camera_observable(self) -> observable.Observable:
         """Return the policy's camera, rendered by OpenGL or with an appearance by ray tracing."""
         if self._sampler is not None:
-            return observable.Generic(lambda _: self._render())
+            return observable.Generic(
+                lambda _: self.worlds.render(self.state, appearance=self.appearance)[0].numpy()
+            )
         return observable.MJCFCamera(
             self.drone.front_center,
             height=self.camera.height,
@@ -215,42 +189,8 @@ class ComposerTask(composer.Task):
             scene_option=entities.hide_drone(),
         )
 
-    @functools.cached_property
-    def _renderer(self) -> Raytracer:
-        return Raytracer(self.compile(), num_envs=1, num_shards=1)
-
-    def _render(self) -> np.ndarray:
-        height, width = self.camera.height, self.camera.width
-        view = View(cameras=("drone/front_center",), height=height, width=width)
-        return self._renderer.render(view, self._poses(), self.appearance)["rgb"][0, 0].numpy()
-
     def _read(self, name: str) -> np.ndarray:
-        return self.rules.info(self.state)[name][0].numpy().copy()
-
-
-def camera_attitude(dynamics: Dynamics, body: BodyState) -> torch.Tensor:
-    """Return the attitude of drones' cameras, which is level on a gimbal. Shape: (num_envs, 4)."""
-    return twist_about_z(body.attitude) if dynamics.mount == "gimbal" else body.attitude
-
-
-def poses_of(
-    task: Task[Any],
-    dynamics: Dynamics,
-    state: State,
-    distractors: int,
-    appearance: Appearance | None = None,
-) -> Poses:
-    """Return the poses to render: drones, a task's props, and distractors.
-
-    Without an appearance that positions them, the distractors are out of sight.
-    """
-    props = task.places(state)
-    if distractors:
-        places = torch.tensor([0.0, 0.0, -HIDDEN_DEPTH]).expand(len(props), distractors, 3)
-        if appearance is not None and appearance.distractors is not None:
-            places = appearance.distractors.expand(len(props)).places
-        props = torch.cat([props, places.to(props)], 1)
-    return Poses(state.body.position, camera_attitude(dynamics, state.body), props)
+        return self.worlds.info()[name][0].numpy()
 
 
 def make_environment(

@@ -10,8 +10,8 @@ from torch import Tensor
 
 from drone_rl.config import ActionSettings, BaseTaskSettings, CameraSettings, DynamicsSettings
 from drone_rl.sim.actions import Entry
-from drone_rl.sim.composer_task import ComposerTask, poses_of
 from drone_rl.sim.dynamics import BodyState, Dynamics, draw_seeds, make_dynamics
+from drone_rl.sim.dynamics.state import twist_about_z
 from drone_rl.sim.entities import FRONT_CENTER
 from drone_rl.sim.rendering import (
     Appearance,
@@ -24,7 +24,9 @@ from drone_rl.sim.rendering import (
 )
 from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.rendering.view import Modality
+from drone_rl.sim.scene_model import SceneModel
 from drone_rl.sim.tasks import State, Task, as_task
+from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance, Maybe
 
@@ -129,9 +131,8 @@ class Worlds:
 
     @functools.cached_property
     def scene(self) -> Scene:
-        """The compiled model of dm_control."""
-        options: dict[str, Any] = {"dynamics": self.dynamics, "distractors": self.distractors}
-        return ComposerTask(self.task, self.camera, pixels=False, **options).compile()
+        """The compiled model."""
+        return SceneModel(self.task, self.camera, self.distractors).compile()
 
     @functools.cached_property
     def renderer(self) -> Renderer:
@@ -242,7 +243,15 @@ class Worlds:
 
     def poses(self, state: State, appearance: Appearance | None = None) -> Poses:
         """Return the poses to render, level on a gimbal; `appearance` positions distractors."""
-        return poses_of(self.task, self.dynamics, state, self.distractors, appearance)
+        props, attitude = self.task.places(state), state.body.attitude
+        if self.distractors:
+            places = torch.tensor([0.0, 0.0, -HIDDEN_DEPTH]).expand(len(props), self.distractors, 3)
+            if appearance is not None and appearance.distractors is not None:
+                places = appearance.distractors.expand(len(props)).places
+            props = torch.cat([props, places.to(props)], 1)
+        if self.dynamics.mount == "gimbal":
+            attitude = twist_about_z(attitude)
+        return Poses(state.body.position, attitude, props)
 
     def prepare(self, view: View | None = None) -> None:
         """Prepare the renderer for a view before the first image."""

@@ -12,7 +12,7 @@ import re
 from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, Unpack
 
 import numpy as np
 import torch
@@ -28,6 +28,7 @@ from drone_rl.config import (
     read_task,
 )
 from drone_rl.config.configuration import from_arguments
+from drone_rl.config.options import TrainOptions
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.policies.baselines import oracle_policy
@@ -292,7 +293,7 @@ def record_oracle(
     *,
     flights: int = 30,
     seed: int = 0,
-    **changes: Any,
+    **changes: Unpack[TrainOptions],
 ) -> list[Path]:
     """Record flights of the task's oracle, which acts by the true state.
 

@@ -9,13 +9,14 @@ import contextlib
 import logging
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import torch
 
 from drone_rl.collectors import EpisodeCollector, ThreadedCollector
 from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.config.learning import Episodes, Reinforce
+from drone_rl.config.options import TrainOptions
 from drone_rl.config.registry import implements, modules_of
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv, with_transforms
@@ -33,7 +34,6 @@ from drone_rl.training.learners import NotANumberError, ReinforceLearner
 from drone_rl.training.run_folder import Judge, RunFolder, Training
 from drone_rl.training.trainer import Trainer
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.memory import bound_kernels
 from drone_rl.utils.progress import Progress
 from drone_rl.utils.provenance import num_cores
 from drone_rl.utils.seeding import Stream, as_global_stream, torch_generator
@@ -50,7 +50,7 @@ def train(
     callbacks: Sequence[Callback] = (),
     progress: Progress | None = None,
     judge: Judge | None = None,
-    **changes: Any,
+    **changes: Unpack[TrainOptions],
 ) -> Training:
     """Train one policy, or resume its training.
 
@@ -112,7 +112,6 @@ def learn(
         stack.enter_context(torch.enable_grad())
         stack.enter_context(exploring(greedy=False))
         stack.enter_context(torch_threads(limits.num_threads))  # sums depend on it
-        bound_kernels()
         with as_global_stream(stream):
             parts = components.make_collector(settings, replay)
             stack.callback(parts.collector.shutdown)

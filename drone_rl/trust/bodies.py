@@ -6,7 +6,7 @@ import json
 import textwrap
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
@@ -14,6 +14,7 @@ from matplotlib.patches import Rectangle
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.commands import BodiesSettings, JudgeSettings
 from drone_rl.config.configuration import from_arguments
+from drone_rl.config.options import BodiesOptions
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.vocabulary import terms_of
@@ -82,7 +83,7 @@ def bodies(
     progress: Progress | None = None,
     judge: Callable[..., Judgement] = judge_one,
     in_the_loop: InTheLoop | None = None,
-    **changes: Any,
+    **changes: Unpack[BodiesOptions],
 ) -> Bodies:
     """Judge policies in computer-vision mode, in flight, in wind, and with worse drones.
 

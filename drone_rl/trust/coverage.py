@@ -23,7 +23,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path, parse_json, read_bytes
 from drone_rl.utils.limits import YAML_BYTES
 from drone_rl.utils.readers import parse_yaml
-from drone_rl.utils.schema import Maybe, OneOf, Real, Record, as_mapping, shown
+from drone_rl.utils.schema import Maybe, OneOf, Real, Record, as_mapping
 from drone_rl.utils.seeding import RootSeed
 
 NUM_RANDOM_STRENGTHS = 2
@@ -172,7 +172,7 @@ def _read_need(name: str, value: Any) -> Need:
         limits = [need[end] for end in ("low", "high") if need.get(end) is not None]
         if not limits or limits != sorted(limits) or (limits[0] < 0 and name not in _SIGNED):
             wanted = "numbers" if name in _SIGNED else "numbers of 0 or more"
-            raise InputError(f"{name}={shown(value)} needs low, high or both, rising {wanted}")
+            raise InputError(f"{name}: {limits} must be one or two rising {wanted}")
     except InputError as error:
         raise InputError(f"{error}; give low, high or both, and unit: {axis.unit}") from None
     return {"low": need.get("low"), "high": need.get("high")}

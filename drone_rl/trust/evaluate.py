@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 from tensordict.nn import TensorDictModuleBase
 
@@ -12,6 +12,7 @@ from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.config import AppearanceSettings
 from drone_rl.config.commands import EvaluateSettings, HeldOutSettings
 from drone_rl.config.configuration import from_arguments
+from drone_rl.config.options import EvaluateOptions
 from drone_rl.envs import worlds_of
 from drone_rl.policies.baselines import check_baselines
 from drone_rl.policies.external_network import Logits
@@ -117,7 +118,7 @@ def evaluate(
     appearance: AppearanceSettings | str | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
-    **changes: Any,
+    **changes: Unpack[EvaluateOptions],
 ) -> Evaluation:
     """Evaluate a policy, greedily and with sampled actions, and the baselines, on held-out states.
 

@@ -5,7 +5,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypedDict, Unpack, cast, overload
+from typing import Any, Unpack, cast, overload
 
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
@@ -13,6 +13,7 @@ from torchrl.envs import EnvBase
 from drone_rl.config import AppearanceSettings, DynamicsSettings, TaskSettings
 from drone_rl.config.commands import HeldOutSettings, JudgeSettings
 from drone_rl.config.configuration import Changes, as_changes, from_arguments
+from drone_rl.config.options import JudgeOptions
 from drone_rl.envs import DroneEnv
 from drone_rl.policies.baselines import make_baseline
 from drone_rl.policies.external_network import Logits
@@ -121,8 +122,8 @@ class Judgements(Result, tuple[Judgement, ...]):
         return table(head, rows)
 
 
-class JudgeOptions(TypedDict, total=False):
-    """Arguments of `judge`: those of `judge_one`, and all of `JudgeSettings`."""
+class JudgeArguments(JudgeOptions, total=False):
+    """Arguments of `judge`: those of `judge_one`."""
 
     task: Mapping[str, Any] | None
     dynamics: Mapping[str, Any] | None
@@ -134,15 +135,6 @@ class JudgeOptions(TypedDict, total=False):
     progress: Progress | None
     drawn_seed: RootSeed | None
     find_claim: FindClaim | None
-    episodes: int
-    num_envs: int
-    seed: int | None
-    device: str
-    renderer: str
-    sampled: bool
-    good_share: float
-    certificate_flights: int
-    domain_flights: int
 
 
 Given = str | Path | BasePolicy | Logits
@@ -151,20 +143,22 @@ Given = str | Path | BasePolicy | Logits
 
 @overload
 def judge(
-    policy: Given, settings: JudgeSettings | None = None, **options: Unpack[JudgeOptions]
+    policy: Given, settings: JudgeSettings | None = None, **options: Unpack[JudgeArguments]
 ) -> Judgement: ...
 
 
 @overload
 def judge(
-    policy: Sequence[Given], settings: JudgeSettings | None = None, **options: Unpack[JudgeOptions]
+    policy: Sequence[Given],
+    settings: JudgeSettings | None = None,
+    **options: Unpack[JudgeArguments],
 ) -> Judgements: ...
 
 
 def judge(
     policy: Given | Sequence[Given],
     settings: JudgeSettings | None = None,
-    **options: Unpack[JudgeOptions],
+    **options: Unpack[JudgeArguments],
 ) -> Judgement | Judgements:
     """Judge one policy, or a list or tuple of policies in the same environments.
 
@@ -205,7 +199,7 @@ def judge_one(
     progress: Progress | None = None,
     drawn_seed: RootSeed | None = None,
     find_claim: FindClaim | None = None,
-    **changes: Any,
+    **changes: Unpack[JudgeOptions],
 ) -> Judgement:
     """Judge the kind of a policy, see `drone_rl.trust.rule`, and whether it is certain.
 

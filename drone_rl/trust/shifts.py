@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import yaml
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from drone_rl.config import MINIMAL, BaseTaskSettings
 from drone_rl.config.commands import ShiftSettings
 from drone_rl.config.configuration import from_arguments
+from drone_rl.config.options import ShiftOptions
 from drone_rl.envs import worlds_of
 from drone_rl.policies.baselines import check_baselines
 from drone_rl.policies.external_network import Logits
@@ -105,7 +106,7 @@ def shifts(
     dynamics: Mapping[str, Any] | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
-    **changes: Any,
+    **changes: Unpack[ShiftOptions],
 ) -> Shifts:
     """Evaluate a policy under perturbations, one axis at a time and all combined.
 

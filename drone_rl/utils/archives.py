@@ -59,14 +59,3 @@ def _damage_as_input_error(path: Path) -> Iterator[None]:
         raise InputError(
             f"{path} is damaged, or holds more than numbers and texts ({reason}); give another file"
         ) from None
-
-
-def check_indices(values: NDArray[Any], most: int, where: str) -> None:
-    """Raise an `InputError` unless an array has integers from 0 to below `most` only."""
-    if values.dtype.kind not in "iub":
-        raise InputError(f"{where} is of type {values.dtype}, not of whole numbers")
-    if values.size and not (int(values.min()) >= 0 and int(values.max()) < most):
-        raise InputError(
-            f"{where} holds {int(values.min())} to {int(values.max())}; its numbers must be at "
-            f"least 0 and below {most}"
-        )

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import torch
@@ -15,6 +15,7 @@ from torch import Tensor
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ChanceSettings, ProveSettings
 from drone_rl.config.configuration import as_changes, from_arguments
+from drone_rl.config.options import ChanceOptions
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason
 from drone_rl.utils.display import Result, aligned, table
@@ -22,7 +23,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, Stream, with_seed, world_random_state
-from drone_rl.utils.text import CHANCES, exact_percent, say, seed_line
+from drone_rl.utils.text import CHANCES, exact_percent, plural, say, seed_line
 from drone_rl.verification.prover.lattice import explore, shape_of
 from drone_rl.verification.prover.markov_chain import (
     NodeEvaluator,
@@ -40,8 +41,7 @@ _BOUNDS = {
     "mean_least": "on average at least",
     "mean_most": "on average at most",
 }
-MAX_NODES = 2**22  # lattice nodes of placements that are explored together; bounds memory
-PLACEMENTS_AT_A_TIME = 20  # placements between two reports of progress
+NODES_AT_A_TIME = 2**20  # lattice nodes of placements that are explored together; bounds memory
 
 
 @dataclasses.dataclass(frozen=True)
@@ -120,12 +120,10 @@ class Chances(Result):
 
     def _notes(self) -> list[str]:
         """Return the lines below the table."""
-        most = f"failure is most probable at cubes={_format_positions(self.worst)}"
-        if not self.outcomes.failure.any():
-            most = "no failure was found at any of them"
-        about = f"{len(self.cubes)} placements; {most}"
-        if len(self.cubes) == 1:
-            about = f"cubes at {_format_positions(self.cubes[0, :, 1])} metres to the left"
+        worst = ", ".join(f"{y:.6g}" for y in self.worst.tolist())
+        about = (
+            f"{plural(len(self.cubes), 'placement')}; success is least probable at cubes=[{worst}]"
+        )
         if self.seed is None:
             return [about]
         seed = self.seed.as_dict()
@@ -162,7 +160,7 @@ def chances(
     task: Mapping[str, Any] | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
-    **changes: Any,
+    **changes: Unpack[ChanceOptions],
 ) -> Chances:
     """Compute the exact probability of each end of an episode with sampled actions, as in training.
 
@@ -185,33 +183,29 @@ def chances(
     """
     settings, seed = with_seed(from_arguments(ChanceSettings, settings, changes, chances))
     progress = as_progress(progress)
-    policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
-    policy = policy.in_task(**as_changes(task, "task"))
+    policy = load_policy(policy, outputs=outputs).in_task(**as_changes(task, "task"))
     task_settings = require_cubes(policy.description, "exact probabilities")
-    if settings.within:  # refuse policies that can't be bounded before anything is computed
-        how = (policy.make_network(), ProveSettings.logit_gap, settings.renderer)
-        make_policy_spec(policy.description, *how).close()
     placed = (
         _sampled(task_settings, settings.placements, seed)
         if cubes is None
         else _given(task_settings, cubes)
     )
-    at_a_time = max(1, MAX_NODES // math.prod(shape_of(task_settings)))
-    parts = placed.split(min(at_a_time, PLACEMENTS_AT_A_TIME))
+    bounded = _bounded(policy, placed, settings, progress) if settings.within else ()
+    at_a_time = max(1, NODES_AT_A_TIME // math.prod(shape_of(task_settings)))
     with closing(policy.make_env(1, device=settings.device, renderer=settings.renderer)) as env:
-        evaluator, found = NodeEvaluator(env, policy.make_network(settings.device)), []
-        for part in parts:
-            progress("placements", sum(map(len, found)), len(placed))
+        evaluator, outcomes = NodeEvaluator(env, policy.make_network(settings.device)), []
+        for part in placed.split(at_a_time):
+            progress("placements", sum(map(len, outcomes)), len(placed))
             graph = explore(task_settings, part)
-            found.append(propagate(graph, evaluator.on(graph)))
+            outcomes.append(propagate(graph, evaluator.on(graph)))
     progress("placements", len(placed), len(placed))
     return Chances(
         policy,
         placed,
-        Outcomes.joined(found),
+        Outcomes.joined(outcomes),
         evaluator.num_images,
         settings.within,
-        _bounded(policy, placed, settings, progress) if settings.within else (),
+        bounded,
         seed if cubes is None else None,
     )
 
@@ -221,16 +215,15 @@ def _bounded(
 ) -> tuple[SuccessBounds, ...]:
     """Bound the success probability over a box around each placement, within the lateral bound."""
     network, gap = policy.make_network(), ProveSettings.logit_gap
-    found: list[SuccessBounds] = []
+    bounds: list[SuccessBounds] = []
     spec = make_policy_spec(policy.description, network, gap, settings.renderer)
     with closing(spec):
         bound = spec.lattice.task.lateral_bound
         for i, aside in enumerate(placed[..., 1].numpy()):
             progress("bounds", i, len(placed))
             box = np.stack([aside - settings.within, aside + settings.within], -1)
-            found.append(bound_success(spec, box.clip(-bound, bound), settings.parts))
-    progress("bounds", len(placed), len(placed))
-    return tuple(found)
+            bounds.append(bound_success(spec, box.clip(-bound, bound), settings.parts))
+    return tuple(bounds)
 
 
 def _sampled(task: TaskSettings, count: int, seed: RootSeed) -> Tensor:
@@ -244,18 +237,12 @@ def _given(task: TaskSettings, cubes: Any) -> Tensor:
     try:
         aside = torch.atleast_2d(torch.as_tensor(cubes, dtype=torch.float64))
     except (TypeError, ValueError, RuntimeError):
-        raise InputError(
-            f"cubes={cubes} are not numbers, as many for each placement; give metres to the left"
-        ) from None
-    if aside.ndim != 2 or not len(aside) or aside.shape[1] != task.num_cubes:
+        aside = torch.empty(0, 0)
+    is_inside = bool((aside.abs() <= task.lateral_bound).all())
+    if not len(aside) or aside[0].shape != (task.num_cubes,) or not is_inside:
         raise InputError(
             f"cubes={cubes} must have {task.num_cubes} positions; give metres to the left, nearest "
-            "first, or change task.num_cubes"
-        )
-    if not (aside.abs() <= task.lateral_bound).all():
-        raise InputError(
-            f"cubes={cubes} are outside the task's range; give metres to the left from "
-            f"-{task.lateral_bound:g} to {task.lateral_bound:g} (task.lateral_bound)"
+            f"first, from -{task.lateral_bound:g} to {task.lateral_bound:g} (task.lateral_bound)"
         )
     ahead = task.first_distance + task.spacing * torch.arange(task.num_cubes).double()
     return torch.stack(
@@ -265,7 +252,3 @@ def _given(task: TaskSettings, cubes: Any) -> Tensor:
 
 def _row(name: str, values: Tensor, show: Callable[[float], str] = exact_percent) -> list[str]:
     return [name, *(show(float(figure)) for figure in (values.mean(), values.min(), values.max()))]
-
-
-def _format_positions(aside: Tensor) -> str:
-    return f"[{', '.join(f'{y:.6g}' for y in aside.tolist())}]"

@@ -5,10 +5,11 @@ import functools
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 from drone_rl.config.commands import CheckSettings
 from drone_rl.config.configuration import as_changes, from_arguments
+from drone_rl.config.options import CheckOptions
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import policy_names
 from drone_rl.utils.display import Result, table
@@ -100,7 +101,7 @@ def check(
     task: Mapping[str, Any] | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
-    **changes: Any,
+    **changes: Unpack[CheckOptions],
 ) -> Check:
     """Check a certificate independently of the prover: exact sums, and simulated episodes.
 
@@ -126,12 +127,11 @@ def check(
             f"the certificate is of policy {stated.name!r}, which is none of "
             f"{', '.join(policy_names())}; give policy= its file"
         )
-    policy = stated.name if policy is None else policy
-    loaded = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
-    weights = loaded.state["policy"]
-    required = loaded.in_task(**as_changes(task, "task")).task if task else None
-    check_same_policy(stated, loaded.description, weights, required)
-    policy = dataclasses.replace(loaded, description=stated.description)
+    policy = load_policy(stated.name if policy is None else policy, outputs=outputs)
+    weights = policy.state["policy"]
+    required = policy.in_task(**as_changes(task, "task")).task if task else None
+    check_same_policy(stated, policy.description, weights, required)
+    policy = dataclasses.replace(policy, description=stated.description)
     findings = check_certificate(
         stated,
         weights,

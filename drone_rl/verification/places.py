@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import torch
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from drone_rl.config.commands import PlacesSettings
 from drone_rl.config.configuration import as_changes, from_arguments
+from drone_rl.config.options import PlacesOptions
 from drone_rl.explanations.report.places import rows, say_places
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.vocabulary import SHOWN_MOVES
@@ -27,6 +28,7 @@ from drone_rl.utils.text import say
 from drone_rl.utils.threads import torch_threads
 from drone_rl.verification.prover.action_map import ActionMap, map_actions
 from drone_rl.verification.prover.arrangement import Window
+from drone_rl.verification.prover.bounds import masks_of
 from drone_rl.verification.prover.policy_spec import make_policy_spec
 
 
@@ -90,7 +92,7 @@ def places(
     task: Mapping[str, Any] | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
-    **changes: Any,
+    **changes: Unpack[PlacesOptions],
 ) -> Places:
     """Map a greedy policy's action over all positions of one cube, exactly.
 
@@ -110,16 +112,15 @@ def places(
     """
     settings = from_arguments(PlacesSettings, settings, changes, places)
     progress = as_progress(progress)
-    policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
-    policy = policy.in_task(**as_changes(task, "task"))
+    policy = load_policy(policy, outputs=outputs).in_task(**as_changes(task, "task"))
     begin = time.perf_counter()
     network, gap = policy.make_network(), settings.logit_gap
     spec = make_policy_spec(policy.description, network, gap, settings.renderer)
-    whole = (slice(None), slice(None))
 
     def render(faces: NDArray[np.uint8]) -> torch.Tensor:
-        shown = [(whole, torch.from_numpy(faces))]
-        return spec.compositor.see(spec.compositor.paint_one(shown, len(faces)))
+        whole, masks = (slice(None), slice(None)), masks_of(torch.from_numpy(faces))
+        images, _ = spec.compositor.paint([(whole, masks, torch.arange(len(faces)))], len(faces))
+        return spec.compositor.see(images)
 
     with torch_threads(1), closing(spec):
         progress("comparing the renderer's images")

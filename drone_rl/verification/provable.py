@@ -3,11 +3,10 @@
 import dataclasses
 import io
 import json
-import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Any, Self, Unpack
 
 import numpy as np
 import torch
@@ -19,6 +18,7 @@ from drone_rl.collectors.complete_episodes import episode_batches
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ProvableSettings, ProveSettings
 from drone_rl.config.configuration import as_config, check_same_config, from_arguments
+from drone_rl.config.options import TrainOptions
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import describe, read_checkpoint
@@ -38,36 +38,32 @@ from drone_rl.training.run_folder import (
 from drone_rl.training.train import learn
 from drone_rl.trust.verdict import check_judged, judge_for_selection
 from drone_rl.utils.archives import read_array
-from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import last_of, read_json, write_atomically
 from drone_rl.utils.progress import Progress, as_progress
-from drone_rl.utils.schema import Instance, Maybe, Plain, Real, Record, Several, Whole
+from drone_rl.utils.schema import Instance, Maybe, Plain, Record, Several
 from drone_rl.utils.seeding import Stream
 from drone_rl.utils.settings import Settings
-from drone_rl.verification.prove import Proof, prove
+from drone_rl.verification.prove import STATE_NAME, Proof, prove
 from drone_rl.verification.prover.boxes import volumes
 from drone_rl.verification.prover.policy_spec import make_policy_spec, partition_placements
 from drone_rl.verification.requirements import require_cubes
 
 WORLDS = 250  # environments of a search; each search uses other seeds
 HOW_MAY_CHANGE = ("rounds", "limit_s")  # settings of rounds that a resumed run may change
-_Count = Annotated[int, Whole(0, 2**62)]
-_Seconds = Annotated[float, Real(0.0, 1e12)]
-_Share = Annotated[float, Real(0.0, 1.0)]
 _JOURNAL = Record({"settings": Plain(), "how": Plain(), "rounds": Several(Plain(), 0, 10_000)})
 
 
 class Round(Settings):
     """The result of one search for failures; the next training starts episodes there."""
 
-    frames: _Count  # collected by training so far
-    trained_s: _Seconds  # training time so far, seconds
-    flights: _Count  # greedy episodes, each from its own placement
-    failures: _Count  # failed episodes
-    losing: _Share | None = None  # fraction of all placements proved to fail; None without a proof
-    undecided: _Share | None = None  # fraction of all placements that the proof leaves open
-    proof_s: _Seconds | None = None  # duration of the proof since its last resume, seconds
-    boxes: _Count  # number of boxes of failures to train on
+    frames: int  # collected by training so far
+    trained_s: float  # training time so far, seconds
+    flights: int  # greedy episodes, each from its own placement
+    failures: int  # failed episodes
+    losing: float | None = None  # fraction of all placements proved to fail; None without a proof
+    undecided: float | None = None  # fraction of all placements that the proof leaves open
+    proof_s: float | None = None  # duration of the proof since its last resume, seconds
+    boxes: int  # number of boxes of failures to train on
 
 
 @dataclasses.dataclass
@@ -78,8 +74,6 @@ class Journal(Callback):
     settings: TrainSettings
     how: ProvableSettings
     rounds: list[Round]
-    is_new: bool = dataclasses.field(default=False, compare=False)
-    """Whether searches in the folder, even an unfinished one, are of an earlier run."""
 
     @classmethod
     def open(
@@ -92,8 +86,8 @@ class Journal(Callback):
     ) -> Self:
         """Start a journal or, with a checkpoint, continue the one in the folder, if there is one.
 
-        Settings that are None are the saved ones, or the defaults. With a checkpoint, nothing is
-        written before `on_start`.
+        Settings that are None are the saved ones, or the defaults. Nothing is written before
+        `on_start`.
 
         Raises:
             InputError: It is damaged, or has other settings.
@@ -109,11 +103,8 @@ class Journal(Callback):
             check_same_config(saved["how"], how.values(), HOW_MAY_CHANGE)
             rounds = [Round.read(row, "rounds") for row in saved["rounds"]]
         how = how or ProvableSettings(rounds=10)
-        journal = cls(folder, settings, how, rounds, is_new=saved is None)
         _check_support(settings)  # refused before anything is written
-        if state is None:  # from here on, the folder has no rounds of an earlier run
-            journal.save()
-        return journal
+        return cls(folder, settings, how, rounds)
 
     def on_start(self, training: OngoingTraining) -> None:
         """Write the file."""
@@ -121,7 +112,7 @@ class Journal(Callback):
 
     def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
         """Delete the state of an unfinished proof, which is of the policy before this update."""
-        (self.next_folder / "state.npz").unlink(missing_ok=True)
+        (self.next_folder / STATE_NAME).unlink(missing_ok=True)
 
     @property
     def task(self) -> TaskSettings:
@@ -145,56 +136,43 @@ class Journal(Callback):
     @property
     def certificate(self) -> Path | None:
         """The certificate of the last search, if it was a proof."""
-        path = self.folder / "rounds" / str(len(self.rounds) - 1) / "certificate.json"
+        path = self._folder_of(len(self.rounds) - 1) / "certificate.json"
         is_proof = bool(self.rounds) and self.rounds[-1].losing is not None
         return path if is_proof and path.exists() else None
 
     @property
     def next_folder(self) -> Path:
         """Folder of the next search."""
-        return self.folder / "rounds" / str(len(self.rounds))
+        return self._folder_of(len(self.rounds))
+
+    def _folder_of(self, search: int) -> Path:
+        return self.folder / "rounds" / str(search)
 
     def forget_after(self, frames: int) -> None:
         """Forget searches of later policies than that of a checkpoint with so many frames."""
-        self.rounds = [done for done in self.rounds if done.frames <= frames]
+        self.rounds = [search for search in self.rounds if search.frames <= frames]
 
-    def add(self, done: Round, failures: NDArray[np.float64]) -> None:
+    def add(self, search: Round, failures: NDArray[np.float64]) -> None:
         """Record a search and the boxes to train on, metres, shape (boxes, num_cubes, 2)."""
         buffer = io.BytesIO()
         np.save(buffer, failures)
         self.next_folder.mkdir(parents=True, exist_ok=True)
         write_atomically(self.next_folder / "failures.npy", buffer.getvalue())
-        self.rounds.append(done)
+        self.rounds.append(search)
         self.save()
 
     def failures(self) -> NDArray[np.float64]:
-        """Return the boxes of the last search. Shape: (boxes, num_cubes, 2), metres.
-
-        Raises:
-            InputError: The file is damaged.
-        """
-        path = self.folder / "rounds" / str(len(self.rounds) - 1) / "failures.npy"
-        cubes = self.task.num_cubes
-        try:
-            boxes = read_array(path)
-            is_sound = boxes.dtype == np.float64 and boxes.shape[1:] == (cubes, 2)
-            is_sound = is_sound and bool(np.isfinite(boxes).all())
-            if not is_sound or (boxes[..., 0] > boxes[..., 1]).any():
-                raise InputError(f"it holds no boxes of {cubes} cubes")
-        except InputError as error:
-            raise InputError(f"{path} is damaged ({error}); train again") from None
-        return boxes
+        """Return the boxes of the last search. Shape: (boxes, num_cubes, 2), metres."""
+        return read_array(self._folder_of(len(self.rounds) - 1) / "failures.npy")
 
     def save(self) -> None:
-        """Write the file; a new run deletes the searches of an earlier one at first."""
-        if self.is_new and not self.rounds:
-            shutil.rmtree(self.folder / "rounds", ignore_errors=True)
-        noted = {
+        """Write the file."""
+        content = {
             "settings": as_config(self.settings),
             "how": self.how.values(),
-            "rounds": [done.values() for done in self.rounds],
+            "rounds": [search.values() for search in self.rounds],
         }
-        write_atomically(self.folder / "provable.json", json.dumps(noted, indent=2))
+        write_atomically(self.folder / "provable.json", json.dumps(content, indent=2))
 
 
 def train_until_proved(
@@ -205,7 +183,7 @@ def train_until_proved(
     resume: bool = False,
     callbacks: Sequence[Callback] = (),
     progress: Progress | None = None,
-    **changes: Any,
+    **changes: Unpack[TrainOptions],
 ) -> Training:
     """Train as usual, then in rounds, until the policy succeeds from every placement.
 
@@ -254,10 +232,10 @@ def train_until_proved(
         is_same = journal.is_proved and journal.rounds[-1].frames == result["frames"]
         if is_same and not result["reason"].startswith("SIG"):
             result["reason"] = "proved"
-        result["rounds"] = [done.values() for done in journal.rounds]
+        result["rounds"] = [search.values() for search in journal.rounds]
         judge = Judge(check_judged, judge_for_selection)
-        done = finish(journal.settings, folder, result, judge)
-    return reraise_signal(done, "train_until_proved")
+        training = finish(journal.settings, folder, result, judge)
+    return reraise_signal(training, "train_until_proved")
 
 
 def find_failures(
@@ -334,7 +312,7 @@ def _search(journal: Journal, progress: Progress) -> None:
         )
         boxes = _doubtful(proof)
         boxes = boxes[np.argsort(-volumes(boxes), kind="stable")[: how.most_boxes]]
-    done = Round(
+    search = Round(
         frames=policy.state["progress"]["frames"],
         trained_s=policy.state["progress"]["seconds"],
         flights=flights,
@@ -344,7 +322,7 @@ def _search(journal: Journal, progress: Progress) -> None:
         proof_s=None if proof is None else proof.certificate["found"]["seconds"],
         boxes=len(boxes),
     )
-    journal.add(done, inflated(boxes, how.margin, journal.task.lateral_bound))
+    journal.add(search, inflated(boxes, how.margin, journal.task.lateral_bound))
 
 
 def _fly(policy: Policy, journal: Journal) -> tuple[NDArray[np.float64], int]:

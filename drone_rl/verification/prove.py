@@ -4,44 +4,42 @@ import contextlib
 import dataclasses
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
 from drone_rl.config.commands import ProveSettings
 from drone_rl.config.configuration import as_changes, from_arguments
+from drone_rl.config.options import ProveOptions
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import fingerprint
 from drone_rl.utils.display import Result, aligned, table
-from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import (
     as_path,
     folder_lock,
     make_folder,
-    parse_json,
-    read_bytes,
     remove_leftovers,
     write_atomically,
 )
-from drone_rl.utils.limits import ARRAYS_BYTES, CERTIFICATE_BYTES
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.utils.text import plural
 from drone_rl.utils.threads import torch_threads
+from drone_rl.verification.checker.certificate import read_certificate
 from drone_rl.verification.prover.policy_spec import (
     PolicySpec,
     make_policy_spec,
     partition_placements,
 )
-from drone_rl.verification.prover.proof_files import FORMAT, certify, load, save
+from drone_rl.verification.prover.proof_files import certify, load, save
 from drone_rl.verification.prover.prover import Prover
-from drone_rl.verification.text import describe_proof, why_stopped
+from drone_rl.verification.text import describe_proof
 
-_BYTES_PER_SIDE = 64  # bytes of a saved state per cube and box: two borders, kept up to four times
+STATE_NAME, _CERTIFICATE_NAME = "state.pt", "certificate.json"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,12 +54,12 @@ class Proof(Result):
     @property
     def success(self) -> float:
         """Fraction of all placements from which all cubes are certainly collected."""
-        return self._share_of(lambda end: end == "all_cubes")
+        return self._share_of(is_success=True)
 
     @property
     def lost(self) -> float:
         """Fraction of all placements from which they certainly are not."""
-        return self._share_of(lambda end: end != "all_cubes")
+        return self._share_of(is_success=False)
 
     @property
     def undecided(self) -> float:
@@ -83,9 +81,10 @@ class Proof(Result):
         """Return the undecided boxes. Shape: (N, num_cubes, 2), metres."""
         return self._boxes(self.certificate["undecided"]["boxes"])
 
-    def _share_of(self, chosen: Callable[[str], bool]) -> float:
+    def _share_of(self, *, is_success: bool) -> float:
         outcomes = self.certificate["outcomes"]
-        return min(1.0, sum(o["share"] for o in outcomes if chosen(o["end"])))  # of rounded shares
+        shares = (o["share"] for o in outcomes if (o["end"] == "all_cubes") == is_success)
+        return min(1.0, sum(shares))  # of rounded shares
 
     def _boxes(self, boxes: list[Any]) -> np.ndarray:
         num_cubes = self.certificate["policy"]["description"]["task"]["num_cubes"]
@@ -117,7 +116,7 @@ def prove(
     task: Mapping[str, Any] | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
-    **changes: Any,
+    **changes: Unpack[ProveOptions],
 ) -> Proof:
     """Verify a greedy policy exhaustively over all cube placements.
 
@@ -136,8 +135,7 @@ def prove(
             unfinished proof of another policy, task, logit_gap or renderer; the message says why.
     """
     settings = from_arguments(ProveSettings, settings, changes, prove)
-    policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
-    policy = policy.in_task(**as_changes(task, "task"))
+    policy = load_policy(policy, outputs=outputs).in_task(**as_changes(task, "task"))
     network, gap = policy.make_network(), settings.logit_gap
     spec = make_policy_spec(policy.description, network, gap, settings.renderer)
     with torch_threads(1), closing(spec), contextlib.ExitStack() as stack:
@@ -147,7 +145,7 @@ def prove(
             folder = as_path(folder, "folder")
             make_folder(folder)
             stack.enter_context(folder_lock(folder))
-            remove_leftovers(folder, "state.npz", "certificate.json")
+            remove_leftovers(folder, STATE_NAME, _CERTIFICATE_NAME)
         return _prove(policy, spec, settings, folder, as_progress(progress))
 
 
@@ -162,17 +160,16 @@ def _prove(
     weights = fingerprint(policy.state["policy"])
     subject = [weights, policy.description.as_dict(), settings.logit_gap, settings.renderer]
     proof_id = json.dumps(subject)
-    state = None if folder is None else folder / "state.npz"
+    state = None if folder is None else folder / STATE_NAME
     if state is not None and state.exists():
-        boxes = settings.most_boxes * policy.description.task.values()["num_cubes"]
-        load(prover, state, proof_id, most=max(ARRAYS_BYTES, _BYTES_PER_SIDE * boxes))
+        load(prover, state, proof_id)
     begin = time.monotonic()
     stopped = _advance(prover, settings, progress, state, proof_id)
     seconds = time.monotonic() - begin
     found = certify(policy.name, policy.description, weights, prover, seconds, stopped)
     found |= provenance()
     if folder is not None and state is not None:
-        write_atomically(folder / "certificate.json", json.dumps(found))
+        write_atomically(folder / _CERTIFICATE_NAME, json.dumps(found))
         if prover.is_finished:
             state.unlink(missing_ok=True)
     return Proof(found, folder)
@@ -202,7 +199,7 @@ def _advance(
             saved = time.monotonic()
     if state is not None and stopped:
         save(prover, state, proof_id)
-    progress(why_stopped(stopped) if stopped else "finished", last, last)
+    progress(f"stopped by {stopped}" if stopped else "finished", last, last)
     return stopped
 
 
@@ -213,14 +210,6 @@ def load_proof(path: str | Path) -> Proof:
         InputError: There is none, or it is damaged or too large.
     """
     path = as_path(path, "path")
-    path = path / "certificate.json" if path.is_dir() else path
-    content = read_bytes(path, CERTIFICATE_BYTES)
-    try:
-        found = parse_json(content, "it")
-        if not isinstance(found, dict) or found.get("format") != FORMAT:
-            raise InputError(f"its format is not {FORMAT!r}")
-        if missing := {"policy", "outcomes", "undecided"} - found.keys():
-            raise InputError(f"it has no {', '.join(sorted(missing))}")
-        return Proof(found, path.parent)
-    except InputError as error:
-        raise InputError(f"{path} is no certificate ({error}); give another file") from None
+    path = path / _CERTIFICATE_NAME if path.is_dir() else path
+    read_certificate(path)  # refuses what is none
+    return Proof(json.loads(path.read_bytes()), path.parent)

@@ -21,18 +21,8 @@ def describe_proof(certificate: Mapping[str, Any]) -> str:
     if undecided["boxes"]:
         text += f", and {exact(undecided['share'], is_all=not outcomes)} are undecided"
     if not certificate["finished"]:
-        text += f" so far ({why_stopped(certificate['found'].get('stopped_by'))})"
+        text += f" so far (stopped by {certificate['found'].get('stopped_by')})"
     return text + "."
-
-
-def why_stopped(setting: str | None) -> str:
-    """Return why a proof has not finished and, by the setting that stopped it, the remedy."""
-    if setting != "most_boxes":
-        return "the proof was stopped"
-    return (
-        "the proof stopped at most_boxes open boxes; restart it with a smaller most_combinations, "
-        "which divides it into smaller parts"
-    )
 
 
 def describe_round(search: Mapping[str, Any]) -> str:

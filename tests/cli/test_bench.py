@@ -18,7 +18,7 @@ from drone_rl.cli.bench import BenchCommand
                 "quick=true",
             ],
         ),
-        (["parallel"], ["only=[sweeps,kills,ray]"]),
+        (["parallel"], ["only=[sweeps,kills]"]),
     ],
 )
 def test_names_and_quick_stand_for_settings(words, overrides):

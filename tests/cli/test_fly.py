@@ -5,12 +5,8 @@ import signal
 import subprocess
 import sys
 import urllib.request
-import webbrowser
 
 import pytest
-
-from drone_rl.cli import fly
-from drone_rl.cli.fly import FlyCommand
 
 pytest.importorskip("uvicorn")
 
@@ -47,42 +43,3 @@ def test_wrong_settings_are_one_line(tmp_path, args, message):
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 2
     assert message in errors and "Traceback" not in errors
-
-
-class Page:
-    """A page that ends at once."""
-
-    url = "http://127.0.0.1:1/token/"
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *exception):
-        pass
-
-    def wait(self):
-        """End as by Ctrl-C."""
-        raise KeyboardInterrupt
-
-
-@pytest.mark.parametrize(("display", "opened"), [(":0", [Page.url]), ("", [])])
-def test_a_browser_opens_where_there_is_a_display(monkeypatch, tmp_path, display, opened):
-    opened_urls, arguments = [], {}
-
-    def make(policy, settings, outputs):
-        arguments.update(policy=policy.name, port=settings.port, outputs=outputs)
-        return Page()
-
-    class Thread:
-        def __init__(self, target, args, daemon):
-            self.start = lambda: target(*args)
-
-    monkeypatch.setattr(fly.drone_rl, "fly", make, raising=False)
-    monkeypatch.setattr(fly.threading, "Thread", Thread)
-    monkeypatch.setattr(webbrowser, "open", opened_urls.append)
-    monkeypatch.setattr(sys, "platform", "linux")
-    monkeypatch.setenv("DISPLAY", display)
-    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    assert FlyCommand(port=8123).run(tmp_path) == (0, None)
-    assert opened_urls == opened
-    assert arguments == {"policy": "good", "port": 8123, "outputs": "outputs"}

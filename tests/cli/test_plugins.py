@@ -1,10 +1,8 @@
 """Parts of the user's own on the command line, from training to evaluation."""
 
-import json
 import shutil
 
 import pytest
-from safetensors import safe_open
 
 from tests.cli.running import TINY, drone_rl, error_line
 
@@ -79,17 +77,6 @@ def test_without_the_plug_in_one_line_names_the_part_and_the_remedy(folder):
     line = error_line(drone_rl("evaluate", "policy=run", *FEW, cwd=folder))
     assert "transforms[3].name='mirror' is not registered" in line
     assert "plugins=[MODULE]" in line
-
-
-def test_an_exported_file_has_names_and_values_only(folder):
-    words = ["policy=run", "plugins=[my_parts]", "episodes=2", "num_envs=2", "name=mine"]
-    done = drone_rl("export", *words, cwd=folder)
-    assert done.returncode == 0, done.stderr
-    (path,) = folder.rglob("mine.safetensors")
-    with safe_open(path, "pt") as file:
-        described = json.loads(file.metadata()["description"])
-    assert described["network"] == {"name": "cells", "rows": 3}
-    assert described["transforms"][-1] == {"name": "mirror", "every": 2}
 
 
 FILES = {

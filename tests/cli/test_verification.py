@@ -59,4 +59,4 @@ def test_chances_of_one_placement(in_process, tmp_path):
 def test_chances_of_held_out_placements(in_process):
     done = in_process("chain", "policy=right_and_forward", "placements=2", "seed=1", *ONE)
     assert done.returncode == 0, done.stderr
-    assert "2 placements; failure is most probable at cubes=[2.09944]" in done.stdout  # to the left
+    assert "2 placements; success is least probable at cubes=[2.09944]" in done.stdout

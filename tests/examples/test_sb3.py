@@ -1,4 +1,4 @@
-"""Runs the example in a short version, and limits its length."""
+"""Runs the example in a short version."""
 
 from pathlib import Path
 
@@ -8,12 +8,8 @@ pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not instal
 PATH = Path(__file__).parents[2] / "examples" / "sb3.py"
 
 
-def test_an_update_and_a_few_episodes(example):
+def test_train_and_success(example):
     model = example.train(512, num_envs=32, steps=16)
     assert (model.num_timesteps, model.n_envs) == (512, 32)
     assert model.observation_space.shape == (1, 25, 64)
     assert 0 <= example.success(model, episodes=4) <= 1
-
-
-def test_length():
-    assert len(PATH.read_text().splitlines()) <= 50

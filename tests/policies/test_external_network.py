@@ -107,11 +107,3 @@ def test_uncopyable_module_raises():
     module.held = torch.ones(1, requires_grad=True) * 2  # not a leaf, and torch copies only leaves
     with pytest.raises(InputError, match=r"^the network Flatten can't be copied .* function that"):
         make(module)
-
-
-def test_the_type_of_parameters_is_named():
-    network = nn.Sequential(nn.Flatten(), nn.Linear(8, 3)).double()
-    with pytest.raises(InputError, match=r"give network\.float\(\), since its parameters"):
-        make(network)
-    with pytest.raises(InputError, match=r"give drone_rl\.policy_from the camera= and transforms="):
-        make(nn.Sequential(nn.Flatten(), nn.Linear(9, 3)))

@@ -5,7 +5,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from drone_rl.utils.archives import check_indices, read_array, read_arrays
+from drone_rl.utils.archives import read_array, read_arrays
 from drone_rl.utils.errors import InputError
 
 
@@ -73,11 +73,3 @@ def test_an_array_alone(tmp_path):
     (tmp_path / "a.npy").write_bytes(npy((10**12,)))
     with pytest.raises(InputError, match="is damaged"):
         read_array(tmp_path / "a.npy")
-
-
-def test_indices():
-    check_indices(np.array([0, 2]), 3, "x")
-    check_indices(np.array([], int), 1, "x")
-    for wrong in ([0, 3], [-1, 0], [2**40], [0.0]):
-        with pytest.raises(InputError):
-            check_indices(np.array(wrong), 3, "x")

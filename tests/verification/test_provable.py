@@ -1,9 +1,7 @@
-"""Training until proved: its rounds, what they practise, and that it goes on bit for bit."""
+"""Training until proved: rounds, failure replay, exact resume and the journal of the rounds."""
 
-import contextlib
 import json
 import shutil
-import signal
 
 import numpy as np
 import pytest
@@ -12,20 +10,31 @@ import torch
 import drone_rl
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ProvableSettings
+from drone_rl.config.configuration import as_config
 from drone_rl.config.learning import Episodes
 from drone_rl.config.training import TrainerSettings, TrainSettings
+from drone_rl.envs import DroneEnv
+from drone_rl.policies.baselines import constant_policy
+from drone_rl.sim.actions import Move
 from drone_rl.training import Callback
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
+from drone_rl.utils.seeding import world_random_state
 from drone_rl.verification import provable
+from drone_rl.verification.provable import Journal, Round, find_failures
 from drone_rl.verification.prove import Proof
+from tests.fake_flight import FLIGHT
 
 TINY = TrainSettings(
     task=TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60),
     collector=Episodes(num_envs=4),
     trainer=TrainerSettings(total_frames=3000, target_share=0.01, confirm_episodes=0),
 )
+
+
 HOW = ProvableSettings(rounds=3, frames=200, share=1.0, margin=0.25, flights=0)
+
+
 LOSING = [[[[2.0, 3.0]], [[5.0, 6.0]]], [[[1.0, 1.5]]], []]
 """Boxes that the first, the second and the third proof find."""
 
@@ -65,18 +74,6 @@ def prover(monkeypatch):
     return prover
 
 
-class Watch(Callback):
-    """Notes where episodes begin, and may end the program."""
-
-    def __init__(self, at=None):
-        self.at, self.count = at, 0
-
-    def on_update(self, training, metrics):
-        self.count += 1
-        if self.count == self.at:
-            raise KeyboardInterrupt
-
-
 def train(folder, how=HOW, **kwargs):
     return drone_rl.train_until_proved(TINY, how, folder=folder, progress=silent, **kwargs)
 
@@ -97,7 +94,7 @@ def usual(tmp_path_factory):
     return drone_rl.train(TINY, folder=tmp_path_factory.mktemp("usual"), progress=silent)
 
 
-def test_rounds_until_nothing_is_left(whole):
+def test_rounds_until_proved(whole):
     assert whole.reason == "proved"
     rounds = whole.result["rounds"]
     assert [r["boxes"] for r in rounds] == [2, 1, 0]
@@ -111,17 +108,7 @@ def test_rounds_until_nothing_is_left(whole):
     assert first.tolist() == [[[1.75, 3.25]], [[4.75, 6.0]]]
 
 
-def test_the_first_part_is_the_usual_training_and_the_largest_boxes_are_kept(
-    tmp_path, prover, usual
-):
-    done = train(tmp_path, HOW.replace(rounds=0, most_boxes=1))
-    assert done.result["rounds"][0]["boxes"] == 1
-    assert usual.reason == "solved"
-    one, two = weights(usual.folder), prover.weights[0]
-    assert all(torch.equal(one[name], two[name]) for name in one)
-
-
-def test_failures_are_practised(tmp_path, monkeypatch):
+def test_episodes_start_at_failures(tmp_path, monkeypatch):
     begun = []
     sample = provable.FailureReplayTask.sample
 
@@ -138,9 +125,9 @@ def test_failures_are_practised(tmp_path, monkeypatch):
     assert all(0.75 <= y <= 1.75 for y in second)
 
 
-def test_killed_and_resumed_is_bit_for_bit_the_uninterrupted(whole, tmp_path):
+def test_an_interrupted_run_resumes_exactly(whole, tmp_path):
     with pytest.raises(KeyboardInterrupt):
-        train(tmp_path, callbacks=[Watch(3)])
+        train(tmp_path, callbacks=[Interrupt(3)])
     done = drone_rl.train_until_proved(folder=tmp_path, resume=True, progress=silent)
     assert done.result["frames"] == whole.result["frames"]
     one, two = weights(tmp_path), weights(whole.folder)
@@ -150,19 +137,7 @@ def test_killed_and_resumed_is_bit_for_bit_the_uninterrupted(whole, tmp_path):
     assert [[r[k] for k in same] for r in told] == [[r[k] for k in same] for r in expected]
 
 
-def test_killed_in_a_proof(whole, tmp_path, monkeypatch, prover):
-    def killed(policy, **kwargs):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(provable, "prove", killed)
-    with pytest.raises(KeyboardInterrupt):
-        train(tmp_path)
-    monkeypatch.setattr(provable, "prove", prover)
-    done = drone_rl.train_until_proved(folder=tmp_path, resume=True, progress=silent)
-    assert done.reason == "proved" and done.result["frames"] == whole.result["frames"]
-
-
-def test_a_usual_run_that_is_refused_stays_one_and_else_is_made_provable(whole, usual, tmp_path):
+def test_resuming_an_ordinary_run(whole, usual, tmp_path):
     shutil.copytree(usual.folder, tmp_path, dirs_exist_ok=True)
     with pytest.raises(InputError, match="can't resume with seed=9"):
         drone_rl.train_until_proved(None, HOW, folder=tmp_path, resume=True, seed=9)
@@ -171,24 +146,7 @@ def test_a_usual_run_that_is_refused_stays_one_and_else_is_made_provable(whole, 
     assert done.reason == "proved" and done.result["frames"] == whole.result["frames"]
 
 
-class Interrupt(Callback):
-    def on_update(self, training, metrics):
-        signal.raise_signal(signal.SIGINT)
-
-
-def test_ctrl_c_ends_it_and_a_resume_goes_on(whole, tmp_path):
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        with pytest.raises(KeyboardInterrupt) as stopped:
-            train(tmp_path, callbacks=[Interrupt()])
-    finally:
-        signal.signal(signal.SIGINT, before)
-    assert stopped.value.training.result["updates"] == 1
-    done = drone_rl.train_until_proved(folder=tmp_path, resume=True, progress=silent)
-    assert done.reason == "proved" and done.result["frames"] == whole.result["frames"]
-
-
-def test_a_proved_run_that_is_resumed_is_left_alone(whole):
+def test_resuming_a_proved_run_changes_nothing(whole):
     before = weights(whole.folder)
     again = drone_rl.train_until_proved(folder=whole.folder, resume=True, progress=silent)
     assert again.reason == "proved" and again.result["frames"] == whole.result["frames"]
@@ -196,21 +154,14 @@ def test_a_proved_run_that_is_resumed_is_left_alone(whole):
     assert all(torch.equal(before[name], after[name]) for name in before)
 
 
-def test_a_finished_run_is_not_replaced(whole):
-    before = (whole.folder / "provable.json").read_bytes()
-    with pytest.raises(InputError, match="holds a finished run, which a new one would replace"):
-        train(whole.folder)
-    assert (whole.folder / "provable.json").read_bytes() == before
-
-
-def test_a_budget_ends_it_unproved_and_more_of_it_goes_on(whole, tmp_path):
+def test_more_rounds_continue_a_run(whole, tmp_path):
     done = train(tmp_path, HOW.replace(rounds=1))
     assert done.reason == "frames" and len(done.result["rounds"]) == 2
     done = drone_rl.train_until_proved(None, HOW, folder=tmp_path, resume=True, progress=silent)
     assert done.reason == "proved" and done.result["frames"] == whole.result["frames"]
 
 
-def test_flights_come_first(tmp_path, monkeypatch, prover):
+def test_episodes_are_searched_first(tmp_path, monkeypatch, prover):
     found = [np.array([[2.0], [-5.9]]), np.empty((0, 1))]
 
     def fly(env, actor, num_episodes, enough):
@@ -228,58 +179,162 @@ def test_flights_come_first(tmp_path, monkeypatch, prover):
     assert len(prover.weights) == 1
 
 
-def test_what_a_stopped_proof_leaves_open_is_not_practised():
-    open_ = {"share": 0.5, "boxes": [[[0.0, 6.0]]]}
-    lost = outcome("front_boundary", 0.1, [[[-2.0, -1.0]]])
-    about = {"policy": {"description": {"task": {"num_cubes": 1}}}}
-    proof = Proof({**about, "outcomes": [lost], "undecided": open_, "finished": False})
-    assert provable._doubtful(proof).tolist() == [[[-2.0, -1.0]]]
-    whole = Proof({**proof.certificate, "finished": True})
-    assert provable._doubtful(whole).tolist() == [[[-2.0, -1.0]], [[0.0, 6.0]]]
-
-
-def test_other_rounds_are_refused(whole):
-    with pytest.raises(InputError, match=r"can't resume with share=0.1: .* share=1.0"):
-        train(whole.folder, HOW.replace(share=0.1), resume=True)
-    with pytest.raises(InputError, match="can't resume with seed=3"):
-        train(whole.folder, resume=True, seed=3)
-
-
-class Stop(Callback):
-    def on_update(self, training, metrics):
-        training.stop_request = "enough"
-
-
-def test_a_callback_stops_it(tmp_path):
-    done = train(tmp_path, callbacks=[Stop()])
-    assert done.reason == "enough" and done.result["rounds"] == []
-
-
-def test_spent_episodes_end_it(tmp_path):
+def test_limit_of_episodes(tmp_path):
     limits = TINY.trainer.replace(total_episodes=1, target_share=None)
     settings = TINY.replace(trainer=limits)
     done = drone_rl.train_until_proved(settings, HOW, folder=tmp_path, progress=silent)
     assert done.reason == "episodes" and len(done.result["rounds"]) == 1
 
 
-def test_a_search_of_a_later_policy_proves_nothing_of_an_older_checkpoint(whole, tmp_path, prover):
+def test_later_searches_are_forgotten(whole, tmp_path, prover):
     """As if last.pt had been replaced by a checkpoint from before the last search."""
     folder = tmp_path / "run"
     shutil.copytree(whole.folder, folder)
-    noted = json.loads((folder / "provable.json").read_text())
-    for done in noted["rounds"]:
+    journal = json.loads((folder / "provable.json").read_text())
+    for done in journal["rounds"]:
         done["frames"] += 50
-    (folder / "provable.json").write_text(json.dumps(noted))
+    (folder / "provable.json").write_text(json.dumps(journal))
     train(folder, resume=True)
     assert prover.weights  # it was searched again
 
 
-def test_a_run_that_ended_while_this_one_waited_is_not_replaced(tmp_path, monkeypatch):
-    @contextlib.contextmanager
-    def lock(folder):
-        (folder / "result.json").write_text("{}")
-        yield
+SETTINGS = TrainSettings(trainer=TrainerSettings(total_frames=1000))
 
-    monkeypatch.setattr("drone_rl.training.run_folder.folder_lock", lock)
-    with pytest.raises(InputError, match="holds a finished run"):
-        train(tmp_path)
+
+STATE = {"config": as_config(SETTINGS)}
+
+
+LIMITS = ProvableSettings(rounds=2)
+
+
+def search(frames, boxes=1, **proved):
+    return Round(frames=frames, trained_s=1.0, flights=8, failures=1, boxes=boxes, **proved)
+
+
+def begin(folder, how=LIMITS, state=None, settings=SETTINGS, **changes):
+    journal = Journal.open(folder, settings, how, state, changes)
+    journal.on_start(None)
+    return journal
+
+
+def test_is_over_and_is_proved(tmp_path):
+    journal = begin(tmp_path)
+    for frames, is_over in ((100, False), (200, False), (300, True)):  # two rounds of practice
+        journal.rounds.append(search(frames))
+        assert journal.is_over == is_over
+    assert not journal.is_proved
+    journal.rounds = [search(1000)]
+    assert journal.is_over and not journal.is_proved  # the frames are spent
+    for boxes, proved, is_proved in (
+        (0, {"losing": 0.0, "undecided": 0.0}, True),
+        (0, {"losing": 0.0, "undecided": 0.5}, False),
+        (3, {"losing": 0.0, "undecided": 0.0}, False),
+        (0, {}, False),
+    ):
+        journal.rounds = [search(10, boxes, **proved)]
+        assert journal.is_proved == journal.is_over == is_proved
+
+
+def test_only_rounds_and_time_limit_may_change(tmp_path):
+    begin(tmp_path)
+    assert begin(tmp_path, LIMITS.replace(rounds=9, limit_s=5.0), STATE).how.rounds == 9
+    with pytest.raises(InputError, match=r"can't resume with margin=1\.0"):
+        begin(tmp_path, LIMITS.replace(margin=1.0), STATE)
+    with pytest.raises(InputError, match="can't resume with seed=4"):
+        begin(tmp_path, None, STATE, seed=4)
+
+
+def test_a_state_is_deleted_at_the_first_update(tmp_path):
+    begin(tmp_path)
+    state = tmp_path / "rounds" / "0" / "state.pt"
+    state.parent.mkdir(parents=True)
+    state.write_bytes(b"a state")
+    again = begin(tmp_path, None, STATE, None)
+    again.on_start(None)
+    assert state.exists()
+    again.on_update(None, {})  # of another policy
+    assert not state.exists()
+
+
+class Interrupt(Callback):
+    """Interrupts training at an update."""
+
+    def __init__(self, at):
+        self.at, self.count = at, 0
+
+    def on_update(self, training, metrics):
+        self.count += 1
+        if self.count == self.at:
+            raise KeyboardInterrupt
+
+
+def test_training_before_the_first_search_is_ordinary(tmp_path, prover, usual):
+    done = train(tmp_path, HOW.replace(rounds=0, most_boxes=1))
+    assert done.result["rounds"][0]["boxes"] == 1
+    one, two = weights(usual.folder), prover.weights[0]
+    assert all(torch.equal(one[name], two[name]) for name in one)
+
+
+def test_undecided_boxes_are_replayed_only_of_finished_proofs():
+    undecided = {"share": 0.5, "boxes": [[[0.0, 6.0]]]}
+    lost = outcome("front_boundary", 0.1, [[[-2.0, -1.0]]])
+    about = {"policy": {"description": {"task": {"num_cubes": 1}}}}
+    proof = Proof({**about, "outcomes": [lost], "undecided": undecided, "finished": False})
+    assert provable._doubtful(proof).tolist() == [[[-2.0, -1.0]]]
+    whole = Proof({**proof.certificate, "finished": True})
+    assert provable._doubtful(whole).tolist() == [[[-2.0, -1.0]], [[0.0, 6.0]]]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"rounds": [{"frames": -1}]}, "rounds.trained_s is missing"),
+        ({"more": 3}, "more.* is unknown"),
+    ],
+)
+def test_a_malformed_journal_is_refused(tmp_path, change, message):
+    begin(tmp_path)
+    path = tmp_path / "provable.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    with pytest.raises(InputError, match=message):
+        begin(tmp_path, None, STATE, None)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"dynamics": FLIGHT}, "proofs support only"),
+        ({"task": TaskSettings(spacing=2.0)}, "task.spacing=2.0 puts cubes next to each other"),
+        ({"task": TaskSettings(num_cubes=8)}, "task.num_cubes=8 gives about"),
+    ],
+)
+def test_unsupported_settings_are_refused_before_training(change, message, tmp_path):
+    with pytest.raises(InputError, match=message):
+        begin(tmp_path / "new", **change)
+    assert not (tmp_path / "new").exists()
+
+
+TASK = TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60)
+
+
+def flown(num_episodes, enough):
+    env = DroneEnv(8, TASK, seed=4, pixels=False)
+    try:
+        return find_failures(env, constant_policy(Move.FORWARD), num_episodes, enough)
+    finally:
+        env.close()
+
+
+def test_find_failures_of_flying_straight():
+    places, episodes = flown(20, 1000)
+    assert episodes == 24  # whole batches
+    worlds = [world_random_state(4, i) for i in range(8)]
+    drawn = [w.uniform(-1.0, 1.0, size=(1, 2))[0, 0] * 6.0 for _ in range(3) for w in worlds]
+    aside = [y for y in drawn if abs(y) > TASK.touch_distance]
+    assert 0 < len(aside) < 24
+    np.testing.assert_allclose(places[:, 0], aside, rtol=1e-6)
+
+
+def test_find_failures_stops_at_enough():
+    places, episodes = flown(1000, 1)
+    assert episodes == 8 and 0 < len(places) <= 8

@@ -3,13 +3,14 @@
 import copy
 import math
 from collections.abc import Sequence
-from typing import Any, Self
+from typing import Self, Unpack
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
+from drone_rl.config.options import DynamicsOptions
 from drone_rl.config.sensors import SensorSettings
 from drone_rl.flight.commands import checks
 from drone_rl.flight.commands.command import (
@@ -67,7 +68,7 @@ class Drone:
         obstacles: Obstacles | None = None,
         worlds: Worlds | None = None,
         sensors: SensorSettings | None = None,
-        **changes: Any,
+        **changes: Unpack[DynamicsOptions],
     ) -> None:
         """Put a disarmed drone on the ground.
 

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import torch
 
@@ -68,6 +68,16 @@ class Sticks:
         for field in dataclasses.fields(self):
             number = checks.real(getattr(self, field.name), field.name, -1.0, 1.0)
             object.__setattr__(self, field.name, number)
+
+
+class PathOptions(TypedDict, total=False):
+    """Keyword arguments of `Pilot.move_along`."""
+
+    drivetrain: str
+    yaw_mode: YawMode | None
+    lookahead: float
+    adaptive_lookahead: float
+    wait: bool
 
 
 class Pilot(SceneDrone):
@@ -269,17 +279,21 @@ class Pilot(SceneDrone):
 
     def move_to(
         self, x: float, y: float, z: float, speed: float = 1.0, timeout: float | None = None,
-        **choices: Any,
+        **options: Unpack[PathOptions],
     ) -> bool | FlightFuture:  # fmt: skip
         """Fly to a position; see `move_along` for the options."""
-        return self.move_along([(x, y, z)], speed, timeout, **choices)
+        return self.move_along([(x, y, z)], speed, timeout, **options)
 
     def move_to_z(
-        self, z: float, speed: float = 1.0, timeout: float | None = None, **choices: Any
+        self,
+        z: float,
+        speed: float = 1.0,
+        timeout: float | None = None,
+        **options: Unpack[PathOptions],
     ) -> bool | FlightFuture:
         """Fly straight up or down to a height; see `move_along`."""
         x, y, _ = self.body.position[0].tolist()
-        return self.move_along([(x, y, z)], speed, timeout, **choices)
+        return self.move_along([(x, y, z)], speed, timeout, **options)
 
     def rotate_to(
         self, yaw: float, timeout: float | None = None, *, margin: float = 5.0, wait: bool = True

@@ -16,10 +16,11 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any, Protocol, Self, Unpack
 
 from drone_rl.config.commands import FlySettings
 from drone_rl.config.configuration import from_arguments
+from drone_rl.config.options import FlyOptions
 from drone_rl.flight.fly_page.flight import Flight
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.utils.errors import InputError, extra
@@ -381,7 +382,7 @@ def fly(
     settings: FlySettings | None = None,
     *,
     outputs: str | Path = "outputs",
-    **changes: Any,
+    **changes: Unpack[FlyOptions],
 ) -> FlyPage:
     """Start a page to fly from, in threads of this process.
 

@@ -32,9 +32,8 @@ from drone_rl.verification.checker.consistency import (
 from drone_rl.verification.checker.sampling import ANYWHERE, BORDER, INSIDE, sample_placements
 from drone_rl.verification.requirements import require_cubes
 
-MAX_PRINTED = 20  # contradictions printed
 MAX_EXACT = 200  # approximate number of episodes repeated with the network in float64
-MAX_KEPT = 1000  # contradictions kept
+MAX_KEPT = 20  # contradictions that are described
 MAX_BATCH_SIZE = 1024  # episodes per batch
 MAX_PIXELS = 2**22  # pixels per batch of images
 _SHORT_LOOP = 2  # up to so many repetitions, a loop need not be stated as one
@@ -73,8 +72,8 @@ class CheckFindings:
 
     def lines(self) -> list[str]:
         """Return each finding in one line."""
-        lines = [*self.inconsistencies, *map(str, self.contradictions[:MAX_PRINTED])]
-        more = self.contradicted - min(len(self.contradictions), MAX_PRINTED)
+        lines = [*self.inconsistencies, *map(str, self.contradictions)]
+        more = self.contradicted - len(self.contradictions)
         return [*lines, f"and {more} flights more ended otherwise than stated"] if more else lines
 
     def as_dict(self) -> dict[str, Any]:
@@ -89,7 +88,7 @@ class CheckFindings:
 
 
 @dataclasses.dataclass(frozen=True)
-class Rollouts:
+class EpisodeEnds:
     """How episodes ended; the first dimension counts episodes."""
 
     end: NDArray[np.int64]  # (k,); `EndReason`
@@ -121,13 +120,14 @@ class Simulator:
 
     def fly(
         self, placements: NDArray[np.float64], report: ProgressCallback = lambda done, total: None
-    ) -> Rollouts:
+    ) -> EpisodeEnds:
         """Simulate episodes in batches, from metres to the left of each cube (k, cubes)."""
         parts = [self._fly(placements[:0])]
         for first in range(0, len(placements), self.batch_size):
             parts.append(self._fly(placements[first : first + self.batch_size]))
             report(min(first + self.batch_size, len(placements)), len(placements))
-        return Rollouts(*map(np.concatenate, zip(*(vars(p).values() for p in parts), strict=True)))
+        fields = zip(*(vars(part).values() for part in parts), strict=True)
+        return EpisodeEnds(*map(np.concatenate, fields))
 
     def compute_in(self, dtype: torch.dtype) -> None:
         """Evaluate the network in another precision from now on."""
@@ -138,7 +138,7 @@ class Simulator:
         self._env.close()
 
     @torch.no_grad()
-    def _fly(self, placements: NDArray[np.float64]) -> Rollouts:
+    def _fly(self, placements: NDArray[np.float64]) -> EpisodeEnds:
         now: Any = self._start(torch.from_numpy(placements))  # worlds are of any task's state
         flying = torch.arange(len(now), device=self._worlds.device)
         done, before = now[flying], now
@@ -151,7 +151,7 @@ class Simulator:
             on = now.end_reason == 0
             flying, now, before = flying[on], now[on], before[on]
         ended = (done.end_reason, done.collected, done.steps, repeats)
-        return Rollouts(*(value.cpu().numpy() for value in ended))
+        return EpisodeEnds(*(value.cpu().numpy() for value in ended))
 
     def _start(self, lateral: Tensor) -> State:
         """Return initial states with cubes at these positions."""
@@ -192,8 +192,7 @@ def check_certificate(
     Raises:
         InputError: There is no such device.
     """
-    inconsistencies = tuple(find_inconsistencies(certificate))
-    if inconsistencies:
+    if inconsistencies := tuple(find_inconsistencies(certificate)):
         return CheckFindings(inconsistencies, (), 0, {})
     sample = sample_placements(certificate, flights, np.random.default_rng(seed))
     stated = sample.outcome < len(certificate.outcomes)
@@ -230,13 +229,12 @@ def read_validated(
     """
     certificate = read_certificate(path)
     check_same_policy(certificate, described, weights, described.task)
-    found = next(find_inconsistencies(certificate), None)
-    if found is not None:
-        raise InputError(f"certificate {path} is inconsistent: {found}; prove the policy again")
+    if inconsistency := next(find_inconsistencies(certificate), None):
+        raise InputError(f"certificate {path} is inconsistent: {inconsistency}; prove again")
     return certificate
 
 
-def ends_as_stated(outcome: Outcome, rollouts: Rollouts, i: int) -> bool:
+def ends_as_stated(outcome: Outcome, rollouts: EpisodeEnds, i: int) -> bool:
     """Return whether episode i ended as stated, after a stated number of steps."""
     if rollouts.end[i] != outcome.end or tuple(rollouts.collected[i]) != outcome.collected:
         return False
@@ -248,16 +246,16 @@ def ends_as_stated(outcome: Outcome, rollouts: Rollouts, i: int) -> bool:
 
 
 def _rounding_errors(
-    stated: Sequence[Outcome], exact: Rollouts, is_wrong: NDArray[np.bool_]
+    stated: Sequence[Outcome], exact: EpisodeEnds, is_wrong: NDArray[np.bool_]
 ) -> list[str]:
     """Return what float64 alone refutes, and not float32, which `is_wrong` (k,) marks."""
     ended = np.array([ends_as_stated(outcome, exact, i) for i, outcome in enumerate(stated)], bool)
-    if not (count := int((~ended & ~is_wrong).sum())):
-        return []
-    return [
+    count = int((~ended & ~is_wrong).sum())
+    text = (
         f"{count} of {len(stated)} flights ended otherwise than stated with the network in float64 "
         "alone, so the policy's decisions depend on rounding"
-    ]
+    )
+    return [text] if count else []
 
 
 def _stated(outcome: Outcome) -> str:
@@ -265,7 +263,7 @@ def _stated(outcome: Outcome) -> str:
     return f"{outcome}" if missing_steps(outcome) else f"{outcome}, steps: {steps}"
 
 
-def _found(rollouts: Rollouts, i: int) -> str:
+def _found(rollouts: EpisodeEnds, i: int) -> str:
     end, collected = EndReason(rollouts.end[i]), tuple(map(bool, rollouts.collected[i]))
     loops = end == EndReason.STEP_LIMIT and bool(rollouts.repeats[i])
     as_outcome = Outcome(end, collected, loops, 0.0, {}, np.zeros((0, len(collected), 2)))

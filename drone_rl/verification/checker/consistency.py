@@ -31,58 +31,28 @@ def volume(boxes: NDArray[np.float64]) -> Fraction:
     return Fraction(int(sizes.prod(1).sum()), unit ** boxes.shape[1])
 
 
-def find_partition_error(
-    boxes: NDArray[np.float64], bound: float
-) -> tuple[list[float], int] | None:
-    """Return a point that refutes a partition of [-bound, bound]^n, and how many boxes hold it.
+def find_partition_error(boxes: NDArray[np.float64], bound: float) -> list[float] | None:
+    """Return a corner of a box next to which boxes do not partition [-bound, bound]^n.
 
-    The point lies inside and not in exactly one box, or outside and in a box. None if nonempty
-    boxes, shape (boxes, n, 2), are a partition.
+    None if nonempty boxes, shape (boxes, n, 2), are a partition.
     """
     n = boxes.shape[1]
-    cube = np.full((1, n, 2), (-bound, bound))
-    every = np.concatenate([cube, boxes])
-    axes = [np.unique(every[:, i]) for i in range(n)]
-    ranks = np.stack([np.searchsorted(axis, every[:, i]) for i, axis in enumerate(axes)], 1)
-    corner = _uncancelled(ranks)
-    if corner is None:
-        return None
-    return next(_around(corner, ranks, axes))
-
-
-def _uncancelled(ranks: NDArray[np.intp]) -> NDArray[np.intp] | None:
-    """Return a corner that does not cancel; the first box counts as negative."""
-    n = ranks.shape[1]
+    every = np.concatenate([np.full((1, n, 2), (-bound, bound)), boxes])
+    ranks = [np.unique(every[:, i], return_inverse=True)[1].reshape(-1, 2) for i in range(n)]
     ends = np.array(list(product((0, 1), repeat=n)))  # (2^n, n)
     sign = 1 - 2 * (ends.sum(1) % 2)
-    key = np.zeros((len(ranks), len(ends)), np.int64)
-    for i in range(n):  # corners by number; renumbered at each axis, so that none overflows
-        key = key * (int(ranks[:, i].max()) + 1) + ranks[:, i][:, ends[:, i]]
+    key = np.zeros((len(every), len(ends)), np.int64)
+    for i, rank in enumerate(ranks):  # corners by number; renumbered, so that none overflows
+        key = key * (int(rank.max()) + 1) + rank[:, ends[:, i]]
         key = np.unique(key, return_inverse=True)[1].reshape(key.shape)
-    weight = np.repeat(sign[None], len(ranks), 0)
-    weight[0] *= -1
-    left = np.bincount(key.ravel(), weight.ravel())  # exact: sums of at most 2^25 ones
-    if not left.any():
+    weight = np.repeat(sign[None], len(every), 0)
+    weight[0] *= -1  # the cube counts as negative
+    sums = np.bincount(key.ravel(), weight.ravel())  # exact: sums of at most 2^25 ones
+    uncancelled = np.flatnonzero(sums)
+    if not len(uncancelled):
         return None
-    box, end = np.argwhere(key == np.flatnonzero(left)[0])[0]
-    return ranks[box, np.arange(n), ends[end]]
-
-
-def _around(
-    corner: NDArray[np.intp], ranks: NDArray[np.intp], axes: Sequence[NDArray[np.float64]]
-) -> Iterator[tuple[list[float], int]]:
-    """Yield the points around a corner with a wrong number of boxes; there is at least one."""
-    sides = [
-        [c for c in (r - 1, r) if 0 <= c < len(axis) - 1]
-        for r, axis in zip(corner, axes, strict=True)
-    ]
-    for cell in product(*sides):
-        at = np.array(cell)
-        holding = np.flatnonzero(((ranks[..., 0] <= at) & (at < ranks[..., 1])).all(1)).tolist()
-        count = len(holding) - (0 in holding)
-        if count != (0 in holding):
-            place = [float((a[c] + a[c + 1]) / 2) for a, c in zip(axes, cell, strict=True)]
-            yield place, count
+    box, end = np.argwhere(key == uncancelled[0])[0]
+    return every[box, np.arange(n), ends[end]].tolist()
 
 
 MAX_MISSING = 0.05  # largest fraction of the stated placements without a stated number of steps
@@ -131,13 +101,8 @@ def _missing(certificate: Certificate) -> Iterator[str]:
 def _misfits(certificate: Certificate, whole: Fraction) -> Iterator[str]:
     """Check twice that the boxes partition the placements: by corners and by volume."""
     boxes, bound = np.concatenate(certificate.groups), certificate.task.lateral_bound
-    misfit = find_partition_error(boxes, bound)
-    if misfit is not None:
-        place, count = misfit
-        yield (
-            f"the boxes do not partition the placements: {count} of them contain the placement "
-            f"{place}, where lateral_bound={bound}"
-        )
+    if (corner := find_partition_error(boxes, bound)) is not None:
+        yield f"the boxes do not partition the placements next to {corner} (lateral_bound={bound})"
     if (total := volume(boxes)) != whole:
         yield f"the boxes have {float(total / whole):.17g} of the volume of all placements"
 

@@ -51,13 +51,6 @@ class ActionMap:
     touch_distance: float  # metres; a cube further to the side requires a turn
     doubtful: float  # bound on the area, m^2, where float32 may show a neighbour's image
 
-    @property
-    def is_blind(self) -> NDArray[np.bool_]:
-        """Cells, by side, that require a turn but get no reaction. Shape: (cells, 3)."""
-        needed = np.array(NEEDED)
-        turns = needed != Move.FORWARD
-        return (self.action == self.alone)[:, None] & (self.action[:, None] != needed) & turns
-
     def at(self, places: NDArray[np.float64]) -> NDArray[np.int64]:
         """Return the actions at positions inside the window. Shape: (N, 2) to (N,)."""
         return self.action[self.arrangement.locate(places)]
@@ -66,7 +59,9 @@ class ActionMap:
         """Return plain numbers; fractions are of areas. Logits closer than `logit_gap` may tie."""
         areas, total = self.areas, self.areas.sum()
         counts = [np.bincount(self.action, area, len(MOVES)) for area in areas.T]
-        blind, unseen = areas * self.is_blind, areas * self.is_unseen[:, None]
+        needed, action = np.array(NEEDED), self.action[:, None]
+        is_blind = (action == self.alone) & (action != needed) & (needed != Move.FORWARD)
+        blind, unseen = areas * is_blind, areas * self.is_unseen[:, None]
         closest = int(self.gap.argmin())
         sides = {
             side: {
@@ -86,13 +81,11 @@ class ActionMap:
             "sides": sides,
             "alone": self.alone,
             "touch_distance": self.touch_distance,
-            "unmoved": _share(areas[self.action == self.alone].sum(), total),
             UNSEEN: _share(unseen.sum(), total),
             BLIND: _share(blind.sum(), total),
             "least_gap": float(self.gap[closest]),
             "least_gap_ahead": float(self.places[closest, 0]),
             "least_gap_left": float(self.places[closest, 1]),
-            "least_gap_area": float(areas[closest].sum()),
             "logit_gap": logit_gap,
             "close": _share(areas[self.gap <= logit_gap].sum(), total),
             "in_doubt": min(1.0, self.doubtful / float(total)),

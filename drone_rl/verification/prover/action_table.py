@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from drone_rl.utils.provenance import num_cores
 from drone_rl.utils.threads import set_torch_threads
@@ -16,7 +17,6 @@ from drone_rl.verification.prover.cells import Cells
 from drone_rl.verification.prover.cube_images import NOTHING
 
 BATCH, CHUNK, ALONE = 4096, 256, 64  # blocks tried at a time, by one thread, and without threads
-SMALL = 1000  # combinations of a span that are enumerated
 FEW, PRICE = 8, 6.0  # images evaluated singly; cost of bounds on a block, in images
 
 
@@ -67,7 +67,8 @@ class ActionTable:
 
     def fill(self, spans: NDArray[np.int64]) -> None:
         """Compute the table within spans, shape (N, cubes, 2)."""
-        unknown = _open(self.table, spans[self._is_unknown(spans)])
+        is_unknown = [bool((self.table[_slices(span)] == 0).any()) for span in spans]
+        unknown = _open(self.table, spans[is_unknown])
         tasks = _open(self._known, self._images_of(unknown))
         stack = [tasks] if len(tasks) else []
         while stack:
@@ -95,18 +96,6 @@ class ActionTable:
     def nothing_in_sight(self) -> int:
         """Return the bits of the possible actions without a visible cube."""
         return int(self._decide(np.empty((1, 0), int))[0])
-
-    def _is_unknown(self, spans: NDArray) -> NDArray[np.bool_]:
-        """Return which spans have unknown entries."""
-        counts = _counts(spans)
-        small, is_unknown = counts <= SMALL, np.zeros(len(spans), bool)
-        if small.any():
-            known = self.table[tuple(_combinations(spans[small]).T[::-1])]
-            begins = np.cumsum(counts[small]) - counts[small]
-            is_unknown[small] = np.minimum.reduceat(known, begins) == 0
-        for i in np.flatnonzero(~small):
-            is_unknown[i] = (self.table[_slices(spans[i])] == 0).any()
-        return is_unknown
 
     def _images_of(self, blocks: NDArray) -> NDArray:
         """Convert ranges of cells and bands to ranges of their images."""
@@ -156,19 +145,21 @@ class ActionTable:
 
     def _decide(self, combinations: NDArray) -> NDArray[np.uint8]:
         """Return the possible actions of single images, given by their indices."""
-        index = torch.from_numpy(combinations)
-        shown = [(r.part, r.images[index[:, k]]) for k, r in enumerate(self._ranges)]
-        images = self._painter.see(self._painter.paint_one(shown, len(index)))
+        images, _ = self._paint(np.stack([combinations, combinations], -1))
         bits, gaps = self._bounds.decide(images)
         self._gaps.append(float(gaps.min()))
         return bits.numpy()
 
     def _bound(self, blocks: NDArray) -> NDArray[np.uint8]:
         """Return the only possible action of each block; 0 where bounds leave several."""
-        cases = [(r.part, *r.of(blocks[:, k])) for k, r in enumerate(self._ranges)]
-        lower, upper = map(self._painter.see, self._painter.paint(cases, len(blocks)))
-        bits = self._bounds.possible(lower, upper)
+        bits = self._bounds.possible(*self._paint(blocks))
         return (bits * (bits & (bits - 1) == 0)).numpy()
+
+    def _paint(self, blocks: NDArray) -> tuple[Tensor, Tensor]:
+        """Return lower and upper bounds of the network's input over each block."""
+        cases = [(r.part, *r.of(blocks[:, k])) for k, r in enumerate(self._ranges)]
+        lower, upper = self._painter.paint(cases, len(blocks))
+        return self._painter.see(lower), self._painter.see(upper)
 
     def _is_worth(self, pixels: NDArray, counts: NDArray) -> NDArray[np.bool_]:
         """Return which blocks bounds probably decide faster than single images would."""

@@ -9,11 +9,9 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from drone_rl.collectors.speedups import accelerated_inference
 from drone_rl.policies import PolicyNetwork
-from drone_rl.policies.rounded_layers import SLACK, UNIT, Layer, layer_of
+from drone_rl.policies.rounded_layers import SLACK, UNIT
 from drone_rl.policies.rounding import PIXEL_UNITS, RoundingBound
-from drone_rl.sim.actions import MOVES
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.cube_images import NOTHING
 
@@ -27,36 +25,34 @@ class NetworkBounds:
     homogeneous, so biases are scaled instead of halving the sums.
     """
 
-    def __init__(self, network: PolicyNetwork, gap: float) -> None:
+    def __init__(self, network: nn.Module, gap: float) -> None:
         """Prepare the layers.
 
         An action is certain only if its logit leads by more than `gap` and by more than the bound
         on rounding errors, see `drone_rl.policies.rounding`.
 
         Raises:
-            InputError: A layer is none of those of `layer_of`, or the last one is not linear.
+            InputError: `RoundingBound` does not support the network.
         """
-        *inner, last = network.layers
-        if not isinstance(last, nn.Linear):
+        rounding = RoundingBound.find(network)
+        if rounding is None or not isinstance(network, PolicyNetwork):
             raise InputError(
-                "the network's last layer is not linear; prove a policy that ends in a linear layer"
+                "proofs support only networks of convolutions without padding, linear layers, "
+                f"ReLU, MaxPool2d and Flatten in turn, got {type(network).__name__}; prove another "
+                "policy"
             )
-        self.gap = gap
-        self._errors = [_errors_of(layer) for layer in network.layers]
-        self._answers = accelerated_inference(network)
+        self.gap, self._rounding = gap, rounding
+        *inner, last = network.layers
         scale, self._steps = 2, []
         for layer in inner:
             self._steps.append((_step(layer, scale), scale))
             scale *= 1 if isinstance(layer, _LINEAR) else 2
         self._scale = scale
-        weight, bias = last.weight.detach(), last.bias.detach()
+        weight, bias = (last.get_parameter(name).detach() for name in ("weight", "bias"))
         self.num_actions = len(weight)
         self._first, self._second = (~torch.eye(len(weight), dtype=torch.bool)).nonzero().T
         self._weight = weight[self._first] - weight[self._second]
         self._bias = bias[self._first] - bias[self._second]
-        self._rounding = RoundingBound(self._errors, getattr(network, "actions", MOVES))
-        self._hull: tuple[Tensor, Tensor, Tensor] | None = None
-        """Bounds on all images decided so far, and the lead that is certain for them."""
 
     @torch.no_grad()
     def possible(self, lower: Tensor, upper: Tensor) -> Tensor:
@@ -91,28 +87,11 @@ class NetworkBounds:
     @torch.no_grad()
     def decide(self, images: Tensor) -> tuple[Tensor, Tensor]:
         """Return the bits of the possible actions of images, and the gap of the top two logits."""
-        logits = self._answers(images)
-        highest = logits.topk(2).values
+        decisions = self._rounding.decide(images)
+        logits, loses = decisions.outputs, ~decisions.possible[:, self._second]
         lead = logits[:, self._first] - logits[:, self._second]
-        bits = self._bits(lead > self._gap(images))
-        rows = (bits & (bits - 1) != 0).nonzero()[:, 0]
-        if len(rows):  # bounds of single images are tighter than the common one
-            losers = ~self._rounding.decide(images[rows]).possible
-            clear = losers[:, self._second] & (lead[rows] > self.gap)
-            bits[rows] = self._bits(clear)
-        return bits, highest[:, 0] - highest[:, 1]
-
-    def _gap(self, images: Tensor) -> Tensor:
-        """Return the lead that is certain for all images seen so far. Shape: (pairs,)."""
-        lower, upper = images.amin(0, keepdim=True), images.amax(0, keepdim=True)
-        if self._hull is not None:
-            lowest, highest, gap = self._hull
-            if not bool(((lower < lowest) | (upper > highest)).any()):
-                return gap
-            lower, upper = torch.minimum(lower, lowest), torch.maximum(upper, highest)
-        gap = self._least(lower, upper)[1].float()
-        self._hull = lower, upper, gap
-        return gap
+        highest = logits.topk(2).values
+        return self._bits(loses & (lead > self.gap)), highest[:, 0] - highest[:, 1]
 
     def _error(self, largest: Sequence[Tensor]) -> Tensor:
         """Return the rounding error of logit differences, and of their bounds. Shape: (pairs,).
@@ -120,7 +99,7 @@ class NetworkBounds:
         Each is at most the sum of the two logits' errors.
         """
         error = PIXEL_UNITS * UNIT * largest[0].amax().clamp(min=UNIT).expand_as(largest[0])
-        for layer, size in zip(self._errors, largest, strict=True):
+        for layer, size in zip(self._rounding.layers, largest, strict=True):
             error = layer.bound(size, error)
         both = error[0, self._first] + error[0, self._second]
         return 2 * SLACK * both.nan_to_num(nan=torch.inf)
@@ -131,17 +110,6 @@ class NetworkBounds:
         for loser, beats in zip(self._second.tolist(), is_certain.T, strict=True):
             bits &= torch.where(beats, 255 - (1 << loser), 255).to(torch.uint8)
         return bits
-
-
-def _errors_of(layer: nn.Module) -> Layer:
-    found = layer_of(layer)
-    if found is None:
-        raise InputError(
-            f"proofs do not support the network's layer {layer}: its rounding errors have no known "
-            "bound; prove a policy of convolutions without padding, linear layers, ReLU, MaxPool2d "
-            "and Flatten"
-        )
-    return found
 
 
 def _size(total: Tensor, width: Tensor) -> Tensor:
@@ -172,6 +140,11 @@ def _monotone(layer: nn.Module, total: Tensor, width: Tensor) -> tuple[Tensor, T
     return lower + upper, upper.sub_(lower)
 
 
+def masks_of(faces: Tensor) -> Tensor:
+    """Return bit masks of the possible faces where one is possible."""
+    return torch.bitwise_left_shift(torch.ones_like(faces), faces)
+
+
 Crop = tuple[slice, slice]  # rows and columns of an image
 _FACES = 4
 
@@ -179,19 +152,16 @@ _FACES = 4
 class Compositor:
     """Composes images of cubes, nearer ones in front, before the background of all images."""
 
-    def __init__(
-        self, background: Tensor, faces: Tensor, rest: Callable[[Tensor], Tensor] | None = None
-    ) -> None:
+    def __init__(self, background: Tensor, faces: Tensor, rest: Callable[[Tensor], Tensor]) -> None:
         """Store the brightness of the background (height, width) and of the faces (3,), float32.
 
         The faces are a cube's front, left and right side. `rest` maps images (N, 1, height, width)
-        to the network's input and must be monotone; it is the identity by default.
+        to the network's input and must be monotone.
         """
         self._background = background
         self._rest = rest
         inf = torch.inf
         bits = torch.arange(2**_FACES)[:, None] >> torch.arange(1, _FACES) & 1 == 1
-        self._shades = torch.cat([faces.new_zeros(1), faces])
         self._lowest = torch.where(bits, faces, inf).min(-1).values
         self._highest = torch.where(bits, faces, -inf).max(-1).values
         is_open = torch.arange(2**_FACES) >> NOTHING & 1 == 1
@@ -219,21 +189,9 @@ class Compositor:
             high.sub_(shut).clamp_min_(self._highest[index].index_select(0, case))
         return lower, upper
 
-    def paint_one(self, cubes: Sequence[tuple[Crop, Tensor]], num_images: int) -> Tensor:
-        """Return known images. Shape: (N, height, width).
-
-        As `paint`, but with each cube's faces, shape (N, rows, columns), uint8.
-        """
-        images = self._background.repeat(num_images, 1, 1)
-        for part, faces in reversed(cubes):
-            shade = self._shades[faces.int()]
-            behind = images[:, *part]
-            behind.copy_(torch.where(faces == NOTHING, behind, shade))
-        return images
-
     def see(self, images: Tensor) -> Tensor:
         """Return the network's input. Shape: (N, height, width) to (N, C, H, W)."""
-        return images[:, None] if self._rest is None else self._rest(images[:, None])
+        return self._rest(images[:, None])
 
 
 class ImageRanges:
@@ -252,7 +210,7 @@ class ImageRanges:
         )
         """Crop outside which the cube is never visible."""
         self.images = images = images[:, *self.part].contiguous()
-        masks = torch.bitwise_left_shift(torch.ones_like(images), images)
+        masks = masks_of(images)
         self._levels = [masks]
         while len(masks) > (reach := 1 << (len(self._levels) - 1)):
             masks = masks[:-reach] | masks[reach:]

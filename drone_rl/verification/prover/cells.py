@@ -15,7 +15,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.boxes import unite
 from drone_rl.verification.prover.cube_images import CameraModel, CubeView
 
-NARROWER = 8  # factor by which bands are narrower where the renderer's images are available
+NARROWER = 8  # factor by which bands are narrower if the renderer's images allow it
 SLIVER = 1e-9  # metres. Smallest part of a cell next to a band; bands are further apart
 
 
@@ -28,12 +28,12 @@ class Cells:
         ahead: float,
         lowest: float,
         highest: float,
-        renderer: CubeView | None = None,
+        renderer: CubeView,
     ) -> None:
         """Find the cells of a cube whose centre is `ahead` metres from the camera.
 
         They reach at least from `lowest` to `highest`, metres to the left of the camera. The
-        renderer renders the images within bands; without it bands may show either neighbour's.
+        renderer renders the images within bands.
 
         Raises:
             InputError: The renderer contradicts the closed form.
@@ -43,21 +43,19 @@ class Cells:
                 f"at {ahead} m a row of pixels grazes the edge of a cube, so rounding decides what "
                 "it shows; change task.first_distance a little"
             )
-        bands, between = _bands(camera, ahead, lowest, highest, NARROWER), None
-        if renderer is not None:
+        for narrower in (NARROWER, 1):
+            bands = _bands(camera, ahead, lowest, highest, narrower)
             between = _within(bands, camera, ahead, renderer)
-            if between is None:
-                bands = _bands(camera, ahead, lowest, highest, 1)
-                between = _within(bands, camera, ahead, renderer)
-            if between is None:
-                raise InputError(
-                    "the renderer's image next to a border differs from the closed form, so "
-                    "nothing can be proved; prove the policy in the default environment"
-                )
+            if between is not None:
+                break
+        else:
+            raise InputError(
+                "the renderer's image next to a border differs from the closed form, so nothing "
+                "can be proved; prove the policy in the default environment"
+            )
         self.limits = _limits(bands, lowest, highest)
         """Start of each cell and band, then the end of the last, metres left of the camera."""
         pure = _middle_faces(camera, ahead, self.limits)
-        between = [pure[:0]] * len(bands) if between is None else between
         parts, begins = [pure[:1]], [0]
         for inner, after in zip(between, pure[1:], strict=True):
             begins += [begins[-1], begins[-1] + 1 + len(inner)]

@@ -138,7 +138,7 @@ class CubeImages:
     """Images of cubes at given positions, rendered and in closed form."""
 
     def __init__(self, worlds: Worlds, lattice: Lattice, camera: CameraModel) -> None:
-        """Read the colors; raise InputError if a face has several or none, or shares one."""
+        """Read the colors of the faces; raise InputError if one is not visible."""
         self._worlds, self._lattice, self._camera = worlds, lattice, camera
         task = lattice.task
         self.num_cubes = task.num_cubes
@@ -163,18 +163,7 @@ class CubeImages:
                     f"{left[1]:g} m to the side, so their colors are unknown; prove a policy with "
                     "a larger camera.horizontal_fov"
                 )
-            if (shown != shown[0]).any():
-                raise InputError(
-                    "a face of a cube has more than one color, so its image has no closed form; "
-                    "prove the policy in an environment without textures and shadows"
-                )
             self.colors[face] = shown[0]
-        behind = self.background.reshape(-1, 3).unique(dim=0)
-        if len(torch.cat([behind, self.colors[FRONT:]]).unique(dim=0)) < len(behind) + 3:
-            raise InputError(
-                f"task.cube_color={task.cube_color} gives a face the color of another face, the "
-                "floor or the sky; give another color"
-            )
 
     def read(self, images: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Convert images of one cube to faces; raise InputError if a pixel shows something else."""

@@ -7,8 +7,7 @@ import numpy as np
 
 from drone_rl.config import TaskSettings
 from drone_rl.envs import GrayPixels, StandardizePixels, on_pixels
-from drone_rl.envs.transforms import without_identities
-from drone_rl.policies import ImageNetwork, PolicyNetwork
+from drone_rl.policies import ImageNetwork
 from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.worlds import Worlds
@@ -68,13 +67,6 @@ def make_policy_spec(
         InputError: The policy or task is not supported; the message says why.
     """
     task = require_cubes(description, "proofs")
-    if not isinstance(network, PolicyNetwork):
-        raise InputError(f"proofs need layers, which {type(network).__name__} has not")
-    if not network.is_sequential:
-        raise InputError(
-            f"proofs support only networks of layers in turn; {type(network).__name__} has a "
-            "forward of its own; prove another policy"
-        )
     check_task(task)
     if not description.appearance.is_minimal:
         raise InputError(
@@ -127,13 +119,13 @@ def make_compositor(description: PolicyDescription, images: CubeImages) -> Compo
             f"proofs do not support the transform {strange[0]}; prove a policy whose only "
             f"transforms are {', '.join(_MONOTONE)}"
         )
-    made = without_identities([choice.make() for choice in chosen], images.background)
+    made = [choice.make() for choice in chosen]
     shades = (GrayPixels, StandardizePixels)
     count = next((i for i, t in enumerate(made) if not isinstance(t, shades)), len(made))
     shade, rest = on_pixels(made[:count]), on_pixels(made[count:])
     background = shade(images.background[None])[0, 0]
     faces = shade(images.colors[None, None, FRONT:])[0, 0, 0]
-    return Compositor(background, faces, rest if made[count:] else None)
+    return Compositor(background, faces, rest)
 
 
 IMAGES_PER_BORDER = 3  # approximate number: the one beyond it, and two within its rounding band

@@ -6,35 +6,30 @@ partition the placements, and every episode from a box must end as stated.
 
 import dataclasses
 import io
-from collections import defaultdict
+import pickle
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+import torch
+from torch import Tensor
 
 from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.tasks.collect_cubes import EndReason
-from drone_rl.utils.archives import check_indices, read_arrays
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import write_atomically
-from drone_rl.utils.limits import ARRAYS_BYTES
+from drone_rl.utils.files import read_bytes, write_atomically
 from drone_rl.verification.prover.boxes import Boxes, volumes
-from drone_rl.verification.prover.lattice import AHEAD, LEFT, RIGHT, Ending, LatticeState
-from drone_rl.verification.prover.prover import ProofFindings, Prover, combine
+from drone_rl.verification.prover.lattice import Ending, LatticeState
+from drone_rl.verification.prover.prover import ProofFindings, Prover
 
 FORMAT = "drone_rl certificate"
 FORMAT_VERSION = 1
 _COUNTS = ("num_states", "num_images", "most_boxes", "least_gap", "largest_band", "decided")
-_BOX_SETS = ("waiting", "ended", "ways", "forked", "parts", "part", "done", "undecided")
-"""Names in files, a part of their format."""
-_DAMAGE = (ValueError, TypeError, LookupError, ArithmeticError, AttributeError)  # of damaged files
-_MAX_INTEGER = 2**40  # in a row
-_UNKNOWN = (-1, 0, 0)  # row of an unknown ending
-
-_Row = tuple[int, ...]  # a lattice state or an ending as integers; empty for neither
-_BoxSet = list[tuple[_Row, Boxes]]  # boxes by lattice state or ending
+_MAX_STATE_BYTES = 2**33
+_DAMAGE = (RuntimeError, pickle.UnpicklingError, EOFError, LookupError, TypeError)
+"""Errors of `torch.load` and of a file that holds something else."""
+_Row = tuple[int, int, bool]  # an ending as plain values
 
 
 def certify(
@@ -95,139 +90,73 @@ def certify(
 
 def save(prover: Prover, path: Path, proof_id: str) -> None:
     """Write a proof's state atomically; `proof_id` identifies what is proved."""
-    done = prover.done
-    sets: dict[str, _BoxSet] = {
-        "waiting": [
-            ((*dataclasses.astuple(state), prover.longest.get(state, 0)), boxes)
-            for state, known in prover.waiting.items()
-            for boxes in known
-        ],
-        "ended": [
-            ((*_row(ending), steps), boxes)
-            for (ending, steps), known in prover.ended.items()
-            for boxes in known
-        ],
-        "ways": [(_row(end), boxes) for end, known in prover.fork_ends.items() for boxes in known],
-        "forked": [((), boxes) for boxes in prover.forked],
-        "parts": [((), prover.parts)],
-        "part": [((), prover.part)],
-        "done": [(_row(ending), boxes) for ending, boxes in done.endings.items()],
-        "undecided": [((), done.undecided)],
+    nothing, done = prover.part[:0], prover.done
+    state = {
+        "proof_id": proof_id,
+        "counts": {name: getattr(prover, name) for name in _COUNTS},
+        "waiting": {
+            (*dataclasses.astuple(state), prover.longest.get(state, 0)): _joined(boxes)
+            for state, boxes in prover.waiting.items()
+        },
+        "ended": {
+            (_row(ending), steps): _joined(boxes) for (ending, steps), boxes in prover.ended.items()
+        },
+        "fork_ends": {_row(ending): _joined(boxes) for ending, boxes in prover.fork_ends.items()},
+        "forked": _joined([nothing, *prover.forked]),
+        "parts": _joined([prover.parts]),
+        "part": _joined([prover.part]),
+        "done": {_row(ending): _joined([boxes]) for ending, boxes in done.endings.items()},
+        "undecided": _joined([done.undecided]),
+        "steps": {_row(ending): dict(volume) for ending, volume in done.steps.items()},
     }
-    volumes_of = [
-        ((*_row(ending), steps), volume)
-        for ending, known in done.steps.items()
-        for steps, volume in known.items()
-    ]
-    arrays: dict[str, Any] = {
-        "subject": np.frombuffer(proof_id.encode(), np.uint8),
-        "counts": np.array([getattr(prover, name) for name in _COUNTS], np.float64),
-    }
-    for name, parts in sets.items():
-        arrays |= _packed(name, parts)
-    rows = [row for row, _ in volumes_of]
-    arrays["steps_rows"] = np.array(rows, np.int64).reshape(len(rows), 4)
-    arrays["steps_volumes"] = np.array([volume for _, volume in volumes_of], np.float64)
     buffer = io.BytesIO()
-    np.savez(buffer, **arrays)
+    torch.save(state, buffer)
     write_atomically(path, buffer.getvalue())
 
 
-def load(prover: Prover, path: Path, proof_id: str, most: int = ARRAYS_BYTES) -> None:
-    """Resume a new proof from a state of at most `most` bytes.
+def load(prover: Prover, path: Path, proof_id: str) -> None:
+    """Resume a new proof from a saved state.
 
     Raises:
-        InputError: The file is damaged or of another proof; the proof is unchanged.
+        InputError: The file is damaged or of another proof.
     """
+    content = read_bytes(path, _MAX_STATE_BYTES)
     try:
-        state = read_arrays(path, most=most)
-        saved = state["subject"].tobytes().decode()
-        counts = {
-            name: type(getattr(prover, name))(count)
-            for name, count in zip(_COUNTS, state["counts"].tolist(), strict=True)
-        }
-        shape = prover.parts.shape[1:]
-        sets = {name: _unpacked(name, state, shape) for name in _BOX_SETS}
-        waiting = [(*_lattice_state(row), b) for row, b in sets["waiting"]]
-        ended = [((_ending(row), row[3]), b) for row, b in sets["ended"]]
-        forks = [(None if row == _UNKNOWN else _ending(row), b) for row, b in sets["ways"]]
-        forked = [boxes for _, boxes in sets["forked"]]
-        ((_, parts),), ((_, part),) = sets["parts"], sets["part"]
-        ((_, undecided),) = sets["undecided"]
-        _check(part, waiting, [*ended, *forks, *forked])
-        done = [ProofFindings({_ending(row): b}, undecided[:0], {}) for row, b in sets["done"]]
-        done = combine([ProofFindings({}, undecided, _steps(state)), *done])
+        state = torch.load(io.BytesIO(content), weights_only=True)
+        is_same = state["proof_id"] == proof_id
     except _DAMAGE as error:
         raise InputError(
             f"{path} is not a saved proof state ({error}); delete it to start again"
         ) from None
-    if saved != proof_id:
+    if not is_same:
         raise InputError(f"{path} belongs to another proof; delete it, or give another folder")
-    prover.waiting.clear()
-    prover.boxes_under_way = 0
-    for waited, longest, boxes in waiting:
-        prover.wait(waited, boxes)
-        if waited.is_fork:
-            prover.longest[waited] = longest
-    for key, boxes in ended:
-        prover.ended[key].append(boxes)
-    for ending, boxes in forks:
-        prover.fork_ends[ending].append(boxes)
-    prover.forked, prover.parts, prover.part, prover.done = forked, parts, part, done
-    for name, count in counts.items():
+    for name, count in state["counts"].items():
         setattr(prover, name, count)
+    for (*fields, longest), boxes in state["waiting"].items():
+        waiting = LatticeState(*fields)
+        prover.wait(waiting, boxes.numpy())
+        if waiting.is_fork:
+            prover.longest[waiting] = longest
+    for (row, steps), boxes in state["ended"].items():
+        prover.ended[_ending(row), steps].append(boxes.numpy())
+    for row, boxes in state["fork_ends"].items():
+        prover.fork_ends[row and _ending(row)].append(boxes.numpy())
+    prover.forked = [state["forked"].numpy()]
+    prover.parts, prover.part = state["parts"].numpy(), state["part"].numpy()
+    prover.done = ProofFindings(
+        {_ending(row): boxes.numpy() for row, boxes in state["done"].items()},
+        state["undecided"].numpy(),
+        {_ending(row): volume for row, volume in state["steps"].items()},
+    )
 
 
-def _check(part: Boxes, waiting: Sequence, known: Sequence) -> None:
-    """Check that lattice states wait only while a part of the placements is in progress."""
-    if len(part) != bool(waiting) or (known and not waiting):
-        raise ValueError(f"{len(part)} parts in progress, {len(waiting)} states waiting")
+def _joined(boxes: Sequence[Boxes]) -> Tensor:
+    return torch.from_numpy(np.concatenate(boxes))
 
 
-def _lattice_state(row: _Row) -> tuple[LatticeState, int]:
-    ahead, left, collected, steps, came, is_fork, longest = row
-    if came not in (AHEAD, LEFT, RIGHT):
-        raise ValueError(f"a state was reached by action {came}")
-    return LatticeState(ahead, left, collected, steps, came, bool(is_fork)), longest
-
-
-def _row(ending: Ending | None) -> tuple[int, int, int]:
-    if ending is None:
-        return _UNKNOWN
-    return int(ending.reason), ending.collected, int(ending.loops)
+def _row(ending: Ending | None) -> _Row | None:
+    return None if ending is None else (int(ending.reason), ending.collected, ending.loops)
 
 
 def _ending(row: _Row) -> Ending:
-    return Ending(EndReason(row[0]), row[1], bool(row[2]))
-
-
-def _steps(state: dict[str, NDArray]) -> dict[Ending, dict[int, float]]:
-    rows, volumes = state["steps_rows"], state["steps_volumes"]
-    if rows.shape != (*volumes.shape, 4) or not np.isfinite(volumes).all():
-        raise ValueError(f"steps are {volumes.dtype} of shape {rows.shape}")
-    steps: dict[Ending, dict[int, float]] = defaultdict(dict)
-    for row, volume in zip(rows.tolist(), volumes.tolist(), strict=True):
-        steps[_ending(row)][row[3]] = volume
-    return dict(steps)
-
-
-def _packed(name: str, parts: Sequence[tuple[_Row, Boxes]]) -> dict[str, NDArray]:
-    rows, boxes = [row for row, _ in parts], [b for _, b in parts]
-    return {
-        f"{name}_rows": np.array(rows, np.int64).reshape(len(rows), -1 if rows and rows[0] else 0),
-        f"{name}_counts": np.array([len(b) for b in boxes], np.int64),
-        f"{name}_boxes": np.concatenate(boxes) if boxes else np.empty((0, 0, 2)),
-    }
-
-
-def _unpacked(name: str, state: dict[str, NDArray], shape: tuple[int, ...]) -> _BoxSet:
-    rows, counts, boxes = (state[f"{name}_{part}"] for part in ("rows", "counts", "boxes"))
-    if not len(counts):
-        return []
-    check_indices(counts, 1 + len(boxes), f"{name}_counts")
-    check_indices(abs(rows), _MAX_INTEGER, f"{name}_rows")
-    is_sound = boxes.dtype == np.float64 and bool(np.isfinite(boxes).all())
-    if boxes.shape != (counts.sum(), *shape) or not is_sound:
-        raise ValueError(f"{name} are {boxes.dtype} of shape {boxes.shape}")
-    parts = np.split(boxes, np.cumsum(counts)[:-1])
-    return [(tuple(row), b) for row, b in zip(rows.tolist(), parts, strict=True)]
+    return Ending(EndReason(row[0]), *row[1:])

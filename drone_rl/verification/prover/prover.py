@@ -6,7 +6,6 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.prover.action_table import ActionTable, runs
@@ -15,7 +14,6 @@ from drone_rl.verification.prover.boxes import (
     all_placements,
     complement,
     merge,
-    ragged,
     resolve_forks,
     union,
     volumes,
@@ -74,7 +72,6 @@ class Prover:
         self.least_gap, self.largest_band = np.inf, 0.0
         self._most = most_combinations
         self._seen_from = -1
-        self._foreseen: set[int] = set()
         self._cells: dict[int, Cells] = {}
         self._tables: dict[tuple[int, ...], ActionTable] = {}
         self._record = np.zeros((32, 2), np.int64)
@@ -90,7 +87,10 @@ class Prover:
             self.part, self.parts = self.parts[:1], self.parts[1:]
             self.wait(LatticeState(0, 0), self.part)
         state = min(self.waiting, key=lambda p: p.turn)
-        self._foresee(state)
+        if state.ahead != self._seen_from:
+            self._seen_from = state.ahead
+            self._tables.clear()
+            self._cells.clear()
         boxes = np.concatenate(self.waiting.pop(state))
         self.boxes_under_way -= len(boxes)
         boxes = union(boxes) if state.is_fork else merge(boxes)
@@ -174,7 +174,10 @@ class Prover:
         if not cubes:
             yield table.nothing_in_sight(), boxes
             return
-        spans = self._fill(table, seen)
+        spans, num_images = table.spans(seen), table.num_images
+        table.fill(spans)
+        self.num_images += table.num_images - num_images
+        self.least_gap = min(self.least_gap, table.least_gap)
         found: dict[int, list[Boxes]] = defaultdict(list)
         for owner, ranges, bits in runs(table, spans, MAX_ROWS):
             pieces = boxes[owner]
@@ -193,67 +196,30 @@ class Prover:
         for kind, parts in found.items():
             yield kind, merge(np.concatenate(parts))
 
-    def _fill(self, table: ActionTable, boxes: Boxes) -> NDArray[np.int64]:
-        """Fill a table within boxes; return their spans."""
-        spans, before = table.spans(boxes), table.num_images
-        table.fill(spans)
-        self.num_images += table.num_images - before
-        self.least_gap = min(self.least_gap, table.least_gap)
-        return spans
-
-    def _foresee(self, state: LatticeState) -> None:
-        """Fill the table for all waiting states next to this one: one large batch is faster."""
-        if state.ahead != self._seen_from:
-            self._seen_from = state.ahead
-            for known in (self._foreseen, self._tables, self._cells):
-                known.clear()
-        if state.collected in self._foreseen or not (cubes := self.lattice.standing(state)):
-            return
-        self._foreseen.add(state.collected)
-        beside = [
-            np.concatenate(boxes)[:, cubes] - self.lattice.y(p)
-            for p, boxes in self.waiting.items()
-            if (p.ahead, p.collected, p.came) == (state.ahead, state.collected, AHEAD)
-        ]
-        if len(beside) > 1:
-            boxes = merge(np.unique(np.concatenate(beside), axis=0))
-            if self._fits(self._all_cells(state, cubes, boxes)):
-                self._fill(self._table(state, cubes, boxes), boxes)
-
     def _table(self, state: LatticeState, cubes: list[int], boxes: Boxes) -> ActionTable:
         """Return the table at the state's x, as far to the sides as the boxes reach."""
-        cells = self._all_cells(state, cubes, boxes)
-        if not self._fits(cells):  # other states would profit little from a larger table
-            cells = [c.between(*end) for c, end in zip(cells, _hull(boxes), strict=True)]
-        known = self._tables.get(tuple(cubes))
-        if known is None or known.cells != cells:
-            known = ActionTable(self.spec.bounds, self.spec.compositor, cells, self._record)
-            self._tables[tuple(cubes)] = known
-        return known
-
-    def _fits(self, cells: list[Cells]) -> bool:
-        return math.prod(len(c.images) for c in cells) <= self._most
-
-    def _all_cells(self, state: LatticeState, cubes: list[int], boxes: Boxes) -> list[Cells]:
-        return [self._cells_of(state, k, *end) for k, end in zip(cubes, _hull(boxes), strict=True)]
+        ends = np.stack([boxes[..., 0].min(0), boxes[..., 1].max(0)], -1)
+        cells = [self._cells_of(state, k, *end) for k, end in zip(cubes, ends, strict=True)]
+        if math.prod(len(c.images) for c in cells) > self._most:
+            # other states would profit little from a larger table
+            cells = [c.between(*end) for c, end in zip(cells, ends, strict=True)]
+        table = self._tables.get(tuple(cubes))
+        if table is None or table.cells != cells:
+            table = ActionTable(self.spec.bounds, self.spec.compositor, cells, self._record)
+            self._tables[tuple(cubes)] = table
+        return table
 
     def _cells_of(self, state: LatticeState, cube: int, lowest: float, highest: float) -> Cells:
         """Return the cells of one cube, at least from the lowest to the highest position."""
-        known = self._cells.get(cube)
-        if known is not None and known.limits[0] <= lowest and highest <= known.limits[-1]:
-            return known
-        if known is not None:
-            lowest, highest = min(lowest, known.limits[0]), max(highest, known.limits[-1])
-        found = self.spec.cells(cube, state.ahead, lowest - MARGIN, highest + MARGIN)
-        bands = np.diff(found.limits)[1::2]
+        if (cells := self._cells.get(cube)) is not None:
+            if cells.limits[0] <= lowest and highest <= cells.limits[-1]:
+                return cells
+            lowest, highest = min(lowest, cells.limits[0]), max(highest, cells.limits[-1])
+        cells = self.spec.cells(cube, state.ahead, lowest - MARGIN, highest + MARGIN)
+        bands = np.diff(cells.limits)[1::2]
         self.largest_band = max(self.largest_band, float(bands.max(initial=0.0)))
-        self._cells[cube] = found
-        return found
-
-
-def _hull(boxes: Boxes) -> NDArray[np.float64]:
-    """Return the lowest and highest end of each cube's intervals. Shape: (cubes, 2)."""
-    return np.stack([boxes[..., 0].min(0), boxes[..., 1].max(0)], -1)
+        self._cells[cube] = cells
+        return cells
 
 
 def ended(known: Ended, none: Boxes) -> ProofFindings:
@@ -266,7 +232,7 @@ def ended(known: Ended, none: Boxes) -> ProofFindings:
 
 
 def so_far(known: Ended, part: Boxes) -> ProofFindings:
-    """Return the largest boxes of each ending of a part in progress; the rest counts as undecided.
+    """Return the largest boxes of a part in progress; the rest counts as undecided.
 
     Many cubes give millions of boxes, which nobody could check one by one.
     """
@@ -274,11 +240,7 @@ def so_far(known: Ended, part: Boxes) -> ProofFindings:
         return ProofFindings({}, part, {})
     each = [np.concatenate(parts) for parts in known.values()]
     boxes, owner = np.concatenate(each), np.repeat(range(len(each)), [len(b) for b in each])
-    kinds = list(dict.fromkeys(ending for ending, _ in known))
-    kind = np.array([kinds.index(ending) for ending, _ in known])[owner]
-    order = np.lexsort((-volumes(boxes), kind))
-    rank = ragged(np.bincount(kind))[1]
-    largest = order[np.argsort(rank, kind="stable")][:MAX_STATED]
+    largest = np.argsort(-volumes(boxes), kind="stable")[:MAX_STATED]
     while (left := complement(boxes[largest], part)) is None:
         largest = largest[: len(largest) // 2]
     stated = {key: [boxes[largest[owner[largest] == i]]] for i, key in enumerate(known)}

@@ -152,19 +152,6 @@ def test_original_is_algorithm_4(settings):
     assert made.trainer.total_episodes == 30_000
 
 
-@pytest.mark.parametrize("objective", ["a2c", "ppo"])
-def test_an_objective_brings_what_it_needs_unless_that_is_given(objective, settings, config):
-    brought = settings("train", f"objective={objective}")
-    in_python = TrainSettings().replace(objective=brought.objective)
-    assert brought.as_base(TrainSettings) == in_python
-    for name, part in brought.objective.needs.items():
-        assert getattr(brought, name) == part
-    made = settings("train", "returns.lmbda=0.5", f"objective={objective}", "collector.num_envs=8")
-    assert (made.returns.lmbda, made.collector.num_envs) == (0.5, 8)
-    composed = config("train", [f"objective={objective}", "collector=episodes"])
-    assert composed.collector._target_ == "episodes"
-
-
 def test_a_pipeline_keeps_its_order(settings):
     names = [step.name for step in settings("train", "transforms=original").transforms]
     assert names == ["gray", "standardize", "crop"]

@@ -1,5 +1,6 @@
 """The report in a real browser, headless: what a person would do with it."""
 
+import importlib.resources
 import json
 
 import pytest
@@ -70,6 +71,21 @@ def test_it_fits_a_phone(browser):
     wide = browser.execute_script("return document.documentElement.scrollWidth - innerWidth")
     browser.set_window_size(1200, 900)
     assert wide <= 0
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_it_is_accessible(browser, scheme):
+    package = pytest.importorskip("axe_core_python")
+    source = importlib.resources.files(package).joinpath("axe.min.js").read_text(encoding="utf-8")
+    feature = {"name": "prefers-color-scheme", "value": scheme}
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [feature]})
+    browser.set_script_timeout(120)
+    browser.execute_script(source)
+    violations = browser.execute_async_script(
+        """document.querySelectorAll("details").forEach(d => { d.open = true; });
+        axe.run().then(result => arguments[arguments.length - 1](result.violations));"""
+    )
+    assert [v["id"] for v in violations if v["impact"] in ("serious", "critical")] == []
 
 
 def test_no_error_and_no_request(browser):

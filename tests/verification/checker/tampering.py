@@ -4,7 +4,7 @@ import copy
 import json
 
 import drone_rl
-from drone_rl.verification.checker.certificate import fingerprint
+from drone_rl.policies.zoo import fingerprint
 
 
 def _largest(data):

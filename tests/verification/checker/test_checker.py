@@ -1,16 +1,25 @@
+"""Episodes simulated by the checker: equal to an evaluation, refute false statements."""
+
+import itertools
+
 import numpy as np
 import pytest
+import torch
 
 import drone_rl
+from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import silent
+from drone_rl.verification.check import check
 from drone_rl.verification.checker.certificate import Outcome, parse_certificate
 from drone_rl.verification.checker.checker import (
-    CheckFindings,
-    Contradiction,
-    Rollouts,
+    EpisodeEnds,
+    Simulator,
     check_certificate,
     ends_as_stated,
 )
+from tests.verification.checker.tampering import BYTES, CHANGES, tampered
 
 
 def findings(data, **settings):
@@ -27,24 +36,19 @@ def test_true_certificates_are_accepted(one_sided, two_halves):
     assert found.flights["border"] == 0
 
 
-def test_a_lie_that_only_flights_tell_is_refused_with_the_placement(one_sided):
+def test_a_wrong_outcome_is_contradicted_by_episodes(one_sided):
     won, lost = one_sided["outcomes"]
     won["boxes"], lost["boxes"] = lost["boxes"], won["boxes"]
     won["share"], lost["share"] = lost["share"], won["share"]
     won["steps"], lost["steps"] = lost["steps"], won["steps"]
     found = findings(one_sided)
     assert not found.accepted and found.contradicted == sum(found.flights.values())
-    first = found.contradictions[0]
-    assert first.stated == "all_cubes, cubes collected: 1"
-    assert first.found.startswith("front_boundary, cubes collected: none, steps: 2")
-    assert 1.65 < first.placement[0] < 6
-    assert len(found.lines()) == 21
-    told = found.as_dict()
-    assert told["contradictions"][0]["placement"] == first.placement
-    assert (told["accepted"], told["contradicted"]) == (False, found.contradicted)
+    assert 1.65 < found.contradictions[0].placement[0] < 6
+    assert len(found.contradictions) == 20 and len(found.lines()) == 21
+    assert found.as_dict()["contradicted"] == found.contradicted
 
 
-def test_a_border_in_the_wrong_place_is_found(one_sided):
+def test_a_shifted_border_is_found(one_sided):
     """Off by a twentieth of a millimetre: no flight anywhere is likely to tell."""
     won, lost = one_sided["outcomes"]
     for part, end in (
@@ -65,14 +69,14 @@ def test_a_border_in_the_wrong_place_is_found(one_sided):
     assert found.contradictions[0].placement[0] == pytest.approx(1.65004, abs=1e-5)
 
 
-def test_what_does_not_go_together_is_not_flown(one_sided):
+def test_an_inconsistent_certificate_is_not_simulated(one_sided):
     one_sided["outcomes"][0]["share"] = 0.5
     found = findings(one_sided)
     assert (found.accepted, found.flights, found.contradicted) == (False, {}, 0)
     assert "has a share of 0.5" in found.lines()[0]
 
 
-def test_an_answer_of_nothing_is_true(one_sided):
+def test_a_certificate_without_statements_is_accepted(one_sided):
     one_sided |= {"outcomes": [], "undecided": {"share": 1.0, "boxes": [[[-6.0, 6.0]]]}}
     found = findings(one_sided)
     assert found.accepted and sum(found.flights.values()) == 0
@@ -90,28 +94,98 @@ LIMIT = EndReason.STEP_LIMIT
         (LIMIT, False, 200, False, {300: 0.5}, False),  # does
         (LIMIT, False, 2, False, {300: 0.5}, True),  # began with the end
         (LIMIT, True, 200, True, {300: 0.5}, False),
+        (EndReason.FRONT_BOUNDARY, False, 200, True, {300: 0.5}, False),
         (EndReason.SIDE_BOUNDARY, False, 0, True, {300: 0.5}, False),
         (LIMIT, False, 200, True, {299: 0.5}, False),
         (LIMIT, False, 200, True, {299: 0.4}, True),  # of the others the steps are not certain
     ],
 )
-def test_ends_by_hand(end, collected, repeats, loops, steps, right):
+def test_ends_as_stated(end, collected, repeats, loops, steps, right):
     stated = Outcome(LIMIT, (False,), loops, 0.5, steps, np.zeros((0, 1, 2)))
-    flown = Rollouts(*map(np.array, ([int(end)], [[collected]], [300], [repeats])))
+    flown = EpisodeEnds(*map(np.array, ([int(end)], [[collected]], [300], [repeats])))
     assert ends_as_stated(stated, flown, 0) is right
 
 
-@pytest.mark.parametrize("stated", [EndReason.FRONT_BOUNDARY, EndReason.SIDE_BOUNDARY])
-@pytest.mark.parametrize("ended", [EndReason.FRONT_BOUNDARY, EndReason.SIDE_BOUNDARY, LIMIT])
-def test_another_end_is_not_as_stated(stated, ended):
-    outcome = Outcome(stated, (False,), False, 0.5, {30: 0.5}, np.zeros((0, 1, 2)))
-    flown = Rollouts(*map(np.array, ([int(ended)], [[False]], [30], [0])))
-    assert ends_as_stated(outcome, flown, 0) is (stated == ended)
+@pytest.fixture
+def make():
+    made = []
+
+    def simulator(name="good", **task):
+        policy = drone_rl.load_policy(name).in_task(**task)
+        made.append(Simulator(policy.description, policy.state["policy"]))
+        return made[-1]
+
+    yield simulator
+    for one in made:
+        one.close()
 
 
-def test_many_contradictions_take_few_lines():
-    one = Contradiction("inside", (1.0, 2.0), "a", "b")
-    found = CheckFindings(("lie",), (one,) * 30, 5000, {"inside": 9000})
-    assert len(found.lines()) == 22
-    assert str(one) in found.lines()[1] and "y=[1.0, 2.0]" in str(one)
-    assert found.lines()[-1] == "and 4980 flights more ended otherwise than stated"
+def test_simulator_matches_evaluation(make):
+    policy = drone_rl.load_policy("right_and_forward")
+    with policy.flying(20) as (env, actor):
+        episodes = run_episodes(env, actor, 20)
+    lateral = episodes.goals.world.reshape(20, 3, 3)[..., 1].double().numpy()
+    flown = make("right_and_forward").fly(lateral)
+    assert flown.end.tolist() == episodes.end_reason.tolist()
+    assert flown.steps.tolist() == episodes.length.tolist()
+    assert flown.collected.tolist() == episodes.goals.reached.tolist()
+
+
+def test_touch_distance(make):
+    flown = make("right_and_forward", num_cubes=1).fly(np.array([[1.64], [1.66]]))
+    assert flown.end.tolist() == [EndReason.ALL_CUBES, EndReason.FRONT_BOUNDARY]
+    assert flown.collected.tolist() == [[True], [False]]
+
+
+class Scripted(torch.nn.Module):
+    """Take the same actions in all environments."""
+
+    def __init__(self, actions):
+        super().__init__()
+        self.actions = iter(actions)
+
+    def forward(self, pixels):
+        logits = torch.zeros(len(pixels), 3)
+        logits[:, next(self.actions)] = 1.0
+        return logits
+
+
+@pytest.mark.parametrize(
+    ("actions", "end", "steps", "repeats"),
+    [
+        (itertools.cycle([1, 2]), EndReason.STEP_LIMIT, 40, 39),
+        (itertools.chain([1, 2] * 3, itertools.repeat(0)), EndReason.ALL_CUBES, 20, 0),
+    ],
+    ids=["oscillates", "moves on"],
+)
+def test_repeats_are_counted_until_the_drone_moves_on(make, actions, end, steps, repeats):
+    simulator = make(num_cubes=1, step_limit=40)
+    simulator._network = Scripted(actions)
+    flown = simulator.fly(np.zeros((2, 1)))
+    assert flown.end.tolist() == [end] * 2
+    assert flown.steps.tolist() == [steps] * 2
+    assert flown.repeats.tolist() == [repeats] * 2
+
+
+def test_episodes_are_simulated_in_batches(make):
+    simulator = make(num_cubes=1)
+    simulator.batch_size = 2
+    assert simulator.fly(np.array([[-5.9], [0.0], [5.9], [0.1], [2.0]])).steps.tolist() == [
+        *(19, 14, 19, 14, 15)
+    ]
+
+
+def is_accepted(path):
+    try:
+        return check(path, flights=400, seed=0, progress=silent).accepted
+    except InputError:
+        return False
+
+
+@pytest.mark.parametrize("name", [*BYTES, *CHANGES])
+def test_a_tampered_certificate_is_rejected(one_sided, write, name):
+    assert not is_accepted(write(tampered(one_sided)[name]))
+
+
+def test_the_certificate_itself_is_accepted(one_sided, write):
+    assert is_accepted(write(one_sided))

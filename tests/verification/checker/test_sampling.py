@@ -1,16 +1,26 @@
+"""Placements that the checker simulates: inside boxes, at borders, anywhere."""
+
+import dataclasses
+
 import numpy as np
 import pytest
 
 from drone_rl.verification.checker.sampling import (
+    ANYWHERE,
+    BORDER,
     BORDER_OFFSET,
     CORNER_INSET,
+    INSIDE,
     find,
     sample_anywhere,
     sample_borders,
     sample_inside,
+    sample_placements,
 )
 
 LEFT, RIGHT = [[0.0, 2.0], [-1.0, 1.0]], [[2.0, 2.5], [-1.0, 1.0]]
+
+
 BOXES = np.array([LEFT, RIGHT])
 
 
@@ -19,7 +29,7 @@ def rng():
     return np.random.default_rng(0)
 
 
-def test_centres_then_corners_then_any(rng):
+def test_sample_inside(rng):
     points = sample_inside(BOXES, 20, rng)
     assert points.shape == (20, 2)
     assert points[:2].tolist() == [[1.0, 0.0], [2.25, 0.0]]  # the largest, then the thinnest
@@ -34,7 +44,7 @@ def test_centres_then_corners_then_any(rng):
     assert held.all(2).any(0).all()
 
 
-def test_of_many_boxes_the_largest_and_the_thinnest_are_there(rng):
+def test_largest_and_thinnest_boxes_come_first(rng):
     low = np.arange(300.0)
     width = np.where(low == 123, 1e-12, np.where(low == 45, 0.9, 0.5))
     boxes = np.stack([low, low + width], 1)[:, None]
@@ -44,19 +54,13 @@ def test_of_many_boxes_the_largest_and_the_thinnest_are_there(rng):
     assert len(sample_inside(boxes, 0, rng)) == 0
 
 
-def test_corners_of_thin_boxes_stay_in_them(rng):
-    thin = np.array([[[1.0, 1.0 + 1e-10]]])
-    points = sample_inside(thin, 9, rng)
-    assert (points > 1.0).all() and (points < 1 + 1e-10).all()
-
-
-def test_anywhere_is_uniform(rng):
+def test_sample_anywhere_is_uniform(rng):
     points, chosen = sample_anywhere(BOXES, 4000, rng)
     assert (chosen == 0).mean() == pytest.approx(0.8, abs=0.03)
     assert points.mean(0) == pytest.approx([1.25, 0.0], abs=0.06)
 
 
-def test_borders_are_met_on_both_sides(rng):
+def test_sample_borders_on_both_sides(rng):
     won, lost = np.array([[[-1.0, 0.0], [-1.0, 1.0]]]), np.array([[[0.0, 1.0], [-1.0, 1.0]]])
     points = sample_borders([won, lost], 1.0, 60, rng)
     assert len(points) == 60
@@ -66,7 +70,7 @@ def test_borders_are_met_on_both_sides(rng):
     assert len(sample_borders([np.concatenate([won, lost])], 1.0, 60, rng)) == 0  # all of one group
 
 
-def test_a_gap_of_less_than_the_distance_is_leapt(rng):
+def test_sample_borders_across_a_thin_gap(rng):
     won, lost = np.array([[[-1.0, -1e-5]]]), np.array([[[1e-5, 1.0]]])
     gap = np.array([[[-1e-5, 1e-5]]])
     points = sample_borders([won, lost, gap], 1.0, 100, rng)
@@ -74,8 +78,34 @@ def test_a_gap_of_less_than_the_distance_is_leapt(rng):
     assert 2 <= len(points) <= 8  # of one cube there are few
 
 
-def test_boxes_of_points():
+def test_find():
     points = np.array([[2.2, 0.5], [0.5, 0.5], [2.0, 1.0]])
     assert find(BOXES, points).tolist() == [1, 0, 0]
     with pytest.raises(ValueError, match="no box holds"):
         find(BOXES, np.array([[3.0, 0.0]]))
+
+
+def test_sample_placements(parsed):
+    placements = sample_placements(parsed, 400, np.random.default_rng(0))
+    assert placements.points.shape == (400, 1)
+    border = 1.65
+    assert (placements.outcome[placements.points[:, 0] < border - 2e-5] == 0).all()
+    assert (placements.outcome[placements.points[:, 0] > border + 2e-5] == 1).all()
+    count = {why: int((placements.why == why).sum()) for why in (INSIDE, BORDER, ANYWHERE)}
+    assert count[INSIDE] == 32  # a box of one cube needs no more than 4 times 4
+    assert 2 <= count[BORDER] <= 12
+    near = placements.points[placements.why == BORDER, 0]
+    assert np.abs(near - border).max() < 2e-4
+
+
+def test_sample_placements_by_seed(parsed):
+    one, other, third = (sample_placements(parsed, 50, np.random.default_rng(s)) for s in (1, 1, 2))
+    assert (one.points == other.points).all() and not (one.points == third.points).all()
+
+
+def test_sample_placements_without_outcomes(parsed):
+    whole = np.array([[[-6.0, 6.0]]])
+    nothing = dataclasses.replace(parsed, outcomes=(), undecided=whole)
+    placements = sample_placements(nothing, 10, np.random.default_rng(0))
+    assert placements.outcome.tolist() == [0] * 10
+    assert set(placements.why) == {ANYWHERE}

@@ -1,4 +1,4 @@
-"""Cells that can be counted and measured by hand."""
+"""Arrangements that can be counted and measured by hand."""
 
 import numpy as np
 import pytest
@@ -22,19 +22,13 @@ def cut(*lines, upright=(), window=SQUARE, most=1000):
 EVERYWHERE = (-np.inf, np.inf)
 
 
-def test_nothing_cuts_nothing():
-    found = cut()
-    assert found.areas().tolist() == [16.0]
-    assert found.inner_points().tolist() == [[2.0, 0.0]]
-
-
 def test_a_cross_of_lines_through_one_point():
     found = cut((0, 0, *EVERYWHERE), (1, -2, *EVERYWHERE), (-1, 2, *EVERYWHERE))
     assert found.num_cells == 6
     assert sorted(found.areas()) == [2, 2, 2, 2, 4, 4]
 
 
-def test_clipping_leaves_what_is_inside():
+def test_clipping():
     found = pieces(
         (1, 0, *EVERYWHERE), (1, 9, *EVERYWHERE), (0, 2, 1, 3), (0, 1, 1, 9), (-2, 0, 3, 9),
         upright=[(0, -1, 1), (3, -9, 0), (3, 2, 5), (5, -1, 1)],
@@ -45,7 +39,7 @@ def test_clipping_leaves_what_is_inside():
     assert found.upright.tolist() == [[3, -2, 0]]
 
 
-def test_a_dented_cell_has_an_inner_point_inside():
+def test_inner_point_of_a_concave_cell():
     """A level piece with an upright one at its end: three quarters of the square are one cell."""
     found = cut((0, 0, 0, 2), upright=[(2, 0, 2)])
     assert sorted(found.areas()) == [4, 12]
@@ -57,7 +51,7 @@ def test_a_dented_cell_has_an_inner_point_inside():
     assert not (x < 2 and y > 0)
 
 
-def test_a_dent_with_a_corner_in_the_way():
+def test_inner_point_of_a_notched_cell():
     """A notch that reaches into the triangle at the cell's first corner."""
     found = cut((0, -1.9, 0.05, 4), (0, -1.8, 0.05, 4), upright=[(0.05, -1.9, -1.8)])
     points = found.inner_points()
@@ -65,7 +59,7 @@ def test_a_dent_with_a_corner_in_the_way():
     assert sorted(found.areas()) == pytest.approx([3.95 * 0.1, 16 - 3.95 * 0.1])
 
 
-def test_what_is_above_a_line():
+def test_areas_above_a_line():
     found = cut((1, -2, *EVERYWHERE))  # two triangles of 8
     upper, lower = found.locate(np.array([[1.0, 1.0], [3.0, -1.0]]))
     assert found.areas()[[upper, lower]].tolist() == [8, 8]
@@ -75,46 +69,36 @@ def test_what_is_above_a_line():
     assert found.areas(above=5.0).tolist() == [0, 0]
 
 
-def test_small_cells_are_measured_well():
+def test_area_of_a_small_cell():
     found = cut((0, 1, *EVERYWHERE), (0, 1 + 2.0**-26, *EVERYWHERE))
     assert found.areas().min() == pytest.approx(2.0**-24, rel=1e-9)
 
 
-def test_pieces_as_near_as_rounding_are_no_cells_of_their_own():
+def test_nearly_equal_points_are_merged():
     third = 1 / 3
     lines = [(s, -s * third - 1, *EVERYWHERE) for s in (-3, -1, 0.7, 2)]  # all through one point
     assert cut(*lines).num_cells == 8
 
 
-def test_outlines_go_around_what_is_alike_and_skip_straight_corners():
+def test_outlines_skip_straight_corners():
     found = cut((0, 0, *EVERYWHERE), (0, 1, *EVERYWHERE), upright=[(2, -2, 2)])
     points = found.inner_points()
-    ways = found.outlines((points[:, 1] > 0).astype(int))
-    assert sorted(label for label, _ in ways) == [0, 1]
-    upper = next(way for label, way in ways if label == 1)
+    outlines = found.outlines((points[:, 1] > 0).astype(int))
+    assert sorted(label for label, _ in outlines) == [0, 1]
+    upper = next(outline for label, outline in outlines if label == 1)
     assert sorted(upper.tolist()) == [[0, 0], [0, 2], [4, 0], [4, 2]]
     x, y = upper.T
     assert (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2 == 8  # it lies to the left
 
 
-def test_a_hole_has_a_way_of_its_own():
-    found = cut(
-        (0, -1, *EVERYWHERE), (0, 1, *EVERYWHERE), upright=[(1, -2, 2), (3, -2, 2)]
-    )  # nine cells
-    assert found.num_cells == 9
-    middle = found.locate(np.array([[2.0, 0.0]]))[0]
-    ways = found.outlines((np.arange(9) == middle).astype(int))
-    assert sorted((label, len(way)) for label, way in ways) == [(0, 4), (0, 4), (1, 4)]
-
-
-def test_too_many_cells():
+def test_too_many_cells_are_refused():
     lines = [(0, y, *EVERYWHERE) for y in np.linspace(-1.9, 1.9, 30)]
     lines += [(1, y, *EVERYWHERE) for y in np.linspace(-5, 1, 30)]
     with pytest.raises(InputError, match=r"more than 20 cells .*most_cells"):
         cut(*lines, most=20)
 
 
-def test_pieces_that_hang_in_the_air_are_noticed():
+def test_unconnected_segments_are_an_error():
     loop = [(0, -1, 1, 3), (0, 1, 1, 3)]
     with pytest.raises(ArithmeticError, match="do not fill"):
         cut(*loop, upright=[(1, -1, 1), (3, -1, 1)])

@@ -1,57 +1,53 @@
-"""Interval bounds by hand, and against every image that they are about."""
+"""Bounds on images and logits: by hand, and compared with every image in the range."""
 
 import itertools
+from collections import OrderedDict
 
+import numpy as np
 import pytest
 import torch
 from torch import nn
 
-from drone_rl.policies import OriginalCNN, SmallCNN
+from drone_rl.policies import OriginalCNN, PolicyNetwork, SmallCNN
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.prover.bounds import NetworkBounds, _step
-
-
-class Linear(nn.Module):
-    """Logits of an image of two pixels."""
-
-    def __init__(self, weight, bias, *before):
-        super().__init__()
-        last = nn.Linear(2, len(weight))
-        with torch.no_grad():
-            last.weight.copy_(torch.tensor(weight))
-            last.bias.copy_(torch.tensor(bias))
-        self.layers = nn.Sequential(*before, nn.Flatten(), last)
-
-    def forward(self, images):
-        return self.layers(images)
+from drone_rl.verification.prover.bounds import (
+    Compositor,
+    ImageRanges,
+    NetworkBounds,
+    masks_of,
+)
+from drone_rl.verification.prover.cube_images import FRONT, LEFT_SIDE, NOTHING, RIGHT_SIDE
+from tests.own_networks import Mirrored
 
 
 def images(*pixels):
     return torch.tensor(pixels)[:, None, None].float()
 
 
-def test_what_actions_have_in_common_cancels():
+def test_common_terms_cancel():
     """Both logits rise alike with the first pixel, so that it decides nothing."""
-    bounds = NetworkBounds(Linear([[5.0, 1.0], [5.0, 0.0]], [0.0, 0.0]), gap=0.1)
+    bounds = NetworkBounds(last_layer([[5.0, 1.0], [5.0, 0.0]], [0.0, 0.0]), gap=0.1)
     assert bounds.possible(images([-9, 0.2]), images([9, 1])).tolist() == [0b01]
     assert bounds.possible(images([-9, -1]), images([9, -0.2])).tolist() == [0b10]
     assert bounds.possible(images([-9, 0.05]), images([9, 1])).tolist() == [0b11]
 
 
-def test_known_pictures_and_their_gap():
-    bounds = NetworkBounds(Linear([[1.0, 0.0], [0.0, 1.0]], [0.0, 0.0]), gap=0.5)
+def test_decide_and_gap():
+    bounds = NetworkBounds(last_layer([[1.0, 0.0], [0.0, 1.0]], [0.0, 0.0]), gap=0.5)
     bits, gaps = bounds.decide(images([3, 1], [1, 1.2], [0, 2]))
     assert bits.tolist() == [0b01, 0b11, 0b10]
     assert gaps.tolist() == pytest.approx([2.0, 0.2, 2.0])
 
 
-def test_a_third_action_is_left_out_where_another_beats_it():
-    bounds = NetworkBounds(Linear([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]], [0.0, 0.0, -5.0]), gap=0.0)
+def test_a_third_action_is_excluded():
+    bounds = NetworkBounds(
+        last_layer([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]], [0.0, 0.0, -5.0]), gap=0.0
+    )
     assert bounds.possible(images([0.0, 0.0]), images([1.0, 1.0])).tolist() == [0b011]
 
 
 @pytest.mark.parametrize(("make", "doubt"), [(SmallCNN, 0.05), (OriginalCNN, 1e-3)])
-def test_bounds_hold_for_all_that_they_are_about(make, doubt):
+def test_bounds_hold_for_all_images_in_range(make, doubt):
     """Two pixels in doubt and all mixtures of them: no action is taken that bounds excluded."""
     generator = torch.Generator().manual_seed(0)
     network = make((1, 25, 64), 3, generator=generator).eval()
@@ -59,7 +55,7 @@ def test_bounds_hold_for_all_that_they_are_about(make, doubt):
         network.layers[-1].weight.mul_(100)
         network.layers[-1].bias.copy_(torch.tensor([-1000.0, 0.0, 1000.0]))  # beyond rounding
     bounds = NetworkBounds(network, gap=1e-4)
-    lower = torch.rand(40, 1, 25, 64, generator=generator)
+    lower = torch.rand(12, 1, 25, 64, generator=generator)
     upper = lower.clone()
     upper[:, 0, 10, 30] += doubt
     upper[:, 0, 12, 31] += doubt
@@ -74,56 +70,117 @@ def test_bounds_hold_for_all_that_they_are_about(make, doubt):
         assert ((bits & ~possible) == 0).all()
 
 
-def test_without_doubt_bounds_decide_like_the_network():
-    generator = torch.Generator().manual_seed(1)
-    network = SmallCNN((1, 25, 64), 3, generator=generator).eval()
-    with torch.no_grad():
-        network.layers[-1].weight.mul_(100)
-        network.layers[-1].bias.copy_(torch.tensor([-1000.0, 0.0, 1000.0]))  # beyond rounding
-    seen = torch.rand(50, 1, 25, 64, generator=generator)
-    bounds = NetworkBounds(network, gap=1e-4)
-    assert bounds.possible(seen.clone(), seen.clone()).tolist() == bounds.decide(seen)[0].tolist()
-    assert bounds.decide(seen)[0].tolist() == (1 << network(seen).argmax(-1)).tolist()
-
-
-def test_flattening_rounds_nothing():
-    total, width = torch.tensor([[[2.0**24, 5.0]]]), torch.tensor([[[1.0, 2.0]]])
-    step = _step(nn.Flatten(), 2)
-    assert [v.tolist() for v in step(total, width)] == [[[2.0**24, 5.0]], [[1.0, 2.0]]]
-
-
-def test_other_layers_are_refused():
-    with pytest.raises(InputError, match="do not support the network's layer Tanh"):
-        NetworkBounds(Linear([[1.0, 0.0]], [0.0], nn.Tanh()), gap=0.0)
-    network = Linear([[1.0, 0.0]], [0.0])
-    network.layers.append(nn.ReLU())
-    with pytest.raises(InputError, match="last layer is not linear"):
-        NetworkBounds(network, gap=0.0)
-
-
-def test_probabilities_of_drawn_actions_by_hand():
+def test_probabilities_of_sampled_actions():
     """Logits 0 and x with x from 1 to 2: the second is drawn with 1 / (1 + exp(-x))."""
-    bounds = NetworkBounds(Linear([[0.0, 0.0], [1.0, 0.0]], [0.0, 0.0]), gap=0.0)
+    bounds = NetworkBounds(last_layer([[0.0, 0.0], [1.0, 0.0]], [0.0, 0.0]), gap=0.0)
     least, most = bounds.probabilities(images([1.0, 0.0]), images([2.0, 0.0]))
     one, two = (1 / (1 + torch.tensor([-1.0, -2.0]).double().exp())).tolist()
     assert least[0].tolist() == pytest.approx([1 - two, one], rel=1e-5)
     assert most[0].tolist() == pytest.approx([1 - one, two], rel=1e-5)
-    wider, _ = NetworkBounds(Linear([[0.0, 0.0], [1.0, 0.0]], [0.0, 0.0]), gap=0.5).probabilities(
-        images([1.0, 0.0]), images([2.0, 0.0])
-    )
+    wider, _ = NetworkBounds(
+        last_layer([[0.0, 0.0], [1.0, 0.0]], [0.0, 0.0]), gap=0.5
+    ).probabilities(images([1.0, 0.0]), images([2.0, 0.0]))
     assert float(wider[0, 1]) == pytest.approx(1 / (1 + float(torch.tensor(-0.5).exp())))
 
 
-def test_an_action_that_an_order_of_summation_decides_is_left_open():
+def test_actions_decided_by_summation_order_stay_possible():
     """The hidden unit is 2^24 + 1 - 2^24: 1 in exact arithmetic, 0 in some orders."""
     hidden = nn.Linear(2, 2)
     with torch.no_grad():
         hidden.weight.copy_(torch.tensor([[2.0**24, -(2.0**24)], [0.0, 0.0]]))
         hidden.bias.copy_(torch.tensor([1.0, 0.0]))
-    network = Linear([[1.0, 0.0], [0.0, 0.0]], [0.0, 0.5], nn.Flatten(), hidden, nn.ReLU())
+    network = last_layer([[1.0, 0.0], [0.0, 0.0]], [0.0, 0.5], nn.Flatten(), hidden, nn.ReLU())
     bounds = NetworkBounds(network, gap=0.0)
     seen = images([1.0, 1.0])
     assert bounds.decide(seen)[0].tolist() == [0b11]
     assert bounds.possible(seen.clone(), seen.clone()).tolist() == [0b11]
-    plain = Linear([[1.0, 0.0], [0.0, 0.0]], [0.0, 0.5])
+    plain = last_layer([[1.0, 0.0], [0.0, 0.0]], [0.0, 0.5])
     assert NetworkBounds(plain, gap=0.0).decide(seen)[0].tolist() == [0b01]
+
+
+COMPOSITOR = Compositor(torch.tensor([[0.5, 0.9]]), torch.tensor([0.3, 0.1, 0.7]), nn.Identity())
+
+
+ALL = (slice(0, 1), slice(0, 2))
+
+
+def mask(*pixels):
+    """One case; what each pixel may show."""
+    bits = [sum(1 << face for face in faces) for faces in pixels]
+    return torch.tensor([[bits]], dtype=torch.uint8)
+
+
+def paint(*cubes):
+    case = torch.tensor([0])
+    lower, upper = COMPOSITOR.paint([(ALL, cube, case) for cube in cubes], len(case))
+    return lower[0, 0].tolist(), upper[0, 0].tolist()
+
+
+def close(found, lower, upper):
+    assert torch.allclose(torch.tensor(found[0]), torch.tensor(lower))
+    assert torch.allclose(torch.tensor(found[1]), torch.tensor(upper))
+
+
+def test_uncertain_faces():
+    close(paint(mask([NOTHING, FRONT], [LEFT_SIDE, RIGHT_SIDE])), [0.3, 0.1], [0.5, 0.7])
+
+
+def test_the_nearer_cube_occludes_the_farther_one():
+    near, far = mask([FRONT], [NOTHING, FRONT]), mask([LEFT_SIDE], [LEFT_SIDE])
+    close(paint(near, far), [0.3, 0.1], [0.3, 0.3])
+
+
+def test_bounds_equal_extremes_of_all_images():
+    """Every mixture of what two cubes may show, painted one by one."""
+    choices = [[NOTHING], [FRONT], [NOTHING, LEFT_SIDE], [FRONT, RIGHT_SIDE], [0, 1, 2, 3]]
+    for near, far in itertools.product(choices, repeat=2):
+        seen = []
+        for one, other in itertools.product(near, far):
+            faces = [torch.tensor([[[f, f]]], dtype=torch.uint8) for f in (one, other)]
+            seen.append(torch.tensor(paint(*map(masks_of, faces))[0]))
+        lower, upper = paint(mask(near, near), mask(far, far))
+        close(
+            (lower, upper),
+            torch.stack(seen).min(0).values.tolist(),
+            torch.stack(seen).max(0).values.tolist(),
+        )
+
+
+def test_masks_of_ranges_by_hand():
+    images = torch.tensor([[[0, 1]], [[2, 1]], [[0, 0]]], dtype=torch.uint8)
+    ranges = ImageRanges(images)
+    masks, case = ranges.of(np.array([[0, 0], [0, 2], [1, 2], [0, 2]]))
+    found = masks[case][:, 0].tolist()
+    assert found == [[1, 2], [5, 3], [5, 3], [5, 3]]
+    assert ranges.doubts(np.array([[0, 0], [0, 1], [0, 2]])).tolist() == [0, 1, 2]
+
+
+def test_masks_of_every_range():
+    images = torch.from_numpy(np.random.RandomState(0).randint(0, 4, (9, 2, 3)).astype(np.uint8))
+    ranges = ImageRanges(images)
+    every = np.array([(a, b) for a in range(9) for b in range(a, 9)])
+    masks, case = ranges.of(every)
+    for (a, b), mask, doubts in zip(every, masks[case], ranges.doubts(every), strict=True):
+        shown = [{*pixel} for pixel in images[a : b + 1].flatten(1).T.tolist()]
+        assert mask.flatten().tolist() == [sum(1 << face for face in faces) for faces in shown]
+        assert doubts == sum(len(faces) > 1 for faces in shown)
+
+
+def last_layer(weight, bias, *before):
+    """Return a network of two pixels that ends in this linear layer."""
+    last = nn.Linear(2, len(weight))
+    with torch.no_grad():
+        last.weight.copy_(torch.tensor(weight))
+        last.bias.copy_(torch.tensor(bias))
+    layers = {str(i): layer for i, layer in enumerate([*before, nn.Flatten()])}
+    return PolicyNetwork((1, 1, 2), OrderedDict(layers, logits=last), lambda *_: None)
+
+
+@pytest.mark.parametrize(
+    "network",
+    [Mirrored((1, 25, 64), 3), last_layer([[1.0, 0.0]], [0.0], nn.Tanh())],
+    ids=["own forward", "tanh"],
+)
+def test_unsupported_networks_are_refused(network):
+    with pytest.raises(InputError, match="proofs support only networks of"):
+        NetworkBounds(network, gap=0.0)

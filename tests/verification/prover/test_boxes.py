@@ -1,18 +1,14 @@
-"""Sets of boxes, with volumes by hand and membership by random points."""
+"""Sets of boxes and resolved forks: volumes by hand, membership by random points."""
 
 import numpy as np
 import pytest
 
 from drone_rl.verification.prover import boxes as module
 from drone_rl.verification.prover.boxes import (
-    all_placements,
-    blocks,
     carve,
     complement,
-    cut,
-    intersect,
     merge,
-    ragged,
+    resolve_forks,
     union,
     unite,
     volumes,
@@ -35,33 +31,7 @@ def random_boxes(random, count, n=3):
     return ends.astype(float)
 
 
-def test_the_whole_and_its_volume():
-    assert all_placements(6.0, 2).tolist() == [[[-6.0, 6.0], [-6.0, 6.0]]]
-    assert volumes(all_placements(6.0, 2)).tolist() == [144.0]
-
-
-def test_a_cut_goes_through_what_it_meets():
-    below, above = cut(boxes([[0, 2], [0, 1]], [[3, 4], [0, 1]]), 0, 1.0)
-    assert below.tolist() == [[[0, 1], [0, 1]]]
-    assert above.tolist() == [[[1, 2], [0, 1]], [[3, 4], [0, 1]]]
-
-
-def test_a_cut_beside_a_box_leaves_it_whole():
-    below, above = cut(boxes([[0, 2]]), 0, 2.0)
-    assert (below.tolist(), above.tolist()) == ([[[0, 2]]], [])
-
-
-def test_neighbours_become_one():
-    four = boxes([[0, 1], [0, 1]], [[1, 2], [0, 1]], [[0, 1], [1, 2]], [[1, 2], [1, 2]])
-    assert merge(four).tolist() == [[[0, 2], [0, 2]]]
-
-
-def test_boxes_that_only_touch_at_a_part_of_a_side_stay_apart():
-    two = boxes([[0, 1], [0, 1]], [[1, 2], [0, 2]])
-    assert len(merge(two)) == 2
-
-
-def test_merging_changes_no_set():
+def test_merge_keeps_the_set():
     random = np.random.default_rng(0)
     grid = boxes(*[[[i, i + 1], [j, j + 1]] for i in range(5) for j in range(5)])
     some = grid[random.random(25) < 0.6]
@@ -72,7 +42,7 @@ def test_merging_changes_no_set():
 
 
 @pytest.mark.parametrize(("cells", "most"), [(1_000_000, 1), (20, 1000), (20, 1)])
-def test_overlaps_are_united(cells, most, monkeypatch):
+def test_union(cells, most, monkeypatch):
     """In one grid, in many small ones, and not at all where there would be too many."""
     monkeypatch.setattr(module, "AT_ONCE", cells)
     random = np.random.default_rng(1)
@@ -84,7 +54,7 @@ def test_overlaps_are_united(cells, most, monkeypatch):
 
 
 @pytest.mark.parametrize("cells", [1_000_000, 20])
-def test_what_boxes_leave_of_another(cells, monkeypatch):
+def test_complement(cells, monkeypatch):
     monkeypatch.setattr(module, "AT_ONCE", cells)
     random = np.random.default_rng(3)
     some, space = random_boxes(random, 10), boxes([[0, 7], [0, 7], [0, 7]])
@@ -94,25 +64,14 @@ def test_what_boxes_leave_of_another(cells, monkeypatch):
     assert volumes(left).sum() + volumes(union(some)).sum() == pytest.approx(343.0)
 
 
-def test_what_would_take_too_long_is_left(monkeypatch):
+def test_complement_of_too_many_grids(monkeypatch):
     monkeypatch.setattr(module, "AT_ONCE", 20)
     some, space = random_boxes(np.random.default_rng(3), 10), boxes([[0, 7], [0, 7], [0, 7]])
     assert complement(some, space, most=2) is None
     assert complement(some[:0], space).tolist() == space.tolist()
 
 
-def test_united_volume_by_hand():
-    united = union(boxes([[0, 2], [0, 2]], [[1, 3], [1, 3]], [[0, 2], [0, 2]]))
-    assert volumes(united).sum() == 7.0
-    assert union(np.empty((0, 2, 2))).shape == (0, 2, 2)
-
-
-def test_intersections_are_what_both_have():
-    found = intersect(boxes([[0, 2], [0, 2]]), boxes([[1, 3], [1, 3]], [[2, 3], [0, 1]]))
-    assert found.tolist() == [[[1, 2], [1, 2]]]
-
-
-def test_carving_parts_the_inside_from_the_outside():
+def test_carve():
     random = np.random.default_rng(2)
     some = union(random_boxes(random, 10))
     hole = np.array([[1, 4], [2, 5], [0, 3]], float)
@@ -123,29 +82,63 @@ def test_carving_parts_the_inside_from_the_outside():
     assert (holds(outside, points) == holds(some, points) * (1 - in_hole)).all()
 
 
-def test_rows_of_different_lengths():
-    row, place = ragged(np.array([2, 0, 3]))
-    assert row.tolist() == [0, 0, 2, 2, 2]
-    assert place.tolist() == [0, 1, 0, 1, 2]
-
-
-def test_blocks_of_a_grid_are_its_cells_once_each():
-    mask = np.random.RandomState(0).rand(5, 4, 6) < 0.6
-    seen = np.zeros(mask.shape, int)
-    for (a, b), (c, d), (e, f) in blocks(mask):
-        seen[a:b, c:d, e:f] += 1
-    assert np.array_equal(seen, mask)
-    assert blocks(np.zeros((2, 3), bool)).shape == (0, 2, 2)
-
-
-def test_intervals_that_touch_are_united():
+def test_unite():
     intervals = np.array([[0.0, 1.0], [0.5, 0.7], [1.0, 2.0], [2.5, 4.0]])
     assert unite(intervals, 0.0).tolist() == [[0.0, 2.0], [2.5, 4.0]]
     assert unite(intervals, 0.5).tolist() == [[0.0, 4.0]]
     assert unite(intervals[:0], 0.5).shape == (0, 2)
 
 
-def test_a_wide_interval_joins_all_that_it_reaches():
+def test_unite_with_a_wide_interval():
     """In the order of their middles, the last one reaches back over the second to the first."""
     intervals = np.array([[0.0, 1.0], [1.5, 1.6], [0.5, 3.0]])
     assert unite(intervals, 0.0).tolist() == [[0.0, 3.0]]
+
+
+def line(*intervals):
+    return np.array(intervals, float).reshape(-1, 1, 2)
+
+
+def sizes(parts):
+    return {ending: float(volumes(boxes).sum()) for ending, boxes in parts.items()}
+
+
+def test_uncovered_forks_are_undecided():
+    settled, left = resolve_forks(
+        [line([0, 4])], {"won": line([0, 3]), "lost": line([3, 3.5])}, [], 1
+    )
+    assert sizes(settled) == {"won": 3.0, "lost": 0.5}
+    assert left.tolist() == [[[3.5, 4]]]
+
+
+def test_forks_without_endings_are_undecided():
+    settled, left = resolve_forks([line([0, 4])], {}, [], 1)
+    assert settled == {} and left.tolist() == [[[0, 4]]]
+    assert not len(resolve_forks([], {"won": line([0, 1])}, [], 1)[0]["won"])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_resolve_forks_at_every_point(seed):
+    """Each point is decided as its branches end, or not at all."""
+    random = np.random.default_rng(seed)
+
+    def some(count):
+        ends = np.sort(random.integers(0, 8, (count, 2, 2)), -1).astype(float)
+        ends[..., 1] += 0.5
+        return ends
+
+    forks = [np.array([[[i, i + 1], [0, 8.5]]], float) for i in range(8)]
+    endings = {"a": np.concatenate([forks[0], some(6)]), "b": some(3), "c": some(2)}
+    unknown = [some(2)]
+    settled, left = resolve_forks(forks, endings, unknown, 2)
+    points = random.random((400, 2)) * (8, 8.5)
+
+    def has(boxes, point):
+        return ((point > boxes[..., 0]) & (point < boxes[..., 1])).all(-1).sum()
+
+    for point in points:
+        ends = {name for name, boxes in endings.items() if has(boxes, point)}
+        is_sure = len(ends) == 1 and not has(unknown[0], point)
+        said = {name: int(has(boxes, point)) for name, boxes in settled.items()}
+        assert said == {name: int(is_sure and name in ends) for name in said}
+        assert has(left, point) == (not is_sure)

@@ -1,20 +1,23 @@
-"""The closed form of a cube's image, by hand for a tiny camera and against the renderer."""
+"""The closed form of a cube's image: by hand, and equal to the renderer's images."""
 
 import dataclasses
 
 import numpy as np
 import pytest
+import torch
 
 from drone_rl.config import CameraSettings, TaskSettings
+from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.cube_images import (
     FRONT,
-    LEFT_SIDE,
     NOTHING,
-    RIGHT_SIDE,
     UNIT,
     CameraModel,
-    _packed,
+    CubeImages,
+    CubeView,
 )
+from drone_rl.verification.prover.lattice import Lattice
 
 
 @pytest.fixture
@@ -30,61 +33,8 @@ def tiny():
     )
 
 
-def test_each_color_is_a_number_of_its_own():
-    colors = np.array([[1, 2, 3], [3, 2, 1], [0, 0, 255], [255, 0, 0]], np.uint8)
-    assert _packed(colors).tolist() == [0x030201, 0x010203, 0xFF0000, 0x0000FF]
-
-
-def test_slopes_of_the_default_camera():
-    camera = CameraModel.of(TaskSettings(), CameraSettings())
-    wide = np.tan(np.radians(67.5))
-    assert camera.left[0] == pytest.approx(63 / 64 * wide)
-    assert camera.left[-1] == -camera.left[0]
-    assert camera.up[12] == 0.0
-    assert camera.up[0] == pytest.approx(24 / 25 * wide * 25 / 64)
-
-
-def test_faces_by_hand(tiny):
-    """4 m ahead the front is 3 m away: a ray of slope 1 is 3 m out there, and 5 m at the back."""
-    left = np.array([1.9, 2.1, 3.9, 4.1, 5.9, 6.1])
-    middle = tiny.faces(4.0, left)[:, 1, 0]
-    assert middle.tolist() == [NOTHING, FRONT, FRONT, LEFT_SIDE, LEFT_SIDE, NOTHING]
-    mirrored = tiny.faces(4.0, -left)[:, 1, 1]
-    assert mirrored.tolist() == [NOTHING, FRONT, FRONT, RIGHT_SIDE, RIGHT_SIDE, NOTHING]
-    assert not tiny.faces(4.0, left)[:, [0, 2]].any()  # these rays are 1 m up 2 m ahead
-
-
-def test_rows_that_leave_through_the_top(tiny):
-    """2.5 m ahead the front is 1.5 m away; rays of slope 0.5 leave the cube 2 m away."""
-    left = np.array([2.4, 2.6, 2.9, 3.1, 4.4, 4.6])
-    assert tiny.faces(2.5, left)[:, 1, 0].tolist() == [1, 2, 2, 2, 2, 0]
-    assert tiny.faces(2.5, left)[:, 0, 0].tolist() == [1, 2, 2, 0, 0, 0]
-
-
-def test_beside_the_camera_only_sides_are_seen(tiny):
-    assert FRONT not in tiny.faces(0.5, np.linspace(-5, 5, 101))
-    assert tiny.faces(0.5, np.array([1.1]))[0, 1].tolist() == [LEFT_SIDE, NOTHING]
-
-
-def test_cubes_at_distances_of_their_own(tiny):
-    """Fronts are 3, 3, 1.5 and no metres away: as by hand above, all at once."""
-    ahead, left = np.array([4.0, 4.0, 2.5, 0.5]), np.array([2.1, 4.1, -2.6, 1.1])
-    shown = tiny.faces(ahead, left)
-    assert shown[:, 1].tolist() == [[FRONT, 0], [LEFT_SIDE, 0], [0, RIGHT_SIDE], [LEFT_SIDE, 0]]
-    alone = [tiny.faces(float(a), y[None])[0] for a, y in zip(ahead, left, strict=True)]
-    np.testing.assert_array_equal(shown, alone)
-
-
-def test_borders_are_where_faces_change(tiny):
-    """Of 4 m: 2, 4 and 6 to either side, for only the middle row shows anything."""
-    places, errors = tiny.borders(4.0)
-    assert np.unique(places).tolist() == [-6.0, -4.0, -2.0, 2.0, 4.0, 6.0]
-    assert (errors > 0).all() and errors.max() < 1e-4
-    assert not len(tiny.borders(-2.0)[0])
-
-
 @pytest.mark.parametrize("ahead", [0.6, 1.6, 2.6, 5.6, 14.6, 32.6])
-def test_between_borders_nothing_changes(ahead):
+def test_images_change_only_at_borders(ahead):
     camera = CameraModel.of(TaskSettings(), CameraSettings())
     places, _ = camera.borders(ahead)
     places = np.unique(places.round(12))
@@ -96,12 +46,7 @@ def test_between_borders_nothing_changes(ahead):
     assert changes.mean() > 0.9  # and there it does, but where rows graze each other
 
 
-def test_grazing_rows_are_told(tiny):
-    assert tiny.grazed(3.0).tolist() == [True, False, True]  # 2 m away, where they are 1 m up
-    assert not tiny.grazed(3.1).any()
-
-
-def test_float32_moves_a_cube_by_no_more_than_is_allowed_for():
+def test_rounding_bounds_float32_positions():
     camera, random = CameraModel.of(TaskSettings(), CameraSettings()), np.random.RandomState(0)
     cubes = random.uniform(-camera.bound, camera.bound, 200_000)
     drone = random.randint(-int(camera.widest), int(camera.widest) + 1, len(cubes)).astype(float)
@@ -110,7 +55,7 @@ def test_float32_moves_a_cube_by_no_more_than_is_allowed_for():
     assert 0.5 < errors.max() < 1  # and not for much more
 
 
-def test_how_far_float32_may_move_each_border(tiny):
+def test_errors_of_borders(tiny):
     """Ways of 2, 4 and 6 m: 16 (way + 1) + 3 * 40 + 3 * 20 units of 2^-24."""
     places, errors = tiny.borders(4.0)
     assert places.tolist() == [-6, -4, -2, 2, 4, 6]
@@ -118,3 +63,65 @@ def test_how_far_float32_may_move_each_border(tiny):
     steep = dataclasses.replace(tiny, left=np.array([2.0, -2.0]))
     _, errors = steep.borders(4.0)  # ways of 5, 7 and 11 m
     assert (errors[3:] / UNIT).tolist() == [16 * 6 + 300, 16 * 8 + 300, 16 * 12 + 300]
+
+
+def make_images(task=None, camera=None):
+    task, camera = task or TaskSettings(), camera or CameraSettings()
+    return CubeImages(Worlds(64, task, camera), Lattice(task), CameraModel.of(task, camera))
+
+
+@pytest.fixture(scope="module")
+def images():
+    return make_images()
+
+
+def test_closed_form_equals_renderer(images):
+    assert images.check(2000, np.random.RandomState(1)) > 1900
+
+
+def test_closed_form_of_another_task_and_camera():
+    task = TaskSettings(num_cubes=5, cube_size=2.0, spacing=4.0, step_length=0.5, first_distance=8)
+    camera = CameraSettings(width=33, height=21, horizontal_fov=90.0)
+    assert make_images(task, camera).check(500, np.random.RandomState(1)) > 450
+
+
+def test_a_camera_too_narrow_for_the_sides_is_refused():
+    with pytest.raises(InputError, match=r"5\.6 m ahead and up to 5 m .*larger camera\.horizontal"):
+        make_images(camera=CameraSettings(horizontal_fov=30.0))
+
+
+def test_a_different_image_is_refused(images, monkeypatch):
+    """One pixel of one image, one step brighter."""
+    render = images.render
+
+    def a_little_off(cubes, places):
+        images = render(cubes, places).clone()
+        images[7, 3, 4, 1] += 1
+        return images
+
+    monkeypatch.setattr(images, "render", a_little_off)
+    with pytest.raises(InputError, match="differs from the closed form, so nothing can be proved"):
+        images.check(100, np.random.RandomState(0))
+
+
+def test_cube_view(images):
+    one = CubeView(images, cube=1, steps=20)
+    left = np.array([-1.0, 0.0, 30.0], np.float32)
+    rendered = one.render(left)
+    faces = one.read(rendered)
+    assert (faces == images._camera.faces(3.6, left.astype(float))).all()
+    assert faces[1, 12, 32] == FRONT and (faces[2] == NOTHING).all()
+
+
+def test_unknown_colors_are_refused(images):
+    with pytest.raises(InputError, match="none of the colors"):
+        images.read(np.zeros((1, 25, 64, 3), np.uint8))
+
+
+def test_touched_and_passed_cubes_are_hidden(images):
+    cubes = np.array([[0.0, 5.0, -5.0]])
+    before, after = (images.render(cubes, np.array([[steps, 0]])) for steps in (13, 14))
+    assert (before != images.background).any(-1).sum() > 100
+    hidden = torch.from_numpy(images.closed_form(cubes, np.array([[14, 0]]))[1])
+    assert hidden.all()
+    assert (after != images.background).any(-1).sum() < 50

@@ -1,6 +1,7 @@
-"""Moves and rules on the lattice, against the simulator's own rules."""
+"""Moves on the lattice and the graph of all nodes, compared with the simulator's rules."""
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -11,8 +12,17 @@ from drone_rl.sim.dynamics import ComputerVision
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.prover.boxes import all_placements, volumes
-from drone_rl.verification.prover.lattice import AHEAD, LEFT, RIGHT, Ending, Lattice, LatticeState
+from drone_rl.verification.prover.boxes import all_placements
+from drone_rl.verification.prover.lattice import (
+    AHEAD,
+    LEFT,
+    RIGHT,
+    Ending,
+    Lattice,
+    LatticeState,
+    explore,
+    shape_of,
+)
 
 TASK = TaskSettings(num_cubes=2, step_limit=60)
 
@@ -24,31 +34,13 @@ def moves(place, action, boxes, lattice=None):
     return found
 
 
-def test_a_step_ahead_past_nothing():
-    (moved,) = moves(LatticeState(3, 1, 0, 4), AHEAD, all_placements(6, 2))
-    assert moved == LatticeState(4, 1, 0, 5, AHEAD)
-
-
-def test_a_cube_is_touched_where_it_is_near_enough():
-    """At x=14 the first cube is 1 m ahead: touched where |y - 2| <= 1.65."""
-    found = moves(LatticeState(13, 2), AHEAD, all_placements(6, 2))
-    sizes = {place.collected: volumes(part).sum() / 12 for place, part in found.items()}
-    assert sizes == pytest.approx({0: 12 - 3.3, 1: 3.3})
-
-
-def test_a_cube_that_is_left_behind_is_touched_no_more():
-    """At x=16 the first cube, at 15, has been passed, near as it is."""
-    (moved,) = moves(LatticeState(16, -3), LEFT, all_placements(6, 2))
-    assert moved.collected == 0
-
-
-def test_collecting_ends_a_way_to_the_side():
+def test_collecting_resets_the_last_sideways_move():
     """Whoever has collected sees another image, so that the way back is no loop."""
     found = moves(LatticeState(14, 0), LEFT, all_placements(6, 2))
     assert {p.collected: p.came for p in found} == {0: LEFT, 1: AHEAD}
 
 
-def test_borders_are_the_simulators_to_the_last_bit():
+def test_touch_borders_are_exact():
     lattice = Lattice(TASK)
     (touched,) = [
         b for p, b in moves(LatticeState(13, 2), AHEAD, all_placements(6, 2)).items() if p.collected
@@ -74,22 +66,14 @@ def test_borders_are_the_simulators_to_the_last_bit():
         (LatticeState(36, 27, 0b11, 60), EndReason.ALL_CUBES),
     ],
 )
-def test_endings_in_their_order(place, reason):
+def test_order_of_endings(place, reason):
     ending = Lattice(TASK).ending(place)
     assert ending == (None if reason is None else Ending(reason, place.collected))
 
 
-def test_cubes_in_sight():
-    lattice = Lattice(TASK)
-    assert lattice.standing(LatticeState(15, 0)) == [0, 1]
-    assert lattice.standing(LatticeState(16, 0)) == [1]
-    assert lattice.standing(LatticeState(3, 0, 0b10)) == [0]
-    assert lattice.standing(LatticeState(25, 0)) == []
-
-
-def test_random_walks_end_as_the_simulator_has_it():
+def test_random_walks_on_the_lattice():
     random, lattice = np.random.default_rng(0), Lattice(TASK)
-    for _ in range(100):
+    for _ in range(40):
         y = random.uniform(-6, 6, 2)
         cubes = torch.tensor([[[15.0, y[0], 2.5], [24.0, y[1], 2.5]]], dtype=torch.float64)
         state, place = CollectCubes(TASK).start(cubes), LatticeState(0, 0)
@@ -108,7 +92,7 @@ def test_random_walks_end_as_the_simulator_has_it():
                 break
 
 
-def test_no_place_comes_before_one_that_leads_to_it():
+def test_order_of_states():
     lattice = Lattice(TASK)
     random = np.random.default_rng(1)
     for _ in range(300):
@@ -122,9 +106,70 @@ def test_no_place_comes_before_one_that_leads_to_it():
                 assert moved.turn > place.turn
 
 
-def test_steps_that_round_are_refused():
+def test_rounded_step_lengths_are_refused():
     with pytest.raises(InputError, match=r"step_length=0.1 are rounded"):
         Lattice(dataclasses.replace(TASK, step_length=0.1, step_limit=900))
     with pytest.raises(InputError, match=r"are rounded, so .* or differ between simulator"):
         Lattice(dataclasses.replace(TASK, step_length=1 + 2**-30))  # no float32
     Lattice(dataclasses.replace(TASK, step_length=0.75))
+
+
+def test_graph_by_hand(small, place):
+    graph = explore(small, place(small, [0.0]))
+    places = zip(graph.nodes.ahead.tolist(), graph.nodes.aside.tolist(), strict=True)
+    assert list(places) == [(0, 0), (0, -1), (0, 1)]
+    assert graph.target.tolist() == [[-1, 2, 1], [-1, 0, -1], [-1, -1, 0]]
+    assert graph.reason.tolist() == [[1, 0, 0], [1, 0, 3], [1, 3, 0]]  # forward touches the cube
+    assert graph.collected.tolist() == [[1, 0, 0], [1, 0, 0], [1, 0, 0]]
+
+
+TASKS = [
+    TaskSettings(side_margin=2.0),
+    TaskSettings(num_cubes=2, vertical_bound=0.5, spacing=1.0, side_margin=0.5),
+    TaskSettings(num_cubes=4, step_length=0.7, spacing=2.5, first_distance=3.0, side_margin=1.0),
+]
+
+
+@pytest.mark.parametrize("settings", TASKS, ids=("three", "two", "four"))
+def test_random_walks_on_the_graph(settings):
+    random = np.random.RandomState(0)
+    walks = 24
+    cubes = torch.stack([CollectCubes(settings).sample(random) for _ in range(walks)])
+    graph = explore(settings, cubes)
+    every = graph.states()
+    dynamics = ComputerVision(settings.step_length)
+    state, node = CollectCubes(settings).start(cubes), torch.arange(walks)
+    ends = torch.zeros(5)
+    bit = torch.arange(settings.num_cubes)
+    for _ in range(settings.step_limit - 1):
+        shown = every[node]
+        assert torch.allclose(shown.drone, state.drone, atol=1e-12, rtol=0)
+        for name in ("cubes", "collected", "passed", "next_cube", "end_reason"):
+            assert torch.equal(getattr(shown, name), getattr(state, name)), name
+        action = torch.from_numpy(random.choice(3, len(state), p=[0.4, 0.35, 0.25]))
+        state, _ = CollectCubes(settings).step(state, dynamics.step(state.body, action))
+        assert torch.equal(graph.reason[node, action], state.end_reason)
+        collected = (graph.collected[node, action][:, None] >> bit & 1).bool()
+        assert torch.equal(collected, state.collected)
+        ends += torch.bincount(state.end_reason, minlength=5)
+        going = state.end_reason == 0
+        node, state = graph.target[node, action][going], state[going]
+        if not len(state):
+            break
+    assert (ends[1:4] > 0).sum() >= 2  # the walks met more than one kind of end
+
+
+def test_nodes_with_equal_images(place):
+    settings = TaskSettings(num_cubes=2)
+    graph = explore(settings, place(settings, [0.0, 5.0], [0.0, 5.0]))
+    node, image = graph.images()
+    state = graph.states()
+    view = torch.cat([graph.nodes.placement[:, None].double(), state.drone, state.present], -1)
+    assert torch.equal(view[node][image], view)
+    assert len(node) == len(view.unique(dim=0)) < len(view)
+
+
+def test_too_many_nodes_are_refused():
+    assert math.prod(shape_of(TaskSettings())) < 50_000
+    with pytest.raises(InputError, match=r"num_cubes=20 .* give fewer cubes"):
+        shape_of(TaskSettings(num_cubes=20))

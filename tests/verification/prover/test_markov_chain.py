@@ -1,23 +1,34 @@
-"""Chances by hand, by a second programme, and by flights of the simulator."""
+"""Probabilities by hand, by a second program and by sampled episodes; bounds on them."""
 
 import dataclasses
 import math
 from collections import defaultdict
 
+import numpy as np
 import pytest
 import torch
-from tensordict.nn import TensorDictModule
 from torch import nn
 
+import drone_rl
 from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.config import TaskSettings
 from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import parse, policy_path, read_policy
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.trust.metrics import summarise
+from drone_rl.utils.progress import silent
 from drone_rl.verification.prover import markov_chain
-from drone_rl.verification.prover.lattice import explore
-from drone_rl.verification.prover.markov_chain import NEGLIGIBLE, NodeEvaluator, Outcomes, propagate
+from drone_rl.verification.prover.lattice import AHEAD, LatticeState, explore
+from drone_rl.verification.prover.markov_chain import (
+    _WON,
+    NEGLIGIBLE,
+    NodeEvaluator,
+    _least_mean,
+    _reachable,
+    bound_success,
+    propagate,
+)
+from drone_rl.verification.prover.policy_spec import make_policy_spec
 
 
 def constant(settings, cubes, *probs):
@@ -27,26 +38,7 @@ def constant(settings, cubes, *probs):
     return propagate(graph, lambda nodes: probs.expand(len(nodes), 3))
 
 
-def test_forward_alone_collects_what_stands_ahead(place):
-    settings = TaskSettings()
-    done = constant(settings, place(settings, [0.0, 0.0, 0.0], [0.0, 1.7, 0.0]), 1.0, 0.0, 0.0)
-    assert done.success.tolist() == [1.0, 0.0]
-    assert done.failure.tolist() == [0.0, 1.0]
-    assert done.collected.tolist() == [[1.0, 1.0, 1.0], [1.0, 0.0, 1.0]]
-    assert done.cubes.tolist() == [3.0, 2.0]
-    assert done.ends[1, EndReason.FRONT_BOUNDARY, 0b101] == 1.0
-    assert done.steps.tolist() == [32.0, 45.0]  # 33 - 32 < 1.65 metres; 45 > 44
-    assert done.undecided.tolist() == [0.0, 0.0]
-
-
-def test_left_alone_ends_at_the_side(place):
-    settings = TaskSettings()
-    done = constant(settings, place(settings, [0.0, 0.0, 0.0]), 0.0, 1.0, 0.0)
-    assert done.ends[0, EndReason.SIDE_BOUNDARY, 0] == 1.0
-    assert done.steps.tolist() == [27.0]
-
-
-def test_a_random_walk_solved_by_hand(small, place):
+def test_random_walk_by_hand(small, place):
     """s0 = 1/3 + 2/3 s1 and s1 = 1/3 + 1/3 s0; e0 = 1 + 2/3 e1 and e1 = 1 + 1/3 e0."""
     done = constant(small, place(small, [0.0]), 1 / 3, 1 / 3, 1 / 3)
     assert float(done.success[0]) == pytest.approx(5 / 7, abs=1e-14)
@@ -55,7 +47,7 @@ def test_a_random_walk_solved_by_hand(small, place):
     assert 0 < float(done.undecided[0]) < NEGLIGIBLE
 
 
-def test_what_is_dropped_at_several_steps_adds_up(small, place, monkeypatch):
+def test_improbable_nodes_are_undecided(small, place, monkeypatch):
     """Forward 0.4, left 0.5, right 0.1, and nodes with a mass of at most 0.2 are dropped.
 
     The place on the right is dropped each time that it is reached: first with 0.1, then with 0.05
@@ -68,21 +60,13 @@ def test_what_is_dropped_at_several_steps_adds_up(small, place, monkeypatch):
     assert float(done.steps[0]) == pytest.approx(1.5 / 0.95, abs=1e-12)
 
 
-def test_the_step_limit_by_hand(small, place):
+def test_step_limit_by_hand(small, place):
     settings = small.replace(step_limit=2)
     done = constant(settings, place(settings, [0.0]), 1 / 3, 1 / 3, 1 / 3)
     expected = [0.0, 5 / 9, 0.0, 2 / 9, 2 / 9, 0.0]  # nobody loses control
     assert done.reasons[0].tolist() == pytest.approx(expected, abs=1e-15)
     assert float(done.steps[0]) == pytest.approx(1 + 2 / 3)
     assert float(done.undecided[0]) == 0.0
-
-
-def test_back_and_forth_for_ever_is_the_step_limit(small, place):
-    graph = explore(small, place(small, [0.0]))
-    probs = torch.tensor([[0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]).double()
-    done = propagate(graph, lambda nodes: probs[nodes])
-    assert done.ends[0, EndReason.STEP_LIMIT, 0] == 1.0
-    assert done.steps.tolist() == [300.0]
 
 
 def walked(settings, y, probs):
@@ -111,7 +95,7 @@ def walked(settings, y, probs):
 
 
 @pytest.mark.parametrize("probs", [(1 / 3, 1 / 3, 1 / 3), (0.05, 0.5, 0.45), (0.7, 0.05, 0.25)])
-def test_one_cube_against_a_programme_written_anew(place, probs):
+def test_one_cube_against_a_second_program(place, probs):
     settings = TaskSettings(num_cubes=1, side_margin=3.0, step_limit=60)
     ends, steps = walked(settings, 2.3, probs)
     done = constant(settings, place(settings, [2.3]), *probs)
@@ -120,16 +104,6 @@ def test_one_cube_against_a_programme_written_anew(place, probs):
         assert found == pytest.approx(ends[reason.name.lower()], abs=1e-14), reason
     assert float(done.steps[0]) == pytest.approx(steps, abs=1e-11)
     assert float(done.reasons.sum() + done.undecided.sum()) == pytest.approx(1.0, abs=1e-14)
-
-
-def test_placements_are_joined_and_stay_apart(place):
-    settings = TaskSettings(num_cubes=2)
-    alone = [
-        constant(settings, place(settings, y), 0.6, 0.1, 0.3) for y in ([1.0, 2.0], [-4.0, 0.0])
-    ]
-    both = constant(settings, place(settings, [1.0, 2.0], [-4.0, 0.0]), 0.6, 0.1, 0.3)
-    assert torch.allclose(Outcomes.joined(alone).ends, both.ends, rtol=0, atol=1e-14)
-    assert len(both) == 2
 
 
 class Hotter(nn.Module):
@@ -144,7 +118,7 @@ class Hotter(nn.Module):
 
 
 def flying(name, num_envs, factor, num_cubes=3):
-    """A policy of the package, hotter, and worlds in which it flies."""
+    """Return an environment and a shipped policy with scaled logits."""
     state = read_policy(policy_path(name))
     described = parse(state["description"])
     task = described.task.replace(num_cubes=num_cubes)
@@ -154,9 +128,9 @@ def flying(name, num_envs, factor, num_cubes=3):
     return described.build_env(num_envs, seed=0, device="cpu"), Hotter(network, factor)
 
 
-def test_flights_of_the_simulator_with_drawn_actions_agree(place, monkeypatch):
-    env, network = flying("good", 500, factor=0.1, num_cubes=2)
-    task, flights = env.base_env.worlds.task, 2000
+def test_sampled_episodes_agree(place, monkeypatch):
+    env, network = flying("good", 400, factor=0.1, num_cubes=2)
+    task, flights = env.base_env.worlds.task, 800
     cubes = place(task.settings, [4.0, -3.0])
     graph = explore(task.settings, cubes)
     done = propagate(graph, NodeEvaluator(env, network).on(graph))
@@ -175,10 +149,9 @@ def test_flights_of_the_simulator_with_drawn_actions_agree(place, monkeypatch):
         assert abs(found - p) <= 5 * math.sqrt(p * (1 - p) / flights) + 1e-9, reason
 
 
-def test_greedy_flights_end_as_a_policy_does_that_is_sure_of_itself():
+def test_greedy_episodes_agree():
     env, network = flying("right_and_forward", 20, factor=1e9)
     actor = make_actor(network, env.action_spec)
-    assert isinstance(actor.module[0], TensorDictModule)
     flown = run_episodes(env, actor, 20)
     settings = env.base_env.worlds.task.settings
     cubes = flown.goals.world.view(20, settings.num_cubes, 3).double()
@@ -190,21 +163,69 @@ def test_greedy_flights_end_as_a_policy_does_that_is_sure_of_itself():
     assert torch.equal(done.steps, flown.length.double())
 
 
-def test_what_is_all_but_impossible_is_not_asked_for_and_told_as_undecided(place):
-    settings = TaskSettings(num_cubes=1)
-    graph = explore(settings, place(settings, [0.0]))
-    asked = []
+def make_placements(box, points=3):
+    """Sample random placements in a box."""
+    low, high = np.array(box).T
+    return low + np.random.RandomState(0).rand(points, len(box)) * (high - low)
 
-    def ask(nodes):
-        asked.append(nodes)
-        return torch.tensor([1.0 - 1e-10, 1e-10, 0.0], dtype=torch.float64).expand(len(nodes), 3)
 
-    done = propagate(graph, ask)
-    nodes = torch.cat(asked)
-    assert (
-        len(nodes) == len(nodes.unique()) == 2 * 14
-    )  # 14 steps to the cube: straight, or one left
-    assert graph.nodes.aside[nodes].unique().tolist() == [0, 1]
-    twice_left = 1e-20 * sum(range(1, 15))  # the first left any time before the second one
-    assert float(done.undecided[0]) == pytest.approx(twice_left, rel=1e-6)
-    assert float(done.success[0]) == pytest.approx(1.0, abs=1e-15)
+def bounds_over(name, box, most=1):
+    """Bounds over a box."""
+    policy = drone_rl.load_policy(name).in_task(num_cubes=len(box))
+    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
+    found = bound_success(spec, np.array(box, float), most)
+    spec.close()
+    return found
+
+
+def chances_at(name, placements):
+    """Exact chances of success at placements. Shape: (P,)."""
+    policy = drone_rl.load_policy(name).in_task(num_cubes=placements.shape[1])
+    return drone_rl.chances(policy, placements.tolist(), progress=silent).outcomes.success
+
+
+def test_least_mean_by_hand():
+    """0.2 to 0.5 of 10, 0.1 to 0.9 of 1 and 0.2 to 0.6 of 4: as much as may be of 1, then of 4."""
+    values = np.array([[10.0, 1.0, 4.0]])
+    lowest, highest = np.array([[0.2, 0.1, 0.2]]), np.array([[0.5, 0.9, 0.6]])
+    assert _least_mean(values, lowest, highest)[0] == pytest.approx(0.2 * 10 + 0.6 * 1 + 0.2 * 4)
+    highest[0, 1] = 0.3
+    assert _least_mean(values, lowest, highest)[0] == pytest.approx(0.2 * 10 + 0.3 * 1 + 0.5 * 4)
+
+
+@pytest.mark.parametrize(
+    ("name", "box"),
+    [
+        ("right_and_forward", [[1.6, 1.7]]),
+        ("good", [[0.9, 0.92], [-3.0, -2.98]]),
+    ],
+)
+def test_bounds_hold_within_the_box(name, box):
+    found, exact = bounds_over(name, box), chances_at(name, make_placements(box))
+    assert (exact >= found.least).all() and (exact <= found.most).all()
+    assert found.mean_least <= found.mean_most
+
+
+def test_smaller_boxes_give_tighter_bounds():
+    small = bounds_over("right_and_forward", [[1.3, 1.3 + 1e-6]])
+    assert small.most - small.least < 1e-5
+    exact = chances_at("right_and_forward", np.array([[1.3]]))
+    assert float(exact[0]) == pytest.approx(small.least, abs=1e-5)
+    one = bounds_over("right_and_forward", [[1.6, 1.7]])
+    many = bounds_over("right_and_forward", [[1.6, 1.7]], most=3)
+    # The midpoint rule: the mean of a monotone probability is off by at most 1 / (2 * 6).
+    middles = 1.6 + 0.1 * (np.arange(6)[:, None] + 0.5) / 6
+    exact = chances_at("right_and_forward", middles)
+    assert many.mean_most - many.mean_least < 0.8 * (one.mean_most - one.mean_least)
+    assert many.mean_least - 0.1 < float(exact.mean()) < many.mean_most + 0.1
+    assert many.least >= one.least and many.most <= one.most
+
+
+@pytest.mark.parametrize("lowest", [-1.7, -1.65])
+def test_a_box_includes_its_ends(lowest):
+    """A cube at -1.65 m is touched straight ahead, and no other one of the box from -1.7 m."""
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
+    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
+    states, targets = _reachable(spec, np.array([[lowest, -1.65]]))
+    spec.close()
+    assert _WON in targets[states.index(LatticeState(13, 0)), AHEAD]

@@ -1,6 +1,7 @@
-"""What can be proved is taken apart; what can't is refused in one line."""
+"""Components of a proof, refused policies and tasks, and the partition of large tasks."""
 
-import dataclasses
+import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,10 +11,15 @@ import drone_rl
 from drone_rl.config import AppearanceSettings, TaskSettings
 from drone_rl.policies.zoo import parse
 from drone_rl.utils.errors import InputError
+from drone_rl.verification.prover.boxes import volumes
 from drone_rl.verification.prover.cells import Cells
 from drone_rl.verification.prover.cube_images import CubeView
-from drone_rl.verification.prover.policy_spec import check_task, make_compositor, make_policy_spec
-from tests.own_networks import Mirrored
+from drone_rl.verification.prover.lattice import Lattice
+from drone_rl.verification.prover.policy_spec import (
+    make_compositor,
+    make_policy_spec,
+    partition_placements,
+)
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +37,7 @@ def with_transforms(*names):
     return parse(described)
 
 
-def test_pictures_are_what_the_network_sees(spec):
+def test_composed_images_equal_observations(spec):
     """Painted by hand and by the renderer and the real transforms."""
     policy = drone_rl.load_policy("good")
     env = policy.make_env(3)
@@ -45,7 +51,7 @@ def test_pictures_are_what_the_network_sees(spec):
         env.close()
 
 
-def test_transforms_after_the_shades_are_applied(spec):
+def test_later_transforms_are_applied(spec):
     crop = {"name": "crop", "top": 2, "bottom": 22}
     description = with_transforms("gray", crop, {"name": "standardize", "mean": 0.5, "std": 0.25})
     compositor = make_compositor(description, spec.images)
@@ -55,19 +61,7 @@ def test_transforms_after_the_shades_are_applied(spec):
     assert float(image[0, 0, 0, 0]) == pytest.approx((sky - 0.5) / 0.25, abs=1e-5)
 
 
-def test_a_resize_to_the_same_size_is_left_out(spec):
-    resize = {"name": "resize", "height": 25, "width": 64}
-    standardize = {"name": "standardize", "mean": 0.5, "std": 0.25}
-    plain = make_compositor(with_transforms("gray", standardize), spec.images)
-    resized = make_compositor(with_transforms("gray", resize, standardize), spec.images)
-    assert resized._rest is None
-    image = plain.paint([], 1)[0]
-    assert torch.equal(resized.paint([], 1)[0], image)
-    smaller = make_compositor(with_transforms("gray", {**resize, "height": 24}), spec.images)
-    assert smaller.see(smaller.paint([], 1)[0]).shape == (1, 1, 24, 64)
-
-
-def test_a_blurred_picture_is_bounded_by_its_blurred_bounds(spec):
+def test_blur_is_monotone(spec):
     blur = {"name": "blur", "width": 1.0}
     compositor = make_compositor(with_transforms("gray", blur), spec.images)
     nothing = compositor.paint([], 1)[0]
@@ -77,7 +71,7 @@ def test_a_blurred_picture_is_bounded_by_its_blurred_bounds(spec):
     assert (bright >= dark).all() and (bright > dark)[0, 0, 10:15, 30:35].all()
 
 
-def test_cells_are_those_of_a_cubes_distance(spec):
+def test_cells_at_the_distance_of_a_cube(spec):
     """The second cube is 24 m ahead of the start, so 19.6 m of the camera after 4 steps."""
     cells = spec.cells(1, 4, -3.0, 3.0)
     expected = Cells(spec.camera, 24.0 - 4.0 - 0.4, -3.0, 3.0, CubeView(spec.images, 1, 4))
@@ -87,50 +81,42 @@ def test_cells_are_those_of_a_cubes_distance(spec):
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"vertical_bound": 0.5}, "vertical_bound=0.5 is not supported"),
-        ({"spacing": 2.0}, "spacing=2.0 puts cubes next to each other"),
-        ({"lateral_bound": 0.0}, "leaves a single placement"),
-    ],
+    ("most", "strips"), [(1000, [1, 1, 1]), (999, [1, 1, 2]), (100, [1, 1, 10]), (40, [1, 3, 10])]
 )
-def test_worlds_without_a_closed_form_are_refused(change, message):
-    check_task(TaskSettings())
-    with pytest.raises(InputError, match=message):
-        check_task(TaskSettings(**change))
+def test_the_farthest_cubes_are_cut_first(most, strips):
+    boxes = partition_placements(lattice_spec(3), most)
+    assert len(boxes) == math.prod(strips)
+    assert [len(np.unique(boxes[:, k, 0])) for k in range(3)] == strips
+    assert volumes(boxes).sum() == pytest.approx(12**3)
+    lower, upper = boxes[:, None, :, 0], boxes[None, :, :, 1]
+    meets = (lower < upper).all(-1)
+    assert (meets & meets.T).sum() == len(boxes)  # each only itself
+    assert np.abs(boxes).max() == 6.0
+
+
+def test_tasks_that_take_days_are_refused():
+    with pytest.raises(InputError, match=r"task.num_cubes=9 .* 1e\+09 .* fewer cubes"):
+        partition_placements(lattice_spec(9), 100)
+
+
+def lattice_spec(num_cubes, borders=(-7.0, -5.0, 0.0, 5.0, 6.5)):
+    """Stand for a `PolicySpec` whose camera has these borders at any distance."""
+    camera = SimpleNamespace(borders=lambda ahead: (np.array(borders), None))
+    return SimpleNamespace(lattice=Lattice(TaskSettings(num_cubes=num_cubes)), camera=camera)
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("task", "appearance", "message"),
     [
-        ({"step_length": 0.3}, "are rounded"),
-        ({"cube_color": (0.0, 0.0, 0.0)}, "gives a face the color of another"),
+        ({"vertical_bound": 0.5}, {}, "vertical_bound=0.5 is not supported"),
+        ({"spacing": 2.0}, {}, "spacing=2.0 puts cubes next to each other"),
+        ({"lateral_bound": 0.0}, {}, "leaves a single placement"),
+        ({"step_length": 0.3}, {}, "are rounded"),
+        ({}, {"fog_visibility": 50.0}, "appearance=minimal"),
     ],
 )
-def test_what_the_parts_refuse_is_refused(change, message):
-    policy = drone_rl.load_policy("good").in_task(**change)
+def test_unsupported_tasks_and_appearances_are_refused(task, appearance, message):
+    policy = drone_rl.load_policy("good").in_task(**task)
+    policy = policy.in_appearance(AppearanceSettings(**appearance))
     with pytest.raises(InputError, match=message):
         make_policy_spec(policy.description, policy.make_network(), 1e-4)
-
-
-def test_worlds_of_another_look_are_refused():
-    policy = drone_rl.load_policy("good")
-    foggy = dataclasses.replace(
-        policy.description, appearance=AppearanceSettings(fog_visibility=50.0)
-    )
-    with pytest.raises(InputError, match="appearance=minimal"):
-        make_policy_spec(foggy, policy.make_network(), 1e-4)
-
-
-def test_the_networks_actions_must_be_moves():
-    policy = drone_rl.load_policy("good")
-    network = policy.make_network()
-    network.actions = dataclasses.replace(network.actions)
-    with pytest.raises(InputError, match="support only the actions"):
-        make_policy_spec(policy.description, network, 1e-4)
-
-
-def test_a_forward_pass_of_its_own_is_refused():
-    description = drone_rl.load_policy("good").description
-    with pytest.raises(InputError, match="Mirrored has a forward of its own"):
-        make_policy_spec(description, Mirrored(description.input.shape, 3), 1e-4)

@@ -1,13 +1,22 @@
-"""A proof that is stopped and gone on with ends as one that never was."""
+"""Saved states resume a proof exactly; the independent checker accepts its certificate."""
+
+import json
+from contextlib import closing
 
 import numpy as np
 import pytest
+import torch
 
 import drone_rl
+from drone_rl.policies.zoo import fingerprint
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.provenance import provenance
+from drone_rl.verification.prover.boxes import volumes
+from drone_rl.verification.prover.lattice import Ending
 from drone_rl.verification.prover.policy_spec import make_policy_spec
-from drone_rl.verification.prover.proof_files import load, save
-from drone_rl.verification.prover.prover import Prover
+from drone_rl.verification.prover.proof_files import certify, load, save
+from drone_rl.verification.prover.prover import ProofFindings, Prover
 
 
 @pytest.fixture(scope="module")
@@ -45,11 +54,11 @@ def finish(prover):
     return endings, found.steps, sorted(found.undecided.tolist()), prover.num_states
 
 
-@pytest.mark.parametrize("places", [3, 40])
-def test_stopped_and_gone_on_with(spec, uninterrupted, tmp_path, places):
-    path = tmp_path / "state.npz"
+@pytest.mark.parametrize("states", [3, 40])
+def test_resume(spec, uninterrupted, tmp_path, states):
+    path = tmp_path / "state.pt"
     stopped = Prover(spec)
-    for _ in range(places):
+    for _ in range(states):
         stopped.advance()
     save(stopped, path, "this")
     later = Prover(spec)
@@ -58,101 +67,91 @@ def test_stopped_and_gone_on_with(spec, uninterrupted, tmp_path, places):
     assert finish(later) == uninterrupted
 
 
-@pytest.mark.parametrize("places", [5, None])
-def test_stopped_within_a_part_or_between_two(narrow, uninterrupted_parts, tmp_path, places):
-    path, stopped, later = tmp_path / "state.npz", *(Prover(narrow, 100) for _ in range(2))
+@pytest.mark.parametrize("states", [5, None])
+def test_resume_within_a_part_or_between_parts(narrow, uninterrupted_parts, tmp_path, states):
+    path, stopped, later = tmp_path / "state.pt", *(Prover(narrow, 100) for _ in range(2))
     assert len(stopped.parts) == 2
     stopped.advance()
-    while stopped.waiting and stopped.num_states != places:
+    while stopped.waiting and stopped.num_states != states:
         stopped.advance()
-    assert len(stopped.parts) == 1 and bool(stopped.waiting) == bool(places)
+    assert len(stopped.parts) == 1 and bool(stopped.waiting) == bool(states)
     save(stopped, path, "this")
     load(later, path, "this")
     assert len(later.parts) == 1 and later.boxes_under_way == stopped.boxes_under_way
     assert finish(later) == uninterrupted_parts
 
 
-def test_another_proofs_state_is_refused(spec, tmp_path):
-    path = tmp_path / "state.npz"
+def test_the_state_of_another_proof_is_refused(spec, tmp_path):
+    path = tmp_path / "state.pt"
     save(Prover(spec), path, "this")
-    with pytest.raises(InputError, match="belongs to another proof; delete it"):
+    with pytest.raises(InputError, match="belongs to another proof"):
         load(Prover(spec), path, "that")
 
 
-@pytest.mark.parametrize("content", [b"no archive", b"PK\x03\x04 cut short"])
-def test_a_broken_state_is_refused(spec, tmp_path, content):
-    path = tmp_path / "state.npz"
-    path.write_bytes(content)
+@pytest.fixture(scope="module")
+def proof(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("proof")
+    task = {"num_cubes": 1}
+    return drone_rl.prove("right_and_forward", folder=folder, task=task, compared=100)
+
+
+def test_fractions_add_up(proof):
+    found = proof.certificate
+    total = sum(o["share"] for o in found["outcomes"]) + found["undecided"]["share"]
+    assert total == pytest.approx(1.0, abs=1e-12)
+    assert found["finished"] is True
+    for outcome in found["outcomes"]:
+        assert sum(outcome["steps"].values()) <= outcome["share"] + 1e-12
+
+
+def test_fractions_are_at_most_one():
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
+    ends = np.sort([-6.0, 6.0, *np.random.RandomState(57).uniform(-6, 6, 50)])
+    boxes = np.stack([ends[:-1], ends[1:]], -1)[:, None]
+    volume = float(volumes(boxes).sum())
+    assert volume > 12
+    ending = Ending(EndReason.FRONT_BOUNDARY, 0)
+    found = ProofFindings({ending: boxes}, boxes[:0], {ending: {26: volume}})
+    with closing(make_policy_spec(policy.description, policy.make_network(), 1e-4)) as spec:
+        prover = Prover(spec)
+        prover.findings = lambda: found
+        (outcome,) = certify("name", policy.description, "", prover, 1.0)["outcomes"]
+    assert outcome["share"] == outcome["steps"]["26"] == 1.0
+
+
+def test_the_checker_accepts_a_certificate(proof):
+    assert drone_rl.check(proof.folder / "certificate.json", flights=300).accepted
+
+
+def test_the_checker_accepts_an_unfinished_certificate(tmp_path):
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=2.0)
+    network = policy.make_network()
+    path, found = tmp_path / "certificate.json", {}
+    with closing(make_policy_spec(policy.description, network, 1e-4)) as spec:
+        prover = Prover(spec, 200)
+        while prover.parts.size:
+            prover.advance()
+        while not prover.ended:
+            prover.advance()
+        assert prover.part.size and prover.waiting and prover.done.endings
+        weights = fingerprint(policy.state["policy"])
+        found = certify(policy.name, policy.description, weights, prover, 1.0, "limit_s")
+    path.write_text(json.dumps(found | provenance()))
+    assert not found["finished"] and found["found"]["stopped_by"] == "limit_s"
+    shares = sum(o["share"] for o in found["outcomes"])
+    assert 0.0 < shares < 1.0 and shares + found["undecided"]["share"] == pytest.approx(1.0)
+    assert drone_rl.check(path, flights=150).accepted
+    found["outcomes"][0]["boxes"] += found["undecided"]["boxes"][:1]
+    path.write_text(json.dumps(found | provenance()))
+    assert not drone_rl.check(path, flights=150).accepted
+
+
+@pytest.mark.parametrize("state", [b"no archive", b"PK\x03\x04 cut short", {"proof_id": print}, {}])
+def test_a_damaged_state_is_refused(spec, tmp_path, state):
+    path = tmp_path / "state.pt"
+    if isinstance(state, bytes):
+        path.write_bytes(state)
+    else:
+        torch.save(state, path)
     with pytest.raises(InputError, match="is not a saved proof state"):
-        load(Prover(spec), path, "this")
-
-
-def test_a_state_reached_by_no_action_is_refused(spec, tmp_path):
-    path, begun = tmp_path / "state.npz", Prover(spec)
-    begun.advance()
-    save(begun, path, "this")
-    with np.load(path) as arrays:
-        state = {**arrays}
-    state["waiting_rows"][:, 4] = 3
-    np.savez(path, **state)
-    with pytest.raises(InputError, match=r"is not a saved proof state .*by action 3"):
-        load(Prover(spec), path, "this")
-
-
-def test_a_state_with_code_in_it_is_refused(spec, tmp_path):
-    path = tmp_path / "state.npz"
-    np.savez(path, spec=np.array([print], dtype=object))
-    with pytest.raises(InputError, match="is not a saved proof state"):
-        load(Prover(spec), path, "this")
-
-
-NOTHING = np.zeros(0, np.int64)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"parts_rows": np.zeros((2, 0)), "parts_counts": np.array([0, 0])},  # parts twice
-        {"parts_rows": np.zeros((0, 0)), "parts_counts": NOTHING},  # not at all
-        {"parts_boxes": np.zeros((3, 2, 2)), "parts_counts": np.array([3])},  # of two cubes
-        {"waiting_boxes": np.zeros((0, 1, 2))},
-        {"waiting_boxes": np.array([[["a", "b"]]])},
-        {"waiting_rows": np.zeros((1, 0), np.int64)},
-        {"waiting_rows": np.zeros((1, 8), np.int64)},
-        {"ended_rows": np.zeros((1, 1), np.int64), "ended_counts": np.array([1])},
-        {"ways_rows": np.array([[99, 0, 0]]), "ways_counts": np.array([0])},
-        {"part_boxes": np.zeros((0, 1, 2)), "part_counts": np.array([0])},  # yet something waits
-        {"waiting_rows": np.zeros((0, 7), np.int64), "waiting_counts": NOTHING},
-        {"done_rows": np.zeros((1, 2), np.int64), "done_counts": np.array([0])},
-        {"undecided_rows": np.zeros((0, 0)), "undecided_counts": NOTHING},
-        {"steps_rows": np.zeros((1, 4), np.int64)},  # and no volume
-        {"steps_rows": np.full((1, 4), 99), "steps_volumes": np.array([1.0])},
-        {"steps_rows": np.array([[1, 1, 0, 9]]), "steps_volumes": np.array([np.nan])},
-        {"counts": np.full(6, np.nan)},
-        {"counts": np.full(6, np.inf)},
-        {"counts": np.zeros(5)},
-    ],
-)
-def test_a_state_that_makes_no_sense_is_refused_and_nothing_taken_over(spec, tmp_path, change):
-    path, fresh = tmp_path / "state.npz", Prover(spec)
-    begun = Prover(spec)
-    begun.advance()
-    save(begun, path, "this")
-    with np.load(path) as arrays:
-        state = {**arrays, "ended_boxes": np.zeros((1, 1, 2)), "ways_boxes": np.zeros((0, 1, 2))}
-    np.savez(path, **(state | change))
-    with pytest.raises(InputError, match="is not a saved proof state"):
-        load(fresh, path, "this")
-    assert not fresh.waiting and not fresh.ended and not fresh.fork_ends and not fresh.forked
-    assert not len(fresh.part) and not fresh.done.endings and not fresh.done.steps
-    assert fresh.num_states == 0 and fresh.parts.tolist() == [[[-6.0, 6.0]]]
-
-
-def test_a_number_as_subject_is_of_another_proof(spec, tmp_path):
-    path = tmp_path / "state.npz"
-    save(Prover(spec), path, "this")
-    with np.load(path) as arrays:
-        state = {**arrays, "subject": np.array(2**62)}
-    np.savez(path, **state)
-    with pytest.raises(InputError, match="belongs to another proof"):
         load(Prover(spec), path, "this")

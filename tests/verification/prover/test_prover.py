@@ -1,47 +1,54 @@
-"""Whole proofs of one cube: what is known of it by hand, and against flights."""
+"""Whole proofs of one cube by hand and compared with episodes; findings of parts."""
 
 import numpy as np
 import pytest
 
 import drone_rl
 from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.verification.prover import prover as module
 from drone_rl.verification.prover.boxes import volumes
 from drone_rl.verification.prover.lattice import LatticeState
 from drone_rl.verification.prover.policy_spec import make_policy_spec
-from drone_rl.verification.prover.prover import Prover
+from drone_rl.verification.prover.prover import (
+    ProofFindings,
+    Prover,
+    simplified,
+    so_far,
+)
+
+NARROW = {"lateral_bound": 2.0}
 
 
-class Noting(Prover):
-    """Notes the volume of the forked boxes when a part is finished."""
+@pytest.fixture(scope="module")
+def make_prover():
+    """Return a function that begins a proof of one cube."""
+    specs = []
 
-    def __init__(self, *args):
-        super().__init__(*args)
-        self.forked_volumes = []
+    def make(most=500_000_000, gap=1e-4, **task):
+        policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, **task)
+        specs.append(make_policy_spec(policy.description, policy.make_network(), gap))
+        return Prover(specs[-1], most)
 
-    def _finish_part(self):
-        self.forked_volumes.append(sum(volumes(b).sum() for b in self.forked))
-        super()._finish_part()
+    yield make
+    for spec in specs:
+        spec.close()
 
 
-def prove(name, gap=1e-4, most=500_000_000, **task):
-    policy = drone_rl.load_policy(name).in_task(num_cubes=1, **task)
-    spec = make_policy_spec(policy.description, policy.make_network(), gap)
-    prover = Noting(spec, most)
+def finish(prover):
     while not prover.is_finished:
         prover.advance()
-    spec.close()
     return prover
 
 
 @pytest.fixture(scope="module")
-def one_sided():
-    return prove("right_and_forward")
+def one_sided(make_prover):
+    return finish(make_prover())
 
 
 @pytest.fixture(scope="module")
-def narrow():
+def narrow(make_prover):
     """The same with less room for the cube: 2 m to each side."""
-    return prove("right_and_forward", lateral_bound=2.0)
+    return finish(make_prover(**NARROW))
 
 
 def shares(findings, bound=6.0):
@@ -52,7 +59,7 @@ def shares(findings, bound=6.0):
     return parts, float(volumes(findings.undecided).sum()) / (2 * bound)
 
 
-def test_the_share_that_a_policy_collects(one_sided):
+def test_fraction_of_success(one_sided):
     """It never goes to the left: it collects what stands up to 1.65 m to its left."""
     parts, undecided = shares(one_sided.findings())
     assert parts[("ALL_CUBES", 1)] == pytest.approx((6 + 1.65) / 12, abs=1e-9)
@@ -60,36 +67,30 @@ def test_the_share_that_a_policy_collects(one_sided):
     assert undecided < 1e-6
 
 
-def test_part_by_part_it_comes_to_the_same(narrow):
-    partition_placements = prove("right_and_forward", most=200, lateral_bound=2.0)
-    assert partition_placements.num_states > narrow.num_states
-    (parts, undecided), (whole, left) = (
-        shares(partition_placements.findings(), bound=2.0),
-        shares(narrow.findings(), bound=2.0),
-    )
+def test_parts_give_the_same_result(narrow, make_prover):
+    several = finish(make_prover(200, **NARROW))
+    assert several.num_states > narrow.num_states
+    (parts, undecided), (whole, left) = (shares(p.findings(), 2.0) for p in (several, narrow))
     assert parts == pytest.approx(whole, abs=1e-12) and undecided == pytest.approx(left, abs=1e-12)
-    assert partition_placements.findings().steps.keys() == narrow.findings().steps.keys()
+    assert several.findings().steps.keys() == narrow.findings().steps.keys()
 
 
-def test_no_part_of_a_box_is_lost_to_rounding():
+def test_cuts_lose_no_part_of_a_box(make_prover):
     """Less than a unit roundoff from a cell, an end of the box counts as in the next cell."""
-    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
-    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
-    prover, tried = Prover(spec), 0
+    prover, tried = make_prover(), 0
     for left in range(-12, 13):
         state = LatticeState(10, left)
-        limits = prover._all_cells(state, [0], np.array([[[-20.0, 20.0]]]))[0].limits[1:-1]
+        limits = prover._cells_of(state, 0, -20.0, 20.0).limits[1:-1]
         below = np.nextafter(limits + left, -np.inf)
         lost = (below - left >= limits) & (abs(below) < 5.9)
         for low in below[lost][:2]:
             parts = [part for _, part in prover._cut(state, np.array([[[low, 6.0]]]))]
             assert np.concatenate(parts)[:, 0, 0].min() == low
             tried += 1
-    spec.close()
     assert tried
 
 
-def test_steps_are_counted(one_sided):
+def test_step_counts(one_sided):
     """At y=0 it takes 14 steps ahead and none to the side."""
     steps = one_sided.findings().steps
     (won,) = [e for e in steps if e.reason is EndReason.ALL_CUBES]
@@ -97,108 +98,82 @@ def test_steps_are_counted(one_sided):
     assert sum(steps[won].values()) <= (6 + 1.65) + 1e-9
 
 
-def test_it_says_what_flights_show(one_sided):
-    findings = one_sided.findings()
-    won = np.concatenate([b for e, b in findings.endings.items() if e.collected])
-    share = float(volumes(won).sum()) / 12
-    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
-    flown = drone_rl.evaluate(policy, episodes=200, baselines=False).success
-    assert abs(flown - share) < 5 * (share * (1 - share) / 200) ** 0.5
-
-
-def test_half_way_the_rest_is_undecided():
-    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
-    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
-    prover = Prover(spec)
-    for _ in range(5):
-        prover.advance()
-    parts, undecided = shares(prover.findings())
-    spec.close()
-    assert not prover.is_finished and prover.boxes_under_way > 0
-    assert parts == {} and undecided == 1.0
-
-
-def test_a_part_that_is_done_is_settled_and_how_it_came_is_forgotten():
-    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=2.0)
-    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
-    prover, most = Prover(spec, 200), 0
+def test_findings_at_every_step(make_prover):
+    """Decided and undecided placements fill the space; of parts done, only findings are kept."""
+    prover = make_prover(200, **NARROW)
+    assert len(prover.parts) > 2
     while not prover.is_finished:
         prover.advance()
-        most = max(most, len(prover.forked), len(prover.ended))
         findings = prover.findings()
         parts, undecided = shares(findings, bound=2.0)
         assert sum(parts.values()) + undecided == pytest.approx(1.0, abs=1e-12)
-        assert sum(parts.values()) * 4.0 == pytest.approx(findings.decided, abs=1e-12)
-        assert sum(parts.values()) * 4.0 <= prover.decided + 1e-9
+        assert findings.decided <= prover.decided + 1e-9
         counted = sum(sum(steps.values()) for steps in findings.steps.values())
         assert counted <= findings.decided + 1e-12
-    spec.close()
-    assert most and not prover.ended and not prover.forked and not prover.fork_ends
-    assert not len(prover.part) and prover.decided == pytest.approx(findings.decided)
-
-
-def test_parts_that_are_not_begun_with_are_undecided():
-    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=2.0)
-    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
-    prover = Prover(spec, 200)
-    count = len(prover.parts)
-    assert count > 2 and shares(prover.findings(), bound=2.0) == ({}, pytest.approx(1.0))
-    prover.advance()
-    while prover.waiting:
-        waiting = [len(part) for parts in prover.waiting.values() for part in parts]
+        waiting = [len(part) for boxes in prover.waiting.values() for part in boxes]
         assert prover.boxes_under_way == sum(waiting)
+    assert not prover.ended and not prover.forked and not prover.fork_ends
+    assert prover.decided == pytest.approx(findings.decided)
+
+
+def test_close_logits_decide_nothing(narrow, make_prover):
+    """With a larger gap, more placements follow several actions, and no statement is wrong."""
+    prover, careful = make_prover(gap=3.0, **NARROW), 0.0
+    while not prover.is_finished:
         prover.advance()
-    assert prover.boxes_under_way == 0
-    spec.close()
-    parts, undecided = shares(prover.findings(), bound=2.0)
-    assert len(prover.parts) == count - 1 and not prover.is_finished
-    assert parts == {("ALL_CUBES", 1): pytest.approx(1 / count, abs=1e-6)}
-    assert undecided == pytest.approx(1 - 1 / count, abs=1e-6)
-
-
-def test_where_logits_are_close_nothing_is_claimed(narrow):
-    """The larger the gap that is asked for, the more ways are followed, and nothing is wrong."""
-    careful = prove("right_and_forward", gap=3.0, lateral_bound=2.0)
-    assert narrow.forked_volumes[0] < 1e-3 < careful.forked_volumes[0]
-    parts, _ = shares(careful.findings(), bound=2.0)
+        careful = max(careful, sum(volumes(boxes).sum() for boxes in prover.forked))
+    assert careful > 1e-3
+    parts, _ = shares(prover.findings(), bound=2.0)
     assert parts.get(("ALL_CUBES", 1), 0) <= (2 + 1.65) / 4 + 1e-9
     assert parts.get(("FRONT_BOUNDARY", 0), 0) <= (2 - 1.65) / 4 + 1e-9
 
 
-def test_to_and_fro_ends_at_the_step_limit(monkeypatch):
-    """Whoever turns left where it came from the right, and back, goes on until the step limit."""
-    policy = drone_rl.load_policy("good").in_task(num_cubes=1)
-    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
-    prover = Prover(spec)
+def test_oscillations_end_at_the_step_limit(make_prover, monkeypatch):
+    prover = make_prover()
     monkeypatch.setattr(
         prover, "_cut", lambda place, boxes: [(2 if place.left % 2 == 0 else 4, boxes)]
     )
-    while not prover.is_finished:
-        prover.advance()
-    spec.close()
-    (ending,) = prover.findings().endings
+    (ending,) = finish(prover).findings().endings
     assert ending.loops and ending.reason is EndReason.STEP_LIMIT and ending.collected == 0
 
 
-def test_a_fork_is_decided_only_if_all_its_ways_end_alike(monkeypatch):
-    """Straight on is won near the middle; to the left for ever is lost everywhere."""
-    policy = drone_rl.load_policy("good").in_task(num_cubes=1)
-    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
-    prover = Prover(spec)
+def test_forks_are_decided_only_if_all_branches_end_alike(make_prover, monkeypatch):
+    """Straight on succeeds near the middle; to the left for ever fails everywhere."""
+    prover = make_prover()
 
     def both_at_first(place, boxes):
         is_start = place.ahead == place.left == 0
         return [(3 if is_start else 2 if place.left else 1, boxes)]
 
     monkeypatch.setattr(prover, "_cut", both_at_first)
-    while not prover.is_finished:
-        prover.advance()
-    spec.close()
-    parts, undecided = shares(prover.findings())
+    parts, undecided = shares(finish(prover).findings())
     assert parts == {} and undecided == 1.0
 
 
-def test_bigger_steps_and_other_cubes_can_be_proved():
-    prover = prove("good", step_length=1.25, cube_size=2.0, lateral_bound=2.0)
-    parts, undecided = shares(prover.findings(), bound=2.0)
-    assert sum(parts.values()) + undecided == pytest.approx(1.0, abs=1e-9)
+def line(*intervals):
+    return np.array(intervals, float).reshape(-1, 1, 2)
+
+
+def test_simplified():
+    won = line(*[[i, i + 1] for i in range(0, 9, 2)], [1, 2], [3, 4], [5, 6])
+    found = ProofFindings({"won": won, "lost": line([7, 8])}, line(), {"won": {1: 8.0}})
+    simple = simplified(found, line([0, 9]))
+    assert sorted(simple.endings["won"].tolist()) == [[[0, 7]], [[8, 9]]]
+    assert simple.endings["lost"].tolist() == [[[7, 8]]]
+    assert not len(simple.undecided) and simple.steps == {"won": {1: 8.0}}
+    nothing = simplified(ProofFindings({}, line([0, 4], [4, 9]), {}), line([0, 9]))
+    assert nothing.undecided.tolist() == [[[0, 9]]] and not nothing.endings
+
+
+@pytest.mark.parametrize(("most", "stated"), [(100, [3, 1]), (2, [2, 0]), (1, [1, 0])])
+def test_so_far(most, stated, monkeypatch):
+    """The largest boxes are stated; all else of the part is undecided."""
+    monkeypatch.setattr(module, "MAX_STATED", most)
+    known = {("won", 7): [line([0, 1], [3, 6])], ("won", 9): [line([7, 9])]}
+    found = so_far(known | {("lost", 2): [line([6, 7])]}, line([0, 12]))
+    assert [len(found.endings.get(e, ())) for e in ("won", "lost")] == stated
+    assert [3, 6] in found.endings["won"][:, 0].tolist()
+    assert found.decided + volumes(found.undecided).sum() == 12.0
+    assert sum(sum(steps.values()) for steps in found.steps.values()) == found.decided
+    sure = np.concatenate([*found.endings.values(), found.undecided])[:, 0]
+    assert (np.sort(sure, 0)[1:, 0] == np.sort(sure, 0)[:-1, 1]).all()
