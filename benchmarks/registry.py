@@ -107,7 +107,7 @@ BENCHMARKS: dict[str, Benchmark] = {
         *_parts("adversarial_maps", "known_map_policies"),
     ),
     "explain": _benchmark(bench_explain, "adversarial", *_EXPLAINING, "conf"),
-    "trust": _benchmark(bench_verdicts, "adversarial", *_JUDGING, *_parts("scripted_policies")),
+    "verdicts": _benchmark(bench_verdicts, "adversarial", *_JUDGING, *_parts("scripted_policies")),
     "fragile_honest": _benchmark(bench_fragile_honest, "adversarial", *_TRAINING, *_JUDGING),
     "shifts": _benchmark(bench_shifts, "adversarial", *_JUDGING),
     "domain_axes": _benchmark(bench_domain_axes, "adversarial", *_JUDGING),

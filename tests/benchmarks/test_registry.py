@@ -122,6 +122,6 @@ def test_the_digest_depends_on_the_measured_code_only(tmp_path, path, counts):
 
 
 def test_a_command_fails_with_the_end_of_its_errors(tmp_path):
-    with pytest.raises(RuntimeError, match=r"drone-rl train failed: .*num_cubs"):
+    with pytest.raises(RuntimeError, match=r"drone-rl train task.* failed: .*num_cubs"):
         train(tmp_path, "task.num_cubs=3")
     call("train", "task.num_cubs=3", statuses=(1, 2))

@@ -406,14 +406,6 @@ FLIGHT = (
     ),
     Row(
         "airsim",
-        "kinds of AirSim programs whose numbers are right through every client that has their "
-        "calls (1.1.7, 1.2.8, 1.8.1, cosysairsim 3.5); simulated seconds after 200 continues of "
-        "0.01 s, and of 0.05 s",
-        "{airsim_scripts_right} of {airsim_scripts}; {airsim_continue_s:.2f}",
-        "all; 2.0, 10.0",
-    ),
-    Row(
-        "airsim",
         "the chapter's program for AirSim 1.1: mean cubes of 3 over 20 resets, collected by an "
         "oracle that sees images only, with the default clock, in lockstep, in computer-vision "
         "mode; trained through the client: success rate, lower end of the 95% CI; minutes",
