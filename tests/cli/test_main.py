@@ -85,7 +85,7 @@ def test_usage_and_version_write_no_files(monkeypatch, capsys, tmp_path, args, p
         (["prove", "policy=good", "task.vertical_bound=0.5"], ["vertical_bound=0.5 is not supp"]),
         (["check", "certificate=none.json"], ["none.json can't be read"]),
         (["places", "policy=good", "nearest=30"], ["nearest=30", "farthest=20"]),
-        (["chain", "policy=good", "cubes=[1.0,2.0]"], ["must have 3", "task.num_cubes"]),
+        (["chain", "policy=good", "cubes=[1.0,2.0]"], ["cubes=(1.0, 2.0)", "give metres"]),
     ],
 )
 def test_mistakes_get_one_line_with_the_value_and_the_remedy(in_process, args, words):

@@ -237,7 +237,7 @@ def test_domain_files_are_valid_requirements(read):
             "fog: {low: 1}\nfog: {low: 2}",
             r"line 2 of .* is no YAML \(fog occurs twice\); correct it",
         ),
-        ("a: !!python/object/apply:os.getcwd []", "no plain YAML"),
+        ("a: !!python/object/apply:os.getcwd []", "is no YAML"),
         ("wind: {low: 1, unit: m/s}", "axis='wind' is unknown; give object_color"),
         ("fog: 60", "fog=60 must be a mapping.*; give low, high or both, and unit: m of sight"),
         ("fog: {low: 60, unit: km}", "fog.unit='km' is unknown; give m of sight"),

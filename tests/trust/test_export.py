@@ -19,8 +19,8 @@ from tests.trust.cards import CARD, VERDICT
 from tests.trust.making import shifts_of
 from tests.verification.checker.making import of_every_place
 
-METRICS = "frames,train/running_reward\n100,1.5\n"
-FIGURES = {"frames": 100, "episodes": 9, "seconds": 1.0, "running_reward": 1.5, "num_cubes": 3}
+METRICS = "frames,seconds,train/running_reward\n100,1.0,1.5\n"
+FIGURES = {"frames": 100, "episodes": 9, "seconds": 1.0, "running_reward": 1.5, "largest_reward": 3}
 
 
 @pytest.fixture
@@ -38,7 +38,7 @@ def checkpoint(tmp_path):
 
 
 def judged(checkpoint, **verdict):
-    result = {"reason": "frames", **FIGURES, "verdict": _verdict("good", **verdict)}
+    result = {"reason": "frames", **FIGURES, "verdict": {**_verdict("good"), **verdict}}
     (checkpoint.parents[1] / "result.json").write_text(json.dumps(result))
 
 
