@@ -123,16 +123,6 @@ class FlyOptions(RendererOptions, total=False):
     demonstrations: str | None
 
 
-class GymnasiumOptions(DeviceOptions, total=False):
-    """Fields of `GymnasiumSettings`."""
-
-    observations: str
-    camera: CameraSettings | Mapping[str, Any]
-    dynamics: DynamicsSettings | Mapping[str, Any]
-    actions: ActionSettings | Mapping[str, Any]
-    render_mode: str | None
-
-
 class VehicleOptions(TypedDict, total=False):
     """Fields of `DynamicsSettings` except its mode."""
 

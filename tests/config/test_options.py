@@ -1,0 +1,37 @@
+"""Keyword arguments of functions are the fields of their settings."""
+
+import dataclasses
+
+import pytest
+
+from drone_rl.config import DynamicsSettings, commands, options
+from drone_rl.config.training import TrainSettings
+from drone_rl.explanations import settings as explaining
+from drone_rl.explanations.chapter_figures import FigureOptions, FigureSettings
+
+LEFT_OUT = {"BodiesSettings": {"policies"}, "FigureSettings": {"figure"}}
+"""Fields that the functions take as arguments of their own."""
+
+
+@pytest.mark.parametrize(
+    ("settings", "keywords"),
+    [
+        (commands.EvaluateSettings, options.EvaluateOptions),
+        (commands.JudgeSettings, options.JudgeOptions),
+        (commands.BodiesSettings, options.BodiesOptions),
+        (commands.ShiftSettings, options.ShiftOptions),
+        (commands.ChanceSettings, options.ChanceOptions),
+        (commands.CheckSettings, options.CheckOptions),
+        (commands.PlacesSettings, options.PlacesOptions),
+        (commands.ProveSettings, options.ProveOptions),
+        (commands.FlySettings, options.FlyOptions),
+        (DynamicsSettings, options.DynamicsOptions),
+        (TrainSettings, options.TrainOptions),
+        (explaining.ExplainSettings, explaining.ExplainOptions),
+        (explaining.ClassModelsSettings, explaining.ClassModelsOptions),
+        (FigureSettings, FigureOptions),
+    ],
+)
+def test_keywords_are_the_fields_of_settings(settings, keywords):
+    fields = {field.name for field in dataclasses.fields(settings)}
+    assert keywords.__optional_keys__ == fields - LEFT_OUT.get(settings.__name__, set())
