@@ -22,8 +22,10 @@ class LocalLauncher(launchers.SweepLauncher):
 class SlurmLauncher(launchers.SweepLauncher):
     """`hydra/launcher=slurm`: on a Slurm cluster by submitit, see `SlurmExecutor`."""
 
-    def __init__(self, **settings: Any) -> None:
-        self.executor = lambda folder: SlurmExecutor(Path(folder) / ".submitit", **settings)
+    def __init__(self, cluster: str, num_jobs: int, **resources: Any) -> None:
+        self.executor = lambda folder: SlurmExecutor(
+            Path(folder) / ".submitit", cluster=cluster, num_jobs=num_jobs, resources=resources
+        )
 
 
 class RayLauncher(launchers.SweepLauncher):

@@ -2,7 +2,7 @@
 
 import abc
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any, cast
+from typing import Any, TypedDict, cast
 
 from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
@@ -13,6 +13,14 @@ from torchrl.envs import EnvBase
 
 from drone_rl.envs import base_env
 from drone_rl.utils.errors import InputError
+
+
+class BatchOptions(TypedDict, total=False):
+    """Keyword arguments of `BatchedCollector`."""
+
+    total_frames: int
+    next_keys: Iterable[NestedKey]
+    postproc: Callable[[TensorDictBase], TensorDictBase] | None
 
 
 class BatchedCollector(BaseCollector):

@@ -1,7 +1,7 @@
 """Collects complete episodes from a batch of environments."""
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import torch
 from tensordict import TensorDictBase
@@ -12,7 +12,7 @@ from torchrl.collectors import Collector
 from torchrl.envs import Compose, EnvBase, TransformedEnv
 from torchrl.envs.utils import exploration_type
 
-from drone_rl.collectors.batched_collector import BatchedCollector, take_rows
+from drone_rl.collectors.batched_collector import BatchedCollector, BatchOptions, take_rows
 from drone_rl.collectors.speedups import Acceleration, accelerated_collector
 from drone_rl.envs.direct_renderer import Reasons
 
@@ -42,7 +42,7 @@ class EpisodeCollector(BatchedCollector):
         actor_keys: Iterable[NestedKey] = (),
         acceleration: Acceleration = "direct",
         num_threads: int = 1,
-        **kwargs: Any,
+        **options: Unpack[BatchOptions],
     ) -> None:
         """Connect an environment and a policy.
 
@@ -53,14 +53,14 @@ class EpisodeCollector(BatchedCollector):
             actor_keys: Entries that the actor reads or writes, to keep in addition to the action.
             acceleration: The fastest implementation that may be used, if it is supported.
             num_threads: Of the fused kernel; no result depends on it.
-            kwargs: See `BatchedCollector`, also for errors.
+            options: See `BatchedCollector`, also for errors.
         """
-        super().__init__(env, actor, **kwargs)
-        options: dict[str, Any] = {"next_keys": self._kept, "actor_keys": actor_keys}
-        options["keep_actor_entries"] = keep_actor_entries
-        found = accelerated_collector(env, actor, acceleration, num_threads=num_threads, **options)
+        super().__init__(env, actor, **options)
+        entries: dict[str, Any] = {"next_keys": self._kept, "actor_keys": actor_keys}
+        entries["keep_actor_entries"] = keep_actor_entries
+        found = accelerated_collector(env, actor, acceleration, num_threads=num_threads, **entries)
         self.source: FusedCollector | DirectCollector | SteppingCollector = (
-            SteppingCollector(env, actor, found, **options) if isinstance(found, Reasons) else found
+            SteppingCollector(env, actor, found, **entries) if isinstance(found, Reasons) else found
         )
         """Implementation that runs the episodes."""
 

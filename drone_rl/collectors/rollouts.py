@@ -1,7 +1,7 @@
 """Collects rollouts of fixed length; episodes continue from batch to batch."""
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import torch
 from tensordict import TensorDict, TensorDictBase
@@ -10,7 +10,7 @@ from tensordict.utils import NestedKey
 from torch import Tensor
 from torchrl.envs import EnvBase
 
-from drone_rl.collectors.batched_collector import BatchedCollector
+from drone_rl.collectors.batched_collector import BatchedCollector, BatchOptions
 from drone_rl.collectors.speedups import accelerated_stepper
 from drone_rl.envs import base_env
 from drone_rl.envs.direct_renderer import Entries, Reasons
@@ -30,12 +30,16 @@ class RolloutCollector(BatchedCollector):
     """
 
     def __init__(
-        self, env: EnvBase, actor: TensorDictModuleBase, num_steps: int, **kwargs: Any
+        self,
+        env: EnvBase,
+        actor: TensorDictModuleBase,
+        num_steps: int,
+        **options: Unpack[BatchOptions],
     ) -> None:
-        """Connect an environment and a policy; `kwargs` and errors as in `BatchedCollector`."""
+        """Connect an environment and a policy; `options` and errors as in `BatchedCollector`."""
         if num_steps < 1:
             raise InputError(f"num_steps={num_steps} is out of range; give 1 or more")
-        super().__init__(env, actor, **kwargs)
+        super().__init__(env, actor, **options)
         self.num_steps = num_steps
         found = accelerated_stepper(env, self._observed, self._kept)
         self._stepper: DirectStepper | TorchrlStepper = (

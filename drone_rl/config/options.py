@@ -28,6 +28,16 @@ class DeviceOptions(RendererOptions, total=False):
     device: str
 
 
+class GymnasiumOptions(DeviceOptions, total=False):
+    """Fields of `GymnasiumSettings`; settings of the task are given in the same way."""
+
+    observations: str
+    camera: CameraSettings | Mapping[str, Any]
+    dynamics: DynamicsSettings | Mapping[str, Any]
+    actions: ActionSettings | Mapping[str, Any]
+    render_mode: str | None
+
+
 class HeldOutOptions(DeviceOptions, total=False):
     """Fields of `HeldOutSettings`."""
 

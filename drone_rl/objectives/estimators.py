@@ -6,7 +6,7 @@ GAE, for learners with a critic.
 """
 
 import abc
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypedDict, Unpack
 
 import torch
 from tensordict import TensorDictBase
@@ -23,6 +23,15 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.plugins import described, place_of
 
 _MASK = ("collector", "mask")
+
+
+class ReturnKeys(TypedDict, total=False):
+    """Keyword arguments of `ReturnEstimator`."""
+
+    scale: bool | None
+    reward_key: NestedKey
+    done_key: NestedKey
+    out_key: NestedKey
 
 
 class ReturnEstimator(Transform, abc.ABC):
@@ -128,8 +137,8 @@ def _ends_later(done: Tensor) -> Tensor:
 
 
 class _Discounted(ReturnEstimator):
-    def __init__(self, gamma: float | None = None, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
+    def __init__(self, gamma: float | None = None, **keys: Unpack[ReturnKeys]) -> None:
+        super().__init__(**keys)
         own: Any = self.Settings
         self.gamma: float = own.gamma if gamma is None else gamma
         if not 0.0 <= self.gamma <= 1.0:
@@ -180,9 +189,9 @@ class SuccessScaled(_Discounted):
         self,
         gamma: float | None = None,
         max_reward: float = settings.SuccessScaled.max_reward,
-        **kwargs: Any,
+        **keys: Unpack[ReturnKeys],
     ) -> None:
-        super().__init__(gamma, **kwargs)
+        super().__init__(gamma, **keys)
         self.max_reward = max_reward
 
     def estimate(self, reward: Tensor, done: Tensor) -> Tensor:
@@ -204,13 +213,13 @@ class TimeBaseline(_Discounted):
         gamma: float | None = None,
         decay: float = settings.TimeBaseline.decay,
         max_steps: int = settings.TimeBaseline.max_steps,
-        **kwargs: Any,
+        **keys: Unpack[ReturnKeys],
     ) -> None:
         """Allocate the means of `max_steps` time steps.
 
         `decay`, 0 or more and below 1, is the weight of the old mean at each batch.
         """
-        super().__init__(gamma, **kwargs)
+        super().__init__(gamma, **keys)
         if not 0.0 <= decay < 1.0:
             raise InputError(f"decay={decay} is out of range; give 0 or more, below 1")
         self.decay = decay

@@ -170,7 +170,9 @@ class LocalExecutor:
 class SlurmExecutor:
     """Executes runs on a Slurm cluster through submitit, as one job array."""
 
-    def __init__(self, folder: Path, *, cluster: str, num_jobs: int, **resources: Any) -> None:
+    def __init__(
+        self, folder: Path, *, cluster: str, num_jobs: int, resources: Mapping[str, Any]
+    ) -> None:
         """Take the folder of submitit's scripts and logs, on a disk that all nodes share.
 
         The cluster is "slurm", or "local" for processes on this machine. The resources are

@@ -27,17 +27,15 @@ def study_folder(run: Path) -> Path:
     return next((above for above in run.parents if (above / _JOURNAL).exists()), run.parent)
 
 
-def open_study(folder: Path, **settings: Any) -> Any:
+def open_study(folder: Path, direction: str | None = None) -> Any:
     """Return the `optuna.Study` in a sweep's folder; create it if `direction` is given.
-
-    The settings are further arguments of `optuna.create_study`.
 
     Raises:
         InputError: Optuna isn't installed, or the study's file is missing, damaged or too large.
     """
     optuna = import_optuna()
     path = folder / _JOURNAL
-    if "direction" not in settings and not path.exists():
+    if direction is None and not path.exists():
         raise InputError(f"{folder} has no search ({_JOURNAL}); leave out trial=")
     if path.exists() and path.stat().st_size:
         read_bytes(path, JOURNAL_BYTES)  # refuses a larger file, and what is no regular file
@@ -47,10 +45,11 @@ def open_study(folder: Path, **settings: Any) -> Any:
         lock = journal.JournalFileOpenLock(str(path))  # the default is a link, refused in sweeps
         backend = journal.JournalFileBackend(str(path), lock)
         storage = optuna.storages.JournalStorage(backend)
-        named = {"study_name": NAME, "storage": storage, **settings}
-        if "direction" not in settings:
-            return optuna.load_study(**named)
-        return optuna.create_study(load_if_exists=True, **named)
+        if direction is None:
+            return optuna.load_study(study_name=NAME, storage=storage)
+        return optuna.create_study(
+            study_name=NAME, storage=storage, direction=direction, load_if_exists=True
+        )
     except _DAMAGE as error:
         raise InputError(
             f"{path} is damaged ({type(error).__name__}: {str(error)[:100]}); move the folder away "

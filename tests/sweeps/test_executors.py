@@ -95,7 +95,7 @@ def test_runs_of_an_interrupted_sweep_stop_at_the_same_time(make_runs, monkeypat
 
 def slurm(folder):
     pytest.importorskip("submitit", reason="pip install -e '.[slurm]'")
-    return SlurmExecutor(folder / "jobs", cluster="local", num_jobs=2, timeout_min=5)
+    return SlurmExecutor(folder / "jobs", cluster="local", num_jobs=2, resources={"timeout_min": 5})
 
 
 def ray(folder):
@@ -121,7 +121,7 @@ def test_settings_that_submitit_refuses(tmp_path, setting):
     pytest.importorskip("submitit", reason="pip install -e '.[slurm]'")
     (name,) = setting
     with pytest.raises(InputError, match=rf"submitit refuses .*{name}.*\+hydra.launcher.slurm_"):
-        SlurmExecutor(tmp_path, cluster="local", num_jobs=2, **setting)
+        SlurmExecutor(tmp_path, cluster="local", num_jobs=2, resources=setting)
 
 
 def test_jobs_that_slurm_refuses(make_runs, tmp_path):

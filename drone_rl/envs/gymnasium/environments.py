@@ -1,7 +1,7 @@
 """The Gymnasium environments: `DroneWorld`, and `DroneWorlds` stepped and rendered as a batch."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import gymnasium
 import numpy as np
@@ -11,6 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from drone_rl.config.options import GymnasiumOptions
 from drone_rl.envs.gymnasium.world_batch import METADATA, Chosen, WorldBatch, read_action
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Whole
@@ -34,7 +35,7 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         task: Chosen = None,
         *,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        **options: Any,
+        **options: Unpack[GymnasiumOptions],
     ) -> None:
         """Create the environments.
 
@@ -52,7 +53,7 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         Whole(1).read(num_envs, "num_envs")
         self.autoreset_mode = _mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
-        self.batch = WorldBatch(num_envs, task, options)
+        self.batch = WorldBatch(num_envs, task, dict(options))
         self.num_envs = num_envs
         self.render_mode = self.batch.render_mode
         self.single_observation_space = self.batch.observation_space
@@ -210,7 +211,7 @@ class DroneWorld(gymnasium.Env[NDArray[Any], Any]):
 
     metadata = METADATA
 
-    def __init__(self, task: Chosen = None, **options: Any) -> None:
+    def __init__(self, task: Chosen = None, **options: Unpack[GymnasiumOptions]) -> None:
         """Create the environment.
 
         `options` are `drone_rl.config.commands.GymnasiumSettings` and settings of the task.
@@ -218,7 +219,7 @@ class DroneWorld(gymnasium.Env[NDArray[Any], Any]):
         Raises:
             InputError: An option is unknown or out of range.
         """
-        self.batch = WorldBatch(1, task, options)
+        self.batch = WorldBatch(1, task, dict(options))
         self.render_mode = self.batch.render_mode
         self.observation_space = self.batch.observation_space
         self.action_space = self.batch.action_space
