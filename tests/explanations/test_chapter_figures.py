@@ -17,7 +17,6 @@ def test_three_states_have_the_exact_gradient():
     error = abs(found.numbers["estimated_gradient"] - found.numbers["exact_gradient"])
     assert error < 2 * found.numbers["half_width95"]
     assert found.numbers["final_probability"] > 0.8
-    assert drone_rl.reproduce(3, seed=2**64).numbers == found.numbers
 
 
 def test_embedding_counts_frames_and_actions(tmp_path):

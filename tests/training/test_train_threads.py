@@ -17,7 +17,6 @@ from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.config.learning import Episodes, Ppo, Rollouts
 from drone_rl.config.networks import Lstm, SmallCnn
 from drone_rl.config.training import TrainerSettings, TrainSettings
-from drone_rl.config.transforms import Gray, Stack, Standardize
 from drone_rl.policies import PolicyNetwork
 from drone_rl.policies.networks import orthogonal
 
@@ -34,7 +33,6 @@ TINY = TrainSettings(
 PPO = Ppo(num_steps=8, minibatch_size=24)
 VARIANTS = {
     "fused": {},
-    "stepping": {"transforms": (Gray(), Standardize(), Stack())},
     "recurrent": {"network": Lstm(channels=(4,), hidden=(8,), memory=4)},
     "ppo": {
         "objective": PPO,
