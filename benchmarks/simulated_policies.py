@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.sim.tasks import CollectCubes, Goals
-from drone_rl.sim.tasks.collect_cubes import EndReason, Side
+from drone_rl.sim.tasks.collect_cubes import CubesEnd, Side
 from drone_rl.trust.baselines import BASELINES
 from drone_rl.trust.rule import Quantity, Rule, VerdictKind, decide, kinds_within
 from drone_rl.trust.verdict import estimate, observe
@@ -223,6 +223,6 @@ def _episode(sides: tuple[Side, ...], hits: Any) -> CompleteEpisodes:
             stratum=side,
             world=torch.zeros(1, 1),
         ),
-        end_reason=torch.tensor([_TASK.success_end if all(hits) else EndReason.STEP_LIMIT]),
+        end_reason=torch.tensor([_TASK.success_end if all(hits) else CubesEnd.STEP_LIMIT]),
         length=torch.ones(1, dtype=torch.int64),
     )

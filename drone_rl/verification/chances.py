@@ -17,7 +17,7 @@ from drone_rl.config.commands import ChanceSettings, ProveSettings
 from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.config.options import ChanceOptions
 from drone_rl.policies.policy import Policy, load_policy
-from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason
+from drone_rl.sim.tasks.collect_cubes import CollectCubes, CubesEnd
 from drone_rl.utils.display import Result, aligned, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
@@ -75,7 +75,7 @@ class Chances(Result):
     def rows(self) -> list[list[str]]:
         """Return a table: a header, then mean, minimum and maximum over placements."""
         outcomes, collected = self.outcomes, self.outcomes.collected.unbind(-1)
-        reasons = (EndReason.FRONT_BOUNDARY, EndReason.SIDE_BOUNDARY, EndReason.STEP_LIMIT)
+        reasons = (CubesEnd.FRONT_BOUNDARY, CubesEnd.SIDE_BOUNDARY, CubesEnd.STEP_LIMIT)
         rows = [
             ["", "mean", "least", "most"],
             _row("all cubes", outcomes.success),
@@ -143,7 +143,7 @@ class Chances(Result):
             "undecided": float(outcomes.undecided[i]),
             "ends": [
                 {
-                    "reason": EndReason(reason).name.lower(),
+                    "reason": CubesEnd(reason).name.lower(),
                     "collected": [bool(cubes >> k & 1) for k in range(self.cubes.shape[1])],
                     "probability": float(ends[reason, cubes]),
                 }

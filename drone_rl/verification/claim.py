@@ -11,7 +11,7 @@ from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.config.commands import JudgeSettings
 from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.zoo import certificate_path
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.trust.rounding_sensitivity import Rounding
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path
@@ -77,7 +77,7 @@ class Claim:
         if rounding is not None and rounding.is_excessive:
             return {"refused": "decisions of the policy depend on rounding"}
         won, lost = (
-            [o for o in stated.outcomes if len(o.boxes) and (o.end == EndReason.ALL_CUBES) == wins]
+            [o for o in stated.outcomes if len(o.boxes) and (o.end == CubesEnd.ALL_CUBES) == wins]
             for wins in (True, False)
         )
         return {

@@ -31,7 +31,7 @@ from drone_rl.envs import (
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN, make_actor
 from drone_rl.sim.dynamics import Quadrotor
 from drone_rl.sim.dynamics.state import LOST
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
 REASON = ("next", "info", "end_reason")
@@ -302,7 +302,7 @@ def test_kernel_ends_the_episode_of_a_lost_drone():
     batch = collector.collect()
     lengths = batch["collector", "traj_ids"].bincount()
     assert lengths[2] == 1 and (lengths[[0, 1, 3, 4]] > 1).all()
-    assert batch[REASON].flatten().tolist().count(EndReason.LOST_CONTROL) == 1
+    assert batch[REASON].flatten().tolist().count(CubesEnd.LOST_CONTROL) == 1
 
 
 @pytest.mark.parametrize(("shape", "num_actions"), [((1, 25, 32), 3), ((1, 25, 64), 5)])

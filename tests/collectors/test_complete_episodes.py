@@ -12,7 +12,7 @@ from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv, base_env
 from drone_rl.policies.baselines import constant_policy, oracle_policy, random_policy
 from drone_rl.sim.actions import MOVES, Move
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.trust.metrics import summarise
 from drone_rl.utils.seeding import Stream
 
@@ -76,7 +76,7 @@ def test_heights_are_metres_above_the_drone():
     env.load_state_dict(start)
     flown = run_episodes(env, constant_policy(Move.FORWARD), 4)
     torch.testing.assert_close(flown.goals.height, drawn.double() - 5.0)
-    assert (flown.end_reason == EndReason.FRONT_BOUNDARY).any()
+    assert (flown.end_reason == CubesEnd.FRONT_BOUNDARY).any()
     assert flown.length.max() == 45  # 44 is still within bounds
 
 

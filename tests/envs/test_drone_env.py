@@ -22,7 +22,7 @@ from drone_rl.envs import (
     with_transforms,
 )
 from drone_rl.envs.direct_renderer import STEP_NAMES, DirectRenderer
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.utils.errors import InputError
 from tests.forked import run_forked
 
@@ -153,7 +153,7 @@ def test_truncation_is_exact_and_distinct_from_termination():
         assert state["truncated"].item() == (step == 5)
     assert state["done"].item()
     assert not state["terminated"].item()
-    assert state["info", "end_reason"].item() == EndReason.STEP_LIMIT
+    assert state["info", "end_reason"].item() == CubesEnd.STEP_LIMIT
 
 
 def test_running_state_resumes_within_episodes():

@@ -6,7 +6,7 @@ import torch
 from drone_rl.explanations.attribution import FILMED, first_heat, key_frames, section, shown_methods
 from drone_rl.explanations.rollouts import RolloutDataset
 from drone_rl.sim.tasks import CollectCubes
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 
 
 def test_the_film_has_the_steps_of_the_first_episode(context):
@@ -36,7 +36,7 @@ def test_without_heat_the_next_method_is_taken():
     assert by == ["one", "two", None]
 
 
-def episode_of(length, collects=(), misses=(), end=EndReason.ALL_CUBES):
+def episode_of(length, collects=(), misses=(), end=CubesEnd.ALL_CUBES):
     event = np.zeros(length, np.int8)
     event[list(collects)], event[list(misses)] = 1, -1
     reason = np.zeros(length, int)
@@ -60,7 +60,7 @@ def test_key_frames_of_a_successful_episode():
 def test_key_frames_of_a_failed_episode():
     why = dict(
         key_frames(
-            episode_of(30, collects=(9,), misses=(19,), end=EndReason.FRONT_BOUNDARY),
+            episode_of(30, collects=(9,), misses=(19,), end=CubesEnd.FRONT_BOUNDARY),
             0,
             CollectCubes(),
         )

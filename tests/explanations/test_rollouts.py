@@ -16,7 +16,7 @@ from drone_rl.policies import ExternalNetwork, make_actor
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.dynamics import BodyState, ComputerVision, FlightState, Quadrotor
 from drone_rl.sim.tasks import CollectCubes
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 
 FLOWN = step_fields(CollectCubes(), MOVES)
 
@@ -152,7 +152,7 @@ def test_a_loop_ends_the_episode(two_scenes):
     ends = run_to_end(
         two_scenes, network, place_target(two_scenes, torch.tensor([9.0]), torch.tensor([0.0]))
     )
-    assert ends.end_reason.tolist() == [EndReason.STEP_LIMIT] and not ends.collected.any()
+    assert ends.end_reason.tolist() == [CubesEnd.STEP_LIMIT] and not ends.collected.any()
     assert len(network.seen) == 3
 
 

@@ -16,7 +16,7 @@ from drone_rl.sim.actions import Move
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.dynamics import Kinematic, Quadrotor
 from drone_rl.sim.rendering.scene import SemanticClass
-from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason
+from drone_rl.sim.tasks.collect_cubes import CollectCubes, CubesEnd
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
@@ -98,7 +98,7 @@ def test_the_boundary_terminates_with_discount_zero(env):
         timestep = env.step(Move.FORWARD)
         for name, spec in env.observation_spec().items():
             spec.validate(timestep.observation[name])
-    assert timestep.observation["end_reason"].item() == EndReason.FRONT_BOUNDARY
+    assert timestep.observation["end_reason"].item() == CubesEnd.FRONT_BOUNDARY
     assert timestep.discount == 0.0
     assert env.task.state.steps.item() == 45
 
@@ -109,7 +109,7 @@ def test_the_step_limit_truncates_with_discount_one():
     for step in range(32):
         timestep = env.step(Move.LEFT if step % 2 else Move.RIGHT)
     assert timestep.last() and timestep.discount == 1.0
-    assert timestep.observation["end_reason"].item() == EndReason.STEP_LIMIT
+    assert timestep.observation["end_reason"].item() == CubesEnd.STEP_LIMIT
 
 
 def test_seed_determines_the_sequence_of_episodes():

@@ -5,7 +5,7 @@ import pytest
 import torch
 from tensordict import TensorDict
 
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.training import Callback, CheckpointCallback, NotANumberError
 from drone_rl.training import trainer as trainer_module
 from drone_rl.training.trainer import batch_metrics, episode_rewards, running_mean
@@ -225,7 +225,7 @@ def test_episode_rewards_and_batch_metrics_match_hand_computed_values():
         [3],
     )
     assert episode_rewards(batch).tolist() == [1.0, 1.0]
-    assert batch_metrics(batch, EndReason) == {
+    assert batch_metrics(batch, CubesEnd) == {
         "train/reward": 1.0,
         "train/length": 1.5,
         "end/all_cubes": 0.5,
@@ -273,7 +273,7 @@ def test_partial_episodes_use_reward_sums():
         [2, 3],
     )
     assert episode_rewards(batch).tolist() == [3.0, 1.0]
-    metrics = batch_metrics(batch, EndReason)
+    metrics = batch_metrics(batch, CubesEnd)
     assert (metrics["train/reward"], metrics["train/length"]) == (2.0, 3.0)
     assert (metrics["end/side_boundary"], metrics["end/all_cubes"]) == (0.5, 0.0)
     del batch["next", "episode_reward"]
@@ -295,7 +295,7 @@ def test_end_reason_is_read_at_the_last_frame():
     batch = make_batch([[0, 1], [1, 1, 0], [0]])
     reasons = torch.tensor([4, 1, 4, 4, 2, 3])[:, None]
     batch["next", "info"] = TensorDict({"end_reason": reasons}, [6])
-    metrics = batch_metrics(batch, EndReason)
-    assert [metrics[f"end/{end.name.lower()}"] for end in EndReason if end] == pytest.approx(
+    metrics = batch_metrics(batch, CubesEnd)
+    assert [metrics[f"end/{end.name.lower()}"] for end in CubesEnd if end] == pytest.approx(
         [1 / 3] * 3 + [0, 0]
     )

@@ -5,7 +5,7 @@ import torch
 
 from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.sim.tasks import CollectCubes
-from drone_rl.sim.tasks.collect_cubes import CubeGoals, EndReason, Side
+from drone_rl.sim.tasks.collect_cubes import CubeGoals, CubesEnd, Side
 from drone_rl.trust.baselines import BASELINES
 
 METRES = {Side.LEFT: 4.0, Side.AHEAD: 0.0, Side.RIGHT: -4.0}
@@ -19,7 +19,7 @@ def make_episodes():
         side, hit = torch.tensor(sides), torch.tensor(collected, dtype=torch.bool)
         metres = torch.tensor([METRES[s] for s in Side], dtype=torch.float64)
         lateral = torch.where(side < 0, torch.nan, metres[side.clamp(min=0)])
-        missed = torch.tensor(EndReason.FRONT_BOUNDARY if end is None else end)
+        missed = torch.tensor(CubesEnd.FRONT_BOUNDARY if end is None else end)
         return CompleteEpisodes(
             task=task or CollectCubes(),
             goals=CubeGoals(
@@ -29,7 +29,7 @@ def make_episodes():
                 lateral=lateral,
                 height=torch.zeros_like(lateral),
             ),
-            end_reason=torch.where(hit.all(-1), EndReason.ALL_CUBES.value, missed),
+            end_reason=torch.where(hit.all(-1), CubesEnd.ALL_CUBES.value, missed),
             length=torch.full((len(side),), 40),
         )
 

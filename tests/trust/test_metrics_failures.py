@@ -4,7 +4,7 @@ import torch
 from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.config import TaskSettings
 from drone_rl.sim.tasks import CollectCubes, Goals
-from drone_rl.sim.tasks.collect_cubes import EndReason, Side
+from drone_rl.sim.tasks.collect_cubes import CubesEnd, Side
 from drone_rl.trust.metrics import failure_table
 from drone_rl.utils.intervals import proportion
 from tests.second_task import End, Posts
@@ -22,7 +22,7 @@ def episodes(make_episodes):
     """Fails at the second, a cube on the right; at the first, on the left; at none."""
     sides = [[LEFT, RIGHT, LEFT], [LEFT, -1, -1], [AHEAD, AHEAD, RIGHT]]
     hits = [[1, 0, 0], [0, 0, 0], [1, 1, 1]]
-    return make_episodes(sides, hits, end=[EndReason.FRONT_BOUNDARY, EndReason.SIDE_BOUNDARY, 0])
+    return make_episodes(sides, hits, end=[CubesEnd.FRONT_BOUNDARY, CubesEnd.SIDE_BOUNDARY, 0])
 
 
 def test_episode_fails_once_at_its_first_miss(episodes):

@@ -8,7 +8,7 @@ from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.envs.fault_models import late_frames
 from drone_rl.sim.rendering.scene import SemanticClass
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.trust.axes import AXES
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
 from drone_rl.trust.perturbations import ONSET_STEP, Condition, PerturbationMode, whiten
@@ -64,7 +64,7 @@ def test_who_flies_straight_on_ends_when_it_must(make_bed):
     assert torch.equal(flown.success.bool(), hit)
     # touches at x = 8 - 1.65, so after 7 moves; else the boundary at x > 12 ends it after 13
     assert flown.length.tolist() == [7 if there else 13 for there in hit]
-    ends = {True: EndReason.ALL_CUBES, False: EndReason.FRONT_BOUNDARY}
+    ends = {True: CubesEnd.ALL_CUBES, False: CubesEnd.FRONT_BOUNDARY}
     assert flown.end_reason.tolist() == [ends[there] for there in hit.tolist()]
 
 

@@ -11,7 +11,7 @@ import drone_rl
 from drone_rl.collectors.complete_episodes import CompleteEpisodes, run_episodes
 from drone_rl.policies.zoo import certificate_path
 from drone_rl.sim.tasks import CollectCubes
-from drone_rl.sim.tasks.collect_cubes import CubeGoals, EndReason
+from drone_rl.sim.tasks.collect_cubes import CubeGoals, CubesEnd
 from drone_rl.trust.rounding_sensitivity import Rounding
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import RootSeed
@@ -28,7 +28,7 @@ def flown(places, ends):
     y = torch.tensor(places, dtype=torch.float64)
     world = torch.stack([torch.tensor([15.0, 24.0]).expand_as(y), y, torch.full_like(y, 2.5)], -1)
     end = torch.tensor(ends)
-    won = (end == EndReason.ALL_CUBES)[:, None].expand_as(y)
+    won = (end == CubesEnd.ALL_CUBES)[:, None].expand_as(y)
     goals = CubeGoals(
         reached=won,
         stratum=torch.zeros_like(won, dtype=torch.long),
@@ -48,7 +48,7 @@ def claim(policy, **how):
     return Claim(PATH, parse_certificate(of_every_place(policy, **how)))
 
 
-ALL, BEHIND = EndReason.ALL_CUBES.value, EndReason.FRONT_BOUNDARY.value
+ALL, BEHIND = CubesEnd.ALL_CUBES.value, CubesEnd.FRONT_BOUNDARY.value
 
 
 def test_certificate_of_every_placement(good):
@@ -110,7 +110,7 @@ def test_one_other_end_refuses_the_certificate(good):
     assert found == {
         "refused": "1 of 3 greedy flights of this verdict ended otherwise than it states"
     }
-    side = EndReason.SIDE_BOUNDARY.value
+    side = CubesEnd.SIDE_BOUNDARY.value
     lost = claim(good, end="front_boundary").as_evidence(flown(places[:1], [side]))
     assert lost["refused"] is not None
 

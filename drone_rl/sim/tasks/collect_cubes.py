@@ -13,7 +13,7 @@ from drone_rl.sim.actions import DOWN, MOVES, MOVES_3D, UP, Actions, Entry, Move
 from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.entities import Cube
 from drone_rl.sim.tasks.collect_cubes_kernel import (
-    EndReason,
+    CubesEnd,
     FusedCubes,
     launch,
     start_all,
@@ -73,10 +73,10 @@ class CollectCubes(PropTask[WorldState]):
     """Move until every cube is touched. The reward is 1 a cube."""
 
     name = TaskSettings.name
-    ends = EndReason
-    truncation = EndReason.STEP_LIMIT
-    success_end = EndReason.ALL_CUBES
-    expected_end = EndReason.FRONT_BOUNDARY
+    ends = CubesEnd
+    truncation = CubesEnd.STEP_LIMIT
+    success_end = CubesEnd.ALL_CUBES
+    expected_end = CubesEnd.FRONT_BOUNDARY
     observed = ("cubes", "collected", "side", "end_reason")
     props = "cubes"
     scored = ("collected", "side", "lateral", "cube_positions")
@@ -106,7 +106,7 @@ class CollectCubes(PropTask[WorldState]):
             "side": Entry((cubes,), torch.int64, -1, len(Side) - 1),
             "lateral": Entry((cubes,), torch.float64),
             "next_cube": Entry((1,), torch.int64, 0, cubes),
-            "end_reason": Entry((1,), torch.int64, 0, len(EndReason) - 1),
+            "end_reason": Entry((1,), torch.int64, 0, len(CubesEnd) - 1),
             "cube_positions": Entry((cubes, 3), torch.float32),
         }
 

@@ -30,7 +30,7 @@ from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, PoseArra
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH, Side
 
 
-class EndReason(enum.IntEnum):
+class CubesEnd(enum.IntEnum):
     """Why an episode ended."""
 
     RUNNING = 0
@@ -130,18 +130,18 @@ def _end_reason(
 ) -> int:
     """Return the first reason that holds, in the order of Algorithm 3; a lost drone before all."""
     if is_lost:
-        return EndReason.LOST_CONTROL
+        return CubesEnd.LOST_CONTROL
     if num_collected == cubes.places.shape[1]:
-        return EndReason.ALL_CUBES
+        return CubesEnd.ALL_CUBES
     if drone[0] > cubes.bounds.front_bound:
-        return EndReason.FRONT_BOUNDARY
+        return CubesEnd.FRONT_BOUNDARY
     if wp.abs(drone[1]) > cubes.bounds.side_bound:
-        return EndReason.SIDE_BOUNDARY
+        return CubesEnd.SIDE_BOUNDARY
     if wp.abs(drone[2] - cubes.bounds.altitude) > cubes.bounds.height_bound:
-        return EndReason.SIDE_BOUNDARY
+        return CubesEnd.SIDE_BOUNDARY
     if steps >= cubes.bounds.step_limit:
-        return EndReason.STEP_LIMIT
-    return EndReason.RUNNING
+        return CubesEnd.STEP_LIMIT
+    return CubesEnd.RUNNING
 
 
 @wp.kernel

@@ -19,7 +19,7 @@ from drone_rl.sim.vocabulary import PILLARS
 from drone_rl.utils.text import plural
 
 
-class EndReason(enum.IntEnum):
+class PillarsEnd(enum.IntEnum):
     """Why an episode ended."""
 
     RUNNING = 0
@@ -71,10 +71,10 @@ class Pillars(common.PropTask[FieldState]):
     """Reach the finish line without touching a pillar. The reward is progress, 1 in total."""
 
     name = PillarsSettings.name
-    ends = EndReason
-    truncation = EndReason.STEP_LIMIT
-    success_end = EndReason.FINISH_LINE
-    expected_end = EndReason.PILLAR_TOUCHED
+    ends = PillarsEnd
+    truncation = PillarsEnd.STEP_LIMIT
+    success_end = PillarsEnd.FINISH_LINE
+    expected_end = PillarsEnd.PILLAR_TOUCHED
     observed = ("passed", "side", "end_reason")
     props = "pillars"
     scored = ("passed", "side", "gap", "rows")
@@ -106,7 +106,7 @@ class Pillars(common.PropTask[FieldState]):
             "side": Entry((rows,), torch.int64, -1, len(common.Side) - 1),
             "gap": Entry((rows,), torch.float64),
             "next_row": Entry((1,), torch.int64, 0, rows),
-            "end_reason": Entry((1,), torch.int64, 0, len(EndReason) - 1),
+            "end_reason": Entry((1,), torch.int64, 0, len(PillarsEnd) - 1),
             "rows": Entry((rows, s.row_size), torch.float32),
         }
 
@@ -185,11 +185,11 @@ class Pillars(common.PropTask[FieldState]):
         s, (x, y, _) = self.settings, state.drone.unbind(-1)
         return (
             torch.zeros_like(state.steps)
-            .masked_fill(state.steps >= s.step_limit, EndReason.STEP_LIMIT)
-            .masked_fill(x >= s.finish, EndReason.FINISH_LINE)
-            .masked_fill(y.abs() > s.spread + EDGE, EndReason.SIDE_BOUNDARY)
-            .masked_fill(state.touched.any(-1), EndReason.PILLAR_TOUCHED)
-            .masked_fill(state.body.is_lost, EndReason.LOST_CONTROL)
+            .masked_fill(state.steps >= s.step_limit, PillarsEnd.STEP_LIMIT)
+            .masked_fill(x >= s.finish, PillarsEnd.FINISH_LINE)
+            .masked_fill(y.abs() > s.spread + EDGE, PillarsEnd.SIDE_BOUNDARY)
+            .masked_fill(state.touched.any(-1), PillarsEnd.PILLAR_TOUCHED)
+            .masked_fill(state.body.is_lost, PillarsEnd.LOST_CONTROL)
         )
 
     def obstacles(self, state: FieldState) -> Obstacles:

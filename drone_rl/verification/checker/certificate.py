@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from drone_rl.config import BaseTaskSettings, TaskSettings
 from drone_rl.policies.zoo import PolicyDescription, fingerprint, parse
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.utils import schema
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
@@ -26,15 +26,15 @@ MAX_OUTCOMES = 2**11
 MAX_STEPS = 20_000  # step counts of all outcomes together
 MIN_BORDER = 2.0**-100  # metres. Smallest nonzero |border|; bounds the bits of exact sums.
 MAX_BORDER = 2.0**20  # metres. Largest |border|
-_NO_ENDS = (EndReason.RUNNING, EndReason.LOST_CONTROL)  # no control is lost in computer-vision mode
-_ENDS = tuple(end.name.lower() for end in EndReason if end not in _NO_ENDS)
+_NO_ENDS = (CubesEnd.RUNNING, CubesEnd.LOST_CONTROL)  # no control is lost in computer-vision mode
+_ENDS = tuple(end.name.lower() for end in CubesEnd if end not in _NO_ENDS)
 
 
 @dataclasses.dataclass(frozen=True)
 class Outcome:
     """One outcome of episodes, and the placements that lead to it."""
 
-    end: EndReason  # why the episodes end
+    end: CubesEnd  # why the episodes end
     collected: tuple[bool, ...]  # whether each cube is collected by then
     loops: bool  # whether the drone oscillates until the step limit
     share: float  # fraction of the volume of all placements
@@ -161,7 +161,7 @@ def _read_outcome(read: Mapping[str, Any], where: str, cubes: int) -> Outcome:
             f"{where}.collected has {len(read['collected'])} values; give {cubes}, one per cube"
         )
     return Outcome(
-        end=EndReason[read["end"].upper()],
+        end=CubesEnd[read["end"].upper()],
         collected=read["collected"],
         loops=read["loops"],
         share=read["share"],

@@ -16,7 +16,7 @@ from torchrl.envs import Transform
 from drone_rl.envs import worlds_of
 from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.tasks import State
-from drone_rl.sim.tasks.collect_cubes import EndReason, WorldState
+from drone_rl.sim.tasks.collect_cubes import CubesEnd, WorldState
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.checker.certificate import (
     Certificate,
@@ -91,7 +91,7 @@ class CheckFindings:
 class EpisodeEnds:
     """How episodes ended; the first dimension counts episodes."""
 
-    end: NDArray[np.int64]  # (k,); `EndReason`
+    end: NDArray[np.int64]  # (k,); `CubesEnd`
     collected: NDArray[np.bool_]  # (k, cubes); whether each cube was collected
     steps: NDArray[np.int64]  # (k,); number of steps
     repeats: NDArray[np.int64]  # (k,); final steps whose state equals that of two steps before
@@ -238,7 +238,7 @@ def ends_as_stated(outcome: Outcome, rollouts: EpisodeEnds, i: int) -> bool:
     """Return whether episode i ended as stated, after a stated number of steps."""
     if rollouts.end[i] != outcome.end or tuple(rollouts.collected[i]) != outcome.collected:
         return False
-    if outcome.end == EndReason.STEP_LIMIT:
+    if outcome.end == CubesEnd.STEP_LIMIT:
         loops = rollouts.repeats[i] > (0 if outcome.loops else _SHORT_LOOP)
         if loops != outcome.loops:
             return False
@@ -264,7 +264,7 @@ def _stated(outcome: Outcome) -> str:
 
 
 def _found(rollouts: EpisodeEnds, i: int) -> str:
-    end, collected = EndReason(rollouts.end[i]), tuple(map(bool, rollouts.collected[i]))
-    loops = end == EndReason.STEP_LIMIT and bool(rollouts.repeats[i])
+    end, collected = CubesEnd(rollouts.end[i]), tuple(map(bool, rollouts.collected[i]))
+    loops = end == CubesEnd.STEP_LIMIT and bool(rollouts.repeats[i])
     as_outcome = Outcome(end, collected, loops, 0.0, {}, np.zeros((0, len(collected), 2)))
     return f"{as_outcome}, steps: {rollouts.steps[i]}"

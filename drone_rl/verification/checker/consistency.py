@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.utils.intervals import proportion
 from drone_rl.verification.checker.certificate import Certificate, Outcome
 
@@ -109,13 +109,13 @@ def _misfits(certificate: Certificate, whole: Fraction) -> Iterator[str]:
 
 def _impossible(outcome: Outcome, step_limit: int) -> Iterator[str]:
     """Yield what the rules of the task exclude."""
-    if (outcome.end == EndReason.ALL_CUBES) != all(outcome.collected):
+    if (outcome.end == CubesEnd.ALL_CUBES) != all(outcome.collected):
         yield "can't be: a flight ends with all_cubes if and only if all are collected"
-    if outcome.loops and outcome.end != EndReason.STEP_LIMIT:
+    if outcome.loops and outcome.end != CubesEnd.STEP_LIMIT:
         yield "can't be: an oscillation ends at the step limit"
     if any(steps > step_limit for steps in outcome.steps):
         yield f"has more steps than step_limit={step_limit}"
-    if outcome.end == EndReason.STEP_LIMIT and {*outcome.steps} - {step_limit}:
+    if outcome.end == CubesEnd.STEP_LIMIT and {*outcome.steps} - {step_limit}:
         yield f"has another number of steps than step_limit={step_limit}"
     if (total := sum(outcome.steps.values())) > outcome.share * (1 + TOLERANCE):
         yield f"has a share of {outcome.share!r}, but its steps add up to {total!r}"

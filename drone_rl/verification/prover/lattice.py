@@ -16,7 +16,7 @@ from torch import Tensor
 from drone_rl.config import TaskSettings
 from drone_rl.sim.actions import DIRECTIONS
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason, WorldState
+from drone_rl.sim.tasks.collect_cubes import CollectCubes, CubesEnd, WorldState
 from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.boxes import Boxes, cut
@@ -46,7 +46,7 @@ class LatticeState:
 class Ending:
     """How an episode ends."""
 
-    reason: EndReason
+    reason: CubesEnd
     collected: int  # bit k is set for cube k
     loops: bool = False  # whether the drone oscillates until the step limit
 
@@ -110,13 +110,13 @@ class Lattice:
         """Return how the episode has ended, in the order of Algorithm 3; None if it continues."""
         reason = None
         if state.steps >= self.task.step_limit:
-            reason = EndReason.STEP_LIMIT
+            reason = CubesEnd.STEP_LIMIT
         if abs(self.y(state)) > self.task.side_bound:
-            reason = EndReason.SIDE_BOUNDARY
+            reason = CubesEnd.SIDE_BOUNDARY
         if self.x(state) > self.task.front_bound:
-            reason = EndReason.FRONT_BOUNDARY
+            reason = CubesEnd.FRONT_BOUNDARY
         if state.collected == self.everything:
-            reason = EndReason.ALL_CUBES
+            reason = CubesEnd.ALL_CUBES
         return None if reason is None else Ending(reason, state.collected)
 
     def _touched(
@@ -175,7 +175,7 @@ class Graph:
     cubes: Tensor  # (P, C, 3) float64; placements, metres
     nodes: Nodes  # the first P are the start nodes, in the order of the placements
     target: Tensor  # (K, A) int64; node that a move leads to; -1 where the episode ends
-    reason: Tensor  # (K, A) int64; `EndReason`; never the step limit
+    reason: Tensor  # (K, A) int64; `CubesEnd`; never the step limit
     collected: Tensor  # (K, A) int64; cubes collected after the move, as in `Nodes`
 
     def states(self) -> WorldState:
@@ -205,7 +205,7 @@ def explore(settings: TaskSettings, cubes: Tensor) -> Graph:
         number[_keys(shape, frontier)] = torch.arange(known, known + len(frontier))
         known += len(frontier)
         moved, reason = _follow(settings, cubes, frontier)
-        goes_on = reason == EndReason.RUNNING
+        goes_on = reason == CubesEnd.RUNNING
         keys = torch.where(goes_on.flatten(), _keys(shape, moved), -1).view(reason.shape)
         parts.append((frontier, keys, reason, moved.collected.view(reason.shape)))
         new = keys[goes_on].unique()
@@ -224,7 +224,7 @@ def explore(settings: TaskSettings, cubes: Tensor) -> Graph:
 
 
 def _follow(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> tuple[Nodes, Tensor]:
-    """Return the nodes after each move (K * A), and the `EndReason` of each move (K, A)."""
+    """Return the nodes after each move (K * A), and the `CubesEnd` of each move (K, A)."""
     moves = torch.tensor(DIRECTIONS).long()
     each = torch.arange(len(nodes)).repeat_interleave(len(moves))
     before = nodes[each]

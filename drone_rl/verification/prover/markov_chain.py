@@ -12,7 +12,7 @@ from torchrl.envs import Transform, TransformedEnv
 from drone_rl.envs import worlds_of
 from drone_rl.envs.transforms import pixel_transforms
 from drone_rl.policies.rounding import RoundingBound
-from drone_rl.sim.tasks.collect_cubes import EndReason, WorldState
+from drone_rl.sim.tasks.collect_cubes import CubesEnd, WorldState
 from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.bounds import Crop, ImageRanges
@@ -37,7 +37,7 @@ Evaluate = Callable[[Tensor], Tensor]  # nodes (N,) to action probabilities (N, 
 class Outcomes(Batch):
     """How episodes end in `P` placements of `C` cubes."""
 
-    ends: Tensor  # (P, len(EndReason), 2**C) float64
+    ends: Tensor  # (P, len(CubesEnd), 2**C) float64
     """Probability of each end reason with exactly these cubes collected. Bit k of the last index is
     set if cube k is collected."""
     steps: Tensor  # (P,) float64; expected length of an episode
@@ -48,16 +48,16 @@ class Outcomes(Batch):
     @property
     def success(self) -> Tensor:
         """Probability that all cubes are collected. Shape: (P,)."""
-        return self.ends[:, EndReason.ALL_CUBES].sum(-1)
+        return self.ends[:, CubesEnd.ALL_CUBES].sum(-1)
 
     @property
     def failure(self) -> Tensor:
         """Probability that not all cubes are collected, precise even if tiny. Shape: (P,)."""
-        return self.reasons[:, [end for end in EndReason if end != EndReason.ALL_CUBES]].sum(-1)
+        return self.reasons[:, [end for end in CubesEnd if end != CubesEnd.ALL_CUBES]].sum(-1)
 
     @property
     def reasons(self) -> Tensor:
-        """Probability of each `EndReason`. Shape: (P, len(EndReason))."""
+        """Probability of each `CubesEnd`. Shape: (P, len(CubesEnd))."""
         return self.ends.sum(-1)
 
     @property
@@ -80,12 +80,12 @@ def propagate(graph: Graph, evaluate: Evaluate) -> Outcomes:
     probability, visits, last, dropped = _propagate(graph, evaluate)
     reason, collected = graph.reason.numpy(), graph.collected.numpy()
     flow = visits[:, None] * probability  # includes moves that continue: they "end" as RUNNING
-    end = (placement[:, None] * len(EndReason) + reason) * sets + collected
-    ends = np.bincount(end.ravel(), flow.ravel(), count * len(EndReason) * sets)
-    ends = ends.reshape(count, len(EndReason), sets)
-    ends[:, EndReason.RUNNING] = 0.0
+    end = (placement[:, None] * len(CubesEnd) + reason) * sets + collected
+    ends = np.bincount(end.ravel(), flow.ravel(), count * len(CubesEnd) * sets)
+    ends = ends.reshape(count, len(CubesEnd), sets)
+    ends[:, CubesEnd.RUNNING] = 0.0
     by_set = placement * sets + graph.nodes.collected.numpy()
-    ends[:, EndReason.STEP_LIMIT] += np.bincount(by_set, last, count * sets).reshape(count, sets)
+    ends[:, CubesEnd.STEP_LIMIT] += np.bincount(by_set, last, count * sets).reshape(count, sets)
     steps = np.bincount(placement, visits, count)
     undecided = np.bincount(placement, dropped, count)
     return Outcomes(*map(torch.from_numpy, (ends.clip(max=1.0), steps, undecided)))
@@ -252,7 +252,7 @@ def _reachable(spec: PolicySpec, box: Boxes) -> tuple[list[LatticeState], NDArra
             for moved, _ in lattice.move(state, move, box[None]):
                 untimed = dataclasses.replace(moved, steps=0, came=AHEAD)
                 if (ending := lattice.ending(untimed)) is not None:
-                    targets.append(_WON if ending.reason == EndReason.ALL_CUBES else _LOST)
+                    targets.append(_WON if ending.reason == CubesEnd.ALL_CUBES else _LOST)
                     continue
                 if untimed not in index_of:
                     index_of[untimed] = len(states)

@@ -16,7 +16,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.policies.zoo import PolicyDescription
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_bytes, write_atomically
 from drone_rl.verification.prover.boxes import Boxes, volumes
@@ -159,4 +159,4 @@ def _row(ending: Ending | None) -> _Row | None:
 
 
 def _ending(row: _Row) -> Ending:
-    return Ending(EndReason(row[0]), *row[1:])
+    return Ending(CubesEnd(row[0]), *row[1:])

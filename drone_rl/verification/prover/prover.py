@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.verification.prover.action_table import ActionTable, runs
 from drone_rl.verification.prover.boxes import (
     Boxes,
@@ -136,7 +136,7 @@ class Prover:
     def _follow(self, state: LatticeState, action: int, boxes: Boxes) -> None:
         """Move on, or end the episode; returning where the drone came from is a loop."""
         if {state.came, action} == {LEFT, RIGHT}:
-            self._end(state, Ending(EndReason.STEP_LIMIT, state.collected, loops=True), boxes)
+            self._end(state, Ending(CubesEnd.STEP_LIMIT, state.collected, loops=True), boxes)
             return
         for moved, part in self.lattice.move(state, action, boxes):
             if ending := self.lattice.ending(moved):
@@ -159,7 +159,7 @@ class Prover:
 
     def _end(self, state: LatticeState, ending: Ending, boxes: Boxes) -> None:
         if state.is_fork:  # a loop with an uncertain action may be left at any time
-            is_known = not ending.loops and ending.reason is not EndReason.STEP_LIMIT
+            is_known = not ending.loops and ending.reason is not CubesEnd.STEP_LIMIT
             self.fork_ends[ending if is_known else None].append(boxes)
             return
         steps = self.lattice.task.step_limit if ending.loops else state.steps

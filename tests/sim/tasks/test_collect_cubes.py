@@ -16,7 +16,7 @@ from drone_rl.sim.tasks import FailureReplayTask
 from drone_rl.sim.tasks.collect_cubes import (
     CollectCubes,
     CubeGoals,
-    EndReason,
+    CubesEnd,
     Side,
     inflated,
     turn_towards,
@@ -70,7 +70,7 @@ def test_enumeration_values_are_those_of_files():
         *("RUNNING", "ALL_CUBES", "FRONT_BOUNDARY", "SIDE_BOUNDARY", "STEP_LIMIT"),
         "LOST_CONTROL",
     )
-    assert [(e.name, e.value) for e in EndReason] == [(n, i) for i, n in enumerate(ends)]
+    assert [(e.name, e.value) for e in CubesEnd] == [(n, i) for i, n in enumerate(ends)]
 
 
 def test_next_cube_is_the_first_present_one():
@@ -195,13 +195,13 @@ def test_side_is_ahead_up_to_the_contact_distance():
 
 def test_end_conditions_of_algorithm_3():
     state = at(0.0, 0.0, 0.0)
-    assert fly(state, 44.0, 0.0)[0].end_reason.item() == EndReason.RUNNING
-    assert fly(state, beyond(44.0), 0.0)[0].end_reason.item() == EndReason.FRONT_BOUNDARY
-    assert fly(state, -100.0, 0.0)[0].end_reason.item() == EndReason.RUNNING
+    assert fly(state, 44.0, 0.0)[0].end_reason.item() == CubesEnd.RUNNING
+    assert fly(state, beyond(44.0), 0.0)[0].end_reason.item() == CubesEnd.FRONT_BOUNDARY
+    assert fly(state, -100.0, 0.0)[0].end_reason.item() == CubesEnd.RUNNING
     for y in (26.0, -26.0):
-        assert fly(state, 0.0, y)[0].end_reason.item() == EndReason.RUNNING
-        assert fly(state, 0.0, beyond(y))[0].end_reason.item() == EndReason.SIDE_BOUNDARY
-    for steps, reason in ((298, EndReason.RUNNING), (299, EndReason.STEP_LIMIT)):
+        assert fly(state, 0.0, y)[0].end_reason.item() == CubesEnd.RUNNING
+        assert fly(state, 0.0, beyond(y))[0].end_reason.item() == CubesEnd.SIDE_BOUNDARY
+    for steps, reason in ((298, CubesEnd.RUNNING), (299, CubesEnd.STEP_LIMIT)):
         state.steps[:] = steps
         assert fly(state, 0.0, 0.0)[0].end_reason.item() == reason
 
@@ -215,7 +215,7 @@ def test_first_of_simultaneous_end_conditions_counts(coinciding):
     ended, _ = fly(state, 45.0 if front else 0.0, 27.0 if side else 0.0)
     order = ("ALL_CUBES", "FRONT_BOUNDARY", "SIDE_BOUNDARY", "STEP_LIMIT")
     expected = next((n for n, holds in zip(order, coinciding, strict=True) if holds), "RUNNING")
-    assert ended.end_reason.item() == EndReason[expected]
+    assert ended.end_reason.item() == CubesEnd[expected]
 
 
 def test_lost_drone_ends_only_its_own_episode():
@@ -226,11 +226,11 @@ def test_lost_drone_ends_only_its_own_episode():
     body = Floating(FLIGHT, None).start(torch.zeros(2, 3).double())
     body.lost[1] = True
     ended, _ = CollectCubes(SETTINGS).step(state, body)
-    assert ended.end_reason.tolist() == [EndReason.ALL_CUBES, EndReason.LOST_CONTROL]
+    assert ended.end_reason.tolist() == [CubesEnd.ALL_CUBES, CubesEnd.LOST_CONTROL]
     state.collected[:] = False
     body.position[:, 1] = 1000.0
     ended, _ = CollectCubes(SETTINGS).step(state, body)
-    assert ended.end_reason.tolist() == [EndReason.SIDE_BOUNDARY, EndReason.LOST_CONTROL]
+    assert ended.end_reason.tolist() == [CubesEnd.SIDE_BOUNDARY, CubesEnd.LOST_CONTROL]
 
 
 def test_samples_follow_the_random_stream_in_order():
@@ -292,7 +292,7 @@ def test_drones_without_moves_up_and_down_are_refused_if_cubes_are_out_of_reach(
 
 @pytest.mark.parametrize(
     ("z", "end"),
-    [(17.6, EndReason.RUNNING), (17.7, EndReason.SIDE_BOUNDARY), (2.3, EndReason.SIDE_BOUNDARY)],
+    [(17.6, CubesEnd.RUNNING), (17.7, CubesEnd.SIDE_BOUNDARY), (2.3, CubesEnd.SIDE_BOUNDARY)],
 )
 def test_a_drone_too_high_or_low_is_out_of_bounds(z, end):
     state, _ = CollectCubes(TALL).step(at(0.0, 0.0, 0.0, settings=TALL), body(1.0, 0.0, z))
@@ -301,7 +301,7 @@ def test_a_drone_too_high_or_low_is_out_of_bounds(z, end):
 
 def test_height_is_unbounded_where_drones_need_not_climb():
     state, _ = CollectCubes(SETTINGS).step(at(0.0, 0.0, 0.0), body(1.0, 0.0, 500.0))
-    assert int(state.end_reason) == EndReason.RUNNING
+    assert int(state.end_reason) == CubesEnd.RUNNING
 
 
 @pytest.mark.parametrize(

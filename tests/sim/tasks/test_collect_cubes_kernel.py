@@ -10,7 +10,7 @@ from drone_rl.sim.dynamics import ComputerVision, Obstacles, Quadrotor
 from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.rendering.raytrace.structs_kernel import PoseArrays
 from drone_rl.sim.tasks import CollectCubes, Pillars
-from drone_rl.sim.tasks.collect_cubes import EndReason, Side
+from drone_rl.sim.tasks.collect_cubes import CubesEnd, Side
 from drone_rl.sim.tasks.collect_cubes_kernel import (
     EnvArrays,
     move,
@@ -37,10 +37,10 @@ def step(
 @pytest.mark.parametrize(
     ("settings", "ends"),
     [
-        ({}, {EndReason.FRONT_BOUNDARY}),
-        ({"num_cubes": 1, "lateral_bound": 2.0}, {EndReason.ALL_CUBES, EndReason.FRONT_BOUNDARY}),
-        ({"side_margin": 0.3, "vertical_bound": 1.2}, {EndReason.SIDE_BOUNDARY}),
-        ({"step_limit": 33, "step_length": 1.3}, {EndReason.STEP_LIMIT}),
+        ({}, {CubesEnd.FRONT_BOUNDARY}),
+        ({"num_cubes": 1, "lateral_bound": 2.0}, {CubesEnd.ALL_CUBES, CubesEnd.FRONT_BOUNDARY}),
+        ({"side_margin": 0.3, "vertical_bound": 1.2}, {CubesEnd.SIDE_BOUNDARY}),
+        ({"step_limit": 33, "step_length": 1.3}, {CubesEnd.STEP_LIMIT}),
     ],
 )
 def test_random_episodes_follow_the_reference_rules(settings, ends):
@@ -90,11 +90,11 @@ def reference_step(settings, state, body):
     x, y, _ = drone.unbind(-1)
     reason = (
         torch.zeros_like(state.steps)
-        .masked_fill(state.steps + 1 >= settings.step_limit, EndReason.STEP_LIMIT)
-        .masked_fill(y.abs() > settings.side_bound, EndReason.SIDE_BOUNDARY)
-        .masked_fill(x > settings.front_bound, EndReason.FRONT_BOUNDARY)
-        .masked_fill(collected.all(-1), EndReason.ALL_CUBES)
-        .masked_fill(body.is_lost, EndReason.LOST_CONTROL)
+        .masked_fill(state.steps + 1 >= settings.step_limit, CubesEnd.STEP_LIMIT)
+        .masked_fill(y.abs() > settings.side_bound, CubesEnd.SIDE_BOUNDARY)
+        .masked_fill(x > settings.front_bound, CubesEnd.FRONT_BOUNDARY)
+        .masked_fill(collected.all(-1), CubesEnd.ALL_CUBES)
+        .masked_fill(body.is_lost, CubesEnd.LOST_CONTROL)
     )
     new = {"collected": collected, "passed": passed, "side": side, "lateral": lateral}
     return {**new, "end_reason": reason}, touched.sum(-1, dtype=torch.float64)

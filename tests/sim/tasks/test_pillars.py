@@ -13,7 +13,7 @@ from drone_rl.config import DynamicsSettings, PillarsSettings
 from drone_rl.sim.actions import Move
 from drone_rl.sim.dynamics import BodyState, ComputerVision, Quadrotor
 from drone_rl.sim.tasks.common import Side
-from drone_rl.sim.tasks.pillars import EndReason, Pillars, RowGoals
+from drone_rl.sim.tasks.pillars import Pillars, PillarsEnd, RowGoals
 from drone_rl.sim.tasks.pillars_lanes import Lanes, meets
 from tests.fake_flight import FLIGHT, Floating
 
@@ -63,19 +63,19 @@ def test_pillars_are_in_rows(field):
 
 def test_reward_is_progress_as_a_fraction_of_the_path(settings, field):
     state, reward = fly(settings, field(FAR, FAR), (1, 0))
-    assert reward == 1 / 20 and state.end_reason == EndReason.RUNNING
+    assert reward == 1 / 20 and state.end_reason == PillarsEnd.RUNNING
     state, reward = fly(settings, field(FAR, FAR), (1, 0), (1, 1), (1, 0))
     assert reward == 1 / 20  # no reward for lateral motion
     path = [(x, 0) for x in range(1, 21)]
     state, reward = fly(settings, field(FAR, FAR), *path)
-    assert abs(reward - 1) < 1e-12 and state.end_reason == EndReason.FINISH_LINE
+    assert abs(reward - 1) < 1e-12 and state.end_reason == PillarsEnd.FINISH_LINE
     state, reward = fly(settings, field(FAR, FAR, x=19.5), (21.5, 0))
     assert abs(reward - 0.5 / 20) < 1e-12  # no reward beyond the finish line
 
 
 def test_touching_a_pillar_ends_the_episode_with_a_penalty(settings, field):
     state, reward = fly(settings, field((0.9, -6.0), FAR, x=7.0), (8.0, 0.0))
-    assert state.end_reason == EndReason.PILLAR_TOUCHED and reward == 1 / 20
+    assert state.end_reason == PillarsEnd.PILLAR_TOUCHED and reward == 1 / 20
     assert state.touched[0].tolist() == [True, False, False, False]
     penalized = settings.replace(collision_penalty=3.0)
     assert fly(penalized, field((0.9, -6.0), FAR, x=7.0), (8.0, 0.0))[1] == 1 / 20 - 3
@@ -118,32 +118,32 @@ def test_path_contact_equals_dense_sampling(path):
 
 def test_side_boundary_and_step_limit_end_the_episode(settings, field):
     state, _ = fly(settings, field(FAR, FAR, y=8.0), (0.0, 8.0))
-    assert state.end_reason == EndReason.RUNNING
+    assert state.end_reason == PillarsEnd.RUNNING
     state, _ = fly(settings, state, (0.0, 8.5))
-    assert state.end_reason == EndReason.SIDE_BOUNDARY
+    assert state.end_reason == PillarsEnd.SIDE_BOUNDARY
     short = settings.replace(step_limit=20)
     state = field(FAR, FAR)
     state, _ = fly(short, state, *[(0.0, 0.0)] * 19)
-    assert state.end_reason == EndReason.RUNNING
-    assert fly(short, state, (0.0, 0.0))[0].end_reason == EndReason.STEP_LIMIT
+    assert state.end_reason == PillarsEnd.RUNNING
+    assert fly(short, state, (0.0, 0.0))[0].end_reason == PillarsEnd.STEP_LIMIT
 
 
 def test_contact_precedes_finish_line_precedes_step_limit(settings, field):
     state, _ = fly(settings, field(FAR, (0.0, 6.0), x=14.0), (21.0, 0.0))
-    assert state.end_reason == EndReason.PILLAR_TOUCHED
+    assert state.end_reason == PillarsEnd.PILLAR_TOUCHED
     short = settings.replace(step_limit=20)
     state, _ = fly(short, field(FAR, FAR), *[(0.0, 0.0)] * 19, (20.0, 0.0))
-    assert state.end_reason == EndReason.FINISH_LINE
+    assert state.end_reason == PillarsEnd.FINISH_LINE
 
 
 def test_lost_control_precedes_contact(settings, field):
     state = field((0.0, -6.0), FAR, x=7.0)
     lost = Floating(FLIGHT, None).start(torch.tensor([[8.5, 0.0, 2.5]]).double())
     state, _ = Pillars(settings).step(state, lost)
-    assert state.end_reason == EndReason.PILLAR_TOUCHED
+    assert state.end_reason == PillarsEnd.PILLAR_TOUCHED
     lost.lost[:] = True
     state, _ = Pillars(settings).step(field((0.0, -6.0), FAR, x=7.0), lost)
-    assert state.end_reason == EndReason.LOST_CONTROL and state.touched.any()
+    assert state.end_reason == PillarsEnd.LOST_CONTROL and state.touched.any()
 
 
 def test_rows_are_passed_in_order(settings, field):
@@ -263,7 +263,7 @@ def test_a_pillar_that_a_drone_bounces_off_within_a_step_is_touched():
     after = quadrotor.step(flying, torch.tensor([0]), task.obstacles(state))
     assert float(after.position[0, 0]) < 8.1 and float(after.velocity[0, 0]) < 0
     state, reward = task.step(state, after)
-    assert state.end_reason == EndReason.PILLAR_TOUCHED
+    assert state.end_reason == PillarsEnd.PILLAR_TOUCHED
     assert state.touched[0].nonzero().tolist() == [[0]] and float(reward) < -0.49
 
 
@@ -322,7 +322,7 @@ def test_plan_crosses_every_field():
         now = state[on]
         move = LANES.fly_through(now.drone, now.rows, now.next_row[:, None])
         state[on] = Pillars(SETTINGS).step(now, dynamics.step(now.body, move))[0]
-    assert (state.end_reason == EndReason.FINISH_LINE).all()
+    assert (state.end_reason == PillarsEnd.FINISH_LINE).all()
 
 
 NARROW = PillarsSettings(spread=3.0, density=0.34, width=1.2)

@@ -9,7 +9,7 @@ import numpy as np
 import drone_rl
 from benchmarks.gamed_certificates import certificate_of, steps_of
 from drone_rl.policies.zoo import fingerprint
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.verification.checker.checker import Simulator
 
 BAND = 1e-5
@@ -65,7 +65,7 @@ def _as_outcomes(pieces, cuts):
             steps[number] = steps.get(number, 0.0) + inner
     outcomes = [
         {
-            "end": EndReason(end).name.lower(),
+            "end": CubesEnd(end).name.lower(),
             "collected": [collected],
             "loops": False,
             "share": _length(boxes) / whole,

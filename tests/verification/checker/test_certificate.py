@@ -9,7 +9,7 @@ import torch
 import drone_rl
 from drone_rl.config import AppearanceSettings
 from drone_rl.policies.zoo import fingerprint
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.checker import certificate as module
 from drone_rl.verification.checker.certificate import (
@@ -24,8 +24,8 @@ from tests.verification.checker.making import of_every_place
 def test_read_certificate(one_sided, write):
     found = read_certificate(write(one_sided))
     won, lost = found.outcomes
-    assert (won.end, won.collected, won.loops) == (EndReason.ALL_CUBES, (True,), False)
-    assert lost.end == EndReason.FRONT_BOUNDARY and set(lost.steps) == {27, 28, 29}
+    assert (won.end, won.collected, won.loops) == (CubesEnd.ALL_CUBES, (True,), False)
+    assert lost.end == CubesEnd.FRONT_BOUNDARY and set(lost.steps) == {27, 28, 29}
     assert won.share == pytest.approx(0.6375, abs=2e-6)
     assert won.boxes.shape == (1, 1, 2) and won.boxes.dtype == np.float64
     assert (found.name, found.task.lateral_bound, found.finished) == (

@@ -8,7 +8,7 @@ import torch
 
 import drone_rl
 from drone_rl.collectors.complete_episodes import run_episodes
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.verification.check import check
@@ -82,7 +82,7 @@ def test_a_certificate_without_statements_is_accepted(one_sided):
     assert found.accepted and sum(found.flights.values()) == 0
 
 
-LIMIT = EndReason.STEP_LIMIT
+LIMIT = CubesEnd.STEP_LIMIT
 
 
 @pytest.mark.parametrize(
@@ -94,8 +94,8 @@ LIMIT = EndReason.STEP_LIMIT
         (LIMIT, False, 200, False, {300: 0.5}, False),  # does
         (LIMIT, False, 2, False, {300: 0.5}, True),  # began with the end
         (LIMIT, True, 200, True, {300: 0.5}, False),
-        (EndReason.FRONT_BOUNDARY, False, 200, True, {300: 0.5}, False),
-        (EndReason.SIDE_BOUNDARY, False, 0, True, {300: 0.5}, False),
+        (CubesEnd.FRONT_BOUNDARY, False, 200, True, {300: 0.5}, False),
+        (CubesEnd.SIDE_BOUNDARY, False, 0, True, {300: 0.5}, False),
         (LIMIT, False, 200, True, {299: 0.5}, False),
         (LIMIT, False, 200, True, {299: 0.4}, True),  # of the others the steps are not certain
     ],
@@ -133,7 +133,7 @@ def test_simulator_matches_evaluation(make):
 
 def test_touch_distance(make):
     flown = make("right_and_forward", num_cubes=1).fly(np.array([[1.64], [1.66]]))
-    assert flown.end.tolist() == [EndReason.ALL_CUBES, EndReason.FRONT_BOUNDARY]
+    assert flown.end.tolist() == [CubesEnd.ALL_CUBES, CubesEnd.FRONT_BOUNDARY]
     assert flown.collected.tolist() == [[True], [False]]
 
 
@@ -153,8 +153,8 @@ class Scripted(torch.nn.Module):
 @pytest.mark.parametrize(
     ("actions", "end", "steps", "repeats"),
     [
-        (itertools.cycle([1, 2]), EndReason.STEP_LIMIT, 40, 39),
-        (itertools.chain([1, 2] * 3, itertools.repeat(0)), EndReason.ALL_CUBES, 20, 0),
+        (itertools.cycle([1, 2]), CubesEnd.STEP_LIMIT, 40, 39),
+        (itertools.chain([1, 2] * 3, itertools.repeat(0)), CubesEnd.ALL_CUBES, 20, 0),
     ],
     ids=["oscillates", "moves on"],
 )

@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.verification.checker.certificate import Outcome, parse_certificate
 from drone_rl.verification.checker.consistency import (
     find_inconsistencies,
@@ -173,7 +173,7 @@ STEPS = np.repeat([10, 11, 0], [600, 200, 200])
 
 def wrong(steps, share=0.8):
     nowhere = np.zeros((0, 1, 2))
-    outcome = Outcome(EndReason.ALL_CUBES, (True,), False, share, steps, nowhere)
+    outcome = Outcome(CubesEnd.ALL_CUBES, (True,), False, share, steps, nowhere)
     return list(find_wrong_step_counts([outcome], OWNER, STEPS))
 
 
@@ -201,7 +201,7 @@ def test_missing_step_counts_may_be_any():
 def test_unstated_step_counts_are_counted_together():
     """Each of them is too seldom to refute anything: 40 flights of 1000, all different."""
     nowhere = np.zeros((0, 1, 2))
-    outcome = Outcome(EndReason.ALL_CUBES, (True,), False, 1.0, {10: 1.0 - 1e-6}, nowhere)
+    outcome = Outcome(CubesEnd.ALL_CUBES, (True,), False, 1.0, {10: 1.0 - 1e-6}, nowhere)
     steps = np.concatenate([np.full(960, 10), np.arange(20, 60)])
     *_, line = find_wrong_step_counts([outcome], np.zeros(1000, int), steps)
     assert "other numbers of steps than those stated" in line and "40 of 1000" in line

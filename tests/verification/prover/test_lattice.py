@@ -10,7 +10,7 @@ import torch
 from drone_rl.config import TaskSettings
 from drone_rl.sim.dynamics import ComputerVision
 from drone_rl.sim.tasks import CollectCubes
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.boxes import all_placements
 from drone_rl.verification.prover.lattice import (
@@ -57,13 +57,13 @@ def test_touch_borders_are_exact():
     ("place", "reason"),
     [
         (LatticeState(3, 0), None),
-        (LatticeState(36, 0), EndReason.FRONT_BOUNDARY),  # the front boundary is at 35
+        (LatticeState(36, 0), CubesEnd.FRONT_BOUNDARY),  # the front boundary is at 35
         (LatticeState(35, 0), None),
-        (LatticeState(3, 27), EndReason.SIDE_BOUNDARY),
+        (LatticeState(3, 27), CubesEnd.SIDE_BOUNDARY),
         (LatticeState(3, -26), None),
-        (LatticeState(3, 0, 0, 60), EndReason.STEP_LIMIT),
-        (LatticeState(36, 27, 0, 60), EndReason.FRONT_BOUNDARY),
-        (LatticeState(36, 27, 0b11, 60), EndReason.ALL_CUBES),
+        (LatticeState(3, 0, 0, 60), CubesEnd.STEP_LIMIT),
+        (LatticeState(36, 27, 0, 60), CubesEnd.FRONT_BOUNDARY),
+        (LatticeState(36, 27, 0b11, 60), CubesEnd.ALL_CUBES),
     ],
 )
 def test_order_of_endings(place, reason):

@@ -14,7 +14,7 @@ from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.config import TaskSettings
 from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import parse, policy_path, read_policy
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.trust.metrics import summarise
 from drone_rl.utils.progress import silent
 from drone_rl.verification.prover import markov_chain
@@ -42,7 +42,7 @@ def test_random_walk_by_hand(small, place):
     """s0 = 1/3 + 2/3 s1 and s1 = 1/3 + 1/3 s0; e0 = 1 + 2/3 e1 and e1 = 1 + 1/3 e0."""
     done = constant(small, place(small, [0.0]), 1 / 3, 1 / 3, 1 / 3)
     assert float(done.success[0]) == pytest.approx(5 / 7, abs=1e-14)
-    assert float(done.reasons[0, EndReason.SIDE_BOUNDARY]) == pytest.approx(2 / 7, abs=1e-14)
+    assert float(done.reasons[0, CubesEnd.SIDE_BOUNDARY]) == pytest.approx(2 / 7, abs=1e-14)
     assert float(done.steps[0]) == pytest.approx(15 / 7, abs=1e-13)
     assert 0 < float(done.undecided[0]) < NEGLIGIBLE
 
@@ -99,7 +99,7 @@ def test_one_cube_against_a_second_program(place, probs):
     settings = TaskSettings(num_cubes=1, side_margin=3.0, step_limit=60)
     ends, steps = walked(settings, 2.3, probs)
     done = constant(settings, place(settings, [2.3]), *probs)
-    for reason in list(EndReason)[1:]:
+    for reason in list(CubesEnd)[1:]:
         found = float(done.reasons[0, reason])
         assert found == pytest.approx(ends[reason.name.lower()], abs=1e-14), reason
     assert float(done.steps[0]) == pytest.approx(steps, abs=1e-11)
@@ -143,7 +143,7 @@ def test_sampled_episodes_agree(place, monkeypatch):
     sigma = math.sqrt(share * (1 - share) / flights)
     assert abs(summarise(flown)["success"]["share"] - share) < 5 * sigma
     assert float(flown.length.double().mean()) == pytest.approx(float(done.steps[0]), rel=0.05)
-    for reason in EndReason:
+    for reason in CubesEnd:
         p = float(done.reasons[0, reason])
         found = float((flown.end_reason == reason).double().mean())
         assert abs(found - p) <= 5 * math.sqrt(p * (1 - p) / flights) + 1e-9, reason

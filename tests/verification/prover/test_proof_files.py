@@ -9,7 +9,7 @@ import torch
 
 import drone_rl
 from drone_rl.policies.zoo import fingerprint
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
 from drone_rl.verification.prover.boxes import volumes
@@ -110,7 +110,7 @@ def test_fractions_are_at_most_one():
     boxes = np.stack([ends[:-1], ends[1:]], -1)[:, None]
     volume = float(volumes(boxes).sum())
     assert volume > 12
-    ending = Ending(EndReason.FRONT_BOUNDARY, 0)
+    ending = Ending(CubesEnd.FRONT_BOUNDARY, 0)
     found = ProofFindings({ending: boxes}, boxes[:0], {ending: {26: volume}})
     with closing(make_policy_spec(policy.description, policy.make_network(), 1e-4)) as spec:
         prover = Prover(spec)

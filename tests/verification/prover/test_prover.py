@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import drone_rl
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.verification.prover import prover as module
 from drone_rl.verification.prover.boxes import volumes
 from drone_rl.verification.prover.lattice import LatticeState
@@ -93,7 +93,7 @@ def test_cuts_lose_no_part_of_a_box(make_prover):
 def test_step_counts(one_sided):
     """At y=0 it takes 14 steps ahead and none to the side."""
     steps = one_sided.findings().steps
-    (won,) = [e for e in steps if e.reason is EndReason.ALL_CUBES]
+    (won,) = [e for e in steps if e.reason is CubesEnd.ALL_CUBES]
     assert min(steps[won]) == 14
     assert sum(steps[won].values()) <= (6 + 1.65) + 1e-9
 
@@ -134,7 +134,7 @@ def test_oscillations_end_at_the_step_limit(make_prover, monkeypatch):
         prover, "_cut", lambda place, boxes: [(2 if place.left % 2 == 0 else 4, boxes)]
     )
     (ending,) = finish(prover).findings().endings
-    assert ending.loops and ending.reason is EndReason.STEP_LIMIT and ending.collected == 0
+    assert ending.loops and ending.reason is CubesEnd.STEP_LIMIT and ending.collected == 0
 
 
 def test_forks_are_decided_only_if_all_branches_end_alike(make_prover, monkeypatch):
