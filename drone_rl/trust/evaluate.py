@@ -21,14 +21,14 @@ from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.tasks import as_task
 from drone_rl.trust.baselines import run_baselines
 from drone_rl.trust.metrics import summarise
-from drone_rl.trust.rounding_sensitivity import run_compared
+from drone_rl.trust.rounding_sensitivity import require_function
 from drone_rl.trust.verdict_text import unlike as unlike_text
 from drone_rl.utils.display import Result, aligned, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.text import Evidence, Sentence, fixed_seed, interval, percent, say, seed_line
+from drone_rl.utils.text import fixed_seed, interval, percent, say, seed_line
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,9 +41,6 @@ class Evaluation(Result):
     """Figures of "greedy", "sampled" and the baselines; see `drone_rl.trust.metrics.summarise`."""
     seed: RootSeed
     """Root of the environments' random streams."""
-    rounding: dict[str, Any] | None = None
-    """The implementation that computed the actions, and the comparison with another one; see
-    `drone_rl.trust.rounding_sensitivity.Rounding`."""
 
     @property
     def success(self) -> float:
@@ -88,7 +85,6 @@ class Evaluation(Result):
             **self.seed.as_dict(),
             **({"unlike": self.policy.unlike} if self.policy.unlike else {}),
             **self.figures,
-            "rounding": self.rounding,
             **provenance(),
             "trained": origin["trained"] and origin["trained"]["progress"],
         }
@@ -102,10 +98,12 @@ class Evaluation(Result):
         return table(head, rows, self._notes())
 
     def _notes(self) -> list[str]:
-        """Return notes on the arithmetic, the seed and what differs from the training."""
+        """Return notes on the seed and what differs from the training."""
         unlike, seed = self.policy.unlike, self.seed.as_dict()
-        evidence = {**seed, "rounding": self.rounding}
-        notes = [say(EVALUATION, evidence), unlike_text({"unlike": unlike}) if unlike else ""]
+        notes = [
+            say((fixed_seed("evaluation.fixed_seed"),), seed),
+            unlike_text({"unlike": unlike}) if unlike else "",
+        ]
         return [*filter(None, notes), seed_line(seed)]
 
 
@@ -141,13 +139,15 @@ def evaluate(
     policy = as_policy(policy, outputs, task=task, dynamics=dynamics, appearance=appearance)
     if settings.baselines and (judged := as_task(policy.task)).oracle is None:
         raise InputError(f"task={judged.name} has no oracle to compare with; give baselines=false")
+    where: dict[str, Any] = {"device": settings.device, "renderer": settings.renderer}
+    require_function(policy, seed=seed.value, **where)
     episodes, steps = settings.episodes, 3 if settings.baselines else 2
     with held_out_environments(policy, settings, seed) as (env, actor):
         state, flown = env.base_env.state_dict(), worlds_of(env).dynamics
         if settings.baselines:
             check_baselines(as_task(policy.task), flown.actions)
         progress("most probable actions", 0, steps)
-        greedy, rounding = run_compared(env, actor, episodes)
+        greedy = run_episodes(env, actor, episodes)
         env.base_env.load_state_dict(state)
         progress("sampled actions", 1, steps)
         rollouts = {"greedy": greedy, "sampled": run_episodes(env, actor, episodes, greedy=False)}
@@ -157,7 +157,7 @@ def evaluate(
         rollouts |= run_baselines(num_envs, policy.task, state, episodes, device, flown)
     progress("evaluated", steps, steps)
     figures = {name: summarise(e) for name, e in rollouts.items()}
-    return Evaluation(policy, settings, figures, seed, rounding and rounding.as_dict())
+    return Evaluation(policy, settings, figures, seed)
 
 
 def held_out_environments(
@@ -166,66 +166,3 @@ def held_out_environments(
     """Return a context manager of environments that no training uses, and the policy's actor."""
     where: dict[str, Any] = {"device": settings.device, "renderer": settings.renderer}
     return policy.flying(settings.batch_size, seed=seed.value, **where)
-
-
-def _same(evidence: Evidence) -> str:
-    check = evidence["rounding"]
-    what = "All actions" if check.get("bound", True) else "The outcomes"
-    return (
-        f"{what} of the first {check['compared_episodes']:,} greedy episodes were the same "
-        f"when computed again ({check['compared']})."
-    )
-
-
-def _other(evidence: Evidence) -> str:
-    check = evidence["rounding"]
-    what = "Actions" if check.get("bound", True) else "Actions or outcomes"
-    return (
-        f"{what} differed in {check['differing']:,} of the first {check['compared_episodes']:,} "
-        f"greedy episodes when computed again ({check['compared']}): decisions depend on rounding."
-    )
-
-
-def _fragile(evidence: Evidence) -> str:
-    check = evidence["rounding"]
-    return (
-        f"These figures hold for this arithmetic only: in {check['fragile']:,} of "
-        f"{check['frames']:,} of these episodes' frames ({percent(check['fragile_rate'])}) the "
-        "order in which float32 sums are computed can change the action."
-    )
-
-
-EVALUATION = (
-    fixed_seed("evaluation.fixed_seed"),
-    Sentence(
-        "computed",
-        "the implementation that computed the actions is known",
-        lambda e: bool(e.get("rounding")),
-        lambda e: f"Computed in {e['rounding']['arithmetic']}.",
-    ),
-    Sentence(
-        "computed.same",
-        "another implementation took the same actions or, without a bound, had the same outcomes",
-        lambda e: bool(e.get("rounding")) and not e["rounding"]["differing"],
-        _same,
-    ),
-    Sentence(
-        "computed.other",
-        "another implementation took other actions or, without a bound, had other outcomes",
-        lambda e: bool(e.get("rounding")) and e["rounding"]["differing"] > 0,
-        _other,
-    ),
-    Sentence(
-        "computed.fragile",
-        "rounding can change the action in more frames or episodes than a verdict allows",
-        lambda e: bool(
-            (found := e.get("rounding"))
-            and (
-                found["fragile_rate"] > found["threshold"]
-                or found["fragile_episodes_rate"] > found["threshold_episodes"]
-            )
-        ),
-        _fragile,
-    ),
-)
-"""Sentences about an evaluation's seed and arithmetic. Evidence: `evaluation.json`."""

@@ -107,19 +107,6 @@ class Rounding:
         }
 
 
-def run_compared(
-    env: EnvBase, actor: TensorDictModuleBase, num_episodes: int
-) -> tuple[CompleteEpisodes, Rounding | None]:
-    """Run greedy episodes in PyTorch, and the first ones again by another implementation.
-
-    Return the episodes and what `check_rounding` returns; see there for errors.
-    """
-    state, log = base_env(env).state_dict(), StepLog()
-    greedy = run_episodes(env, actor, num_episodes, log=log)
-    base_env(env).load_state_dict(state)
-    return greedy, check_rounding(env, actor, COMPARED, greedy=greedy, log=log, is_compiled=False)
-
-
 def require_function(
     policy: BasePolicy, *, seed: int, device: str = "cpu", renderer: str = "raytrace"
 ) -> None:
@@ -134,7 +121,10 @@ def require_function(
     if isinstance(policy, ExternalPolicy):
         options: dict[str, Any] = {"seed": seed, "device": device, "renderer": renderer}
         with policy.flying(_CHECKED_EPISODES, **options) as (env, actor):
-            run_compared(env, actor, _CHECKED_EPISODES)
+            state, log = base_env(env).state_dict(), StepLog()
+            greedy = run_episodes(env, actor, _CHECKED_EPISODES, log=log)
+            base_env(env).load_state_dict(state)
+            check_rounding(env, actor, COMPARED, greedy=greedy, log=log)
 
 
 def check_rounding(
@@ -144,13 +134,12 @@ def check_rounding(
     *,
     greedy: CompleteEpisodes,
     log: StepLog,
-    is_compiled: bool = True,
 ) -> Rounding | None:
     """Run the first episodes again, with a bound on the rounding error at every frame.
 
     They are compared with greedy episodes and their actions, `greedy` and `log`, which started from
     the present state of the environments. If the fused kernel ran those, PyTorch runs them again;
-    otherwise the fused kernel, or PyTorch with the frames in other batches.
+    otherwise PyTorch with the frames in other batches.
 
     Args:
         env: The environments.
@@ -158,7 +147,6 @@ def check_rounding(
         episodes: How many at most.
         greedy: Greedy episodes of the policy.
         log: Their actions.
-        is_compiled: Whether the fused kernel ran them if it supports the policy.
 
     Returns:
         None for an actor without a network that depends on single images only.
@@ -176,12 +164,9 @@ def check_rounding(
     count = episodes
     if log.implementation == "PyTorch":
         count = min(COMPARED, episodes)
-        if not is_compiled:
-            ends, again = _run_again(env, actor, count, state, is_compiled=True)
-        if is_compiled or again.implementation == "PyTorch":
-            mixed = make_actor(Regrouped(network, "mixed"), env.action_spec)
-            ends, again = _run_again(env, mixed, count, state)
-            again.implementation = "PyTorch, in other batches"
+        mixed = make_actor(Regrouped(network, "mixed"), env.action_spec)
+        ends, again = _run_again(env, mixed, count, state)
+        again.implementation = "PyTorch, in other batches"
     if by_action := _is_compared_by_action(env, network):
         pairs = zip(log.actions[:count], again.actions[:count], strict=True)
         steps = [_first_difference(one, other) for one, other in pairs]
@@ -219,17 +204,12 @@ def _run_checked(
 
 
 def _run_again(
-    env: EnvBase,
-    actor: TensorDictModuleBase,
-    episodes: int,
-    state: dict[str, Any],
-    *,
-    is_compiled: bool = False,
+    env: EnvBase, actor: TensorDictModuleBase, episodes: int, state: dict[str, Any]
 ) -> tuple[CompleteEpisodes, StepLog]:
     """Run episodes from this state of the environments."""
     base_env(env).load_state_dict(state)
     log = StepLog()
-    return run_episodes(env, actor, episodes, is_compiled=is_compiled, is_exact=True, log=log), log
+    return run_episodes(env, actor, episodes, is_exact=True, log=log), log
 
 
 def _is_compared_by_action(env: EnvBase, network: ImageNetwork) -> bool:

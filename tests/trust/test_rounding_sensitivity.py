@@ -23,13 +23,12 @@ from drone_rl.utils.errors import InputError
 EPISODES = 20
 
 
-def examined(policy, is_compiled=True):
+def examined(policy):
     with policy.flying(EPISODES, seed=1) as (env, actor):
         state, log = env.base_env.state_dict(), StepLog()
-        flown = run_episodes(env, actor, EPISODES, is_compiled=is_compiled, log=log)
+        flown = run_episodes(env, actor, EPISODES, is_compiled=True, log=log)
         env.base_env.load_state_dict(state)
-        how = {"greedy": flown, "log": log, "is_compiled": is_compiled}
-        return check_rounding(env, actor, EPISODES, **how), flown, log
+        return check_rounding(env, actor, EPISODES, greedy=flown, log=log), flown, log
 
 
 def with_unit(by_unit):
@@ -66,14 +65,6 @@ def test_a_policy_that_acts_by_the_order_of_sums_is_found():
     assert found.unexplained == 0  # the bound knows
 
 
-def test_evaluations_compare_with_the_fused_kernel():
-    found, _, log = examined(drone_rl.load_policy("good"), is_compiled=False)
-    assert (log.implementation, found.compared) == ("PyTorch", "fused kernel")
-    assert found.differing == 0
-    found, _, _ = examined(with_unit(1000.0), is_compiled=False)
-    assert (found.differing, found.unexplained) == (EPISODES, 0)
-
-
 @pytest.mark.parametrize("kind", ["alone", "first", "calls"])
 def test_callables_that_act_by_more_than_the_frame_are_refused(kind):
     calls = 0
@@ -91,11 +82,11 @@ def test_callables_that_act_by_more_than_the_frame_are_refused(kind):
     policy = policy_from(lambda x: x[:, 0, 10:13, 5], name="logits")
     policy = dataclasses.replace(policy, logits=logits)  # `policy_from` would refuse some
     with pytest.raises(InputError, match=r"policy=logits depends on more than the frame"):
-        examined(policy, is_compiled=False)
+        examined(policy)
 
 
 def test_a_callable_that_acts_by_the_frame_passes():
-    found, _, _ = examined(policy_from(lambda x: x[:, 0, 10:13, 5] * 100), is_compiled=False)
+    found, _, _ = examined(policy_from(lambda x: x[:, 0, 10:13, 5] * 100))
     assert not found.is_bound
     assert found.unexplained == 0
 
