@@ -1,11 +1,9 @@
-"""Drift from MuJoCo, paths, hovering in wind, and the speed of vehicle dynamics."""
+"""Drift from MuJoCo, paths, and hovering in wind."""
 
 import math
 
 import pytest
-import torch
 
-from benchmarks import flight_speed
 from benchmarks.flight_parity import measure_parity
 from benchmarks.flight_paths import bench_flight_paths, hover_error
 from drone_rl.config import DynamicsSettings
@@ -35,12 +33,3 @@ def test_the_hover_error_follows_from_the_lean_angle():
     lean = 0.00538 * 1.225 * 25.0 / 9.81
     metres = lean / (0.2 * math.pi / 5.5) / (0.25 * 6.0)
     assert error.mean == pytest.approx(metres, rel=0.05)
-
-
-def test_a_fleet_takes_random_moves():
-    fleet = flight_speed.Fleet(4)
-    assert flight_speed._fly(fleet) == 64 * 4
-    assert fleet.body.ticks.tolist() == [64 * flight_speed.FLYING.control_ticks] * 4
-    assert (fleet.body.position[:, :2].norm(dim=-1) > 1.0).all()
-    assert torch.isfinite(fleet.body.numbers).all()
-    assert flight_speed._mujoco_warp_step(3)() == 3

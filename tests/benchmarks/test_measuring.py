@@ -7,13 +7,12 @@ import pytest
 import torch
 import yaml
 
-from benchmarks import memory, pipeline, revisions, scaling, speed, startup, sweeps, training
+from benchmarks import pipeline, revisions, scaling, speed, startup, sweeps, training
 from benchmarks.memory import growth
 from benchmarks.pipeline import make_drone_env, paired, random_walk, rate
 from drone_rl.config import AppearanceSettings
 from drone_rl.config.configuration import from_config
 from drone_rl.utils.settings import conf_dir
-from tests.forked import run_module_forked
 
 
 @pytest.fixture
@@ -56,13 +55,6 @@ def test_memory_growth_ignores_samples_before_settling():
     samples = [(0, 300.0), (50, 500.0), (100, 600.0), (10_100, 601.0), (20_100, 602.0)]
     assert growth(samples, 100) == pytest.approx(100.0)
     assert growth(samples[:4], 100) is None
-
-
-def test_the_memory_of_a_training_is_recorded(setup, monkeypatch):
-    monkeypatch.setattr(memory.subprocess, "run", run_module_forked)
-    figures = memory.bench_memory(setup)
-    assert 200 < figures["peak_memory_mib"] < 4096
-    assert isinstance(figures["memory_growth_mib_per_million_frames"], float)
 
 
 def test_r_squared_is_one_for_a_straight_line_only():

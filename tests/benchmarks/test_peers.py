@@ -55,22 +55,6 @@ def test_our_training_is_measured(tmp_path, forked):
     assert 0 < measured["seconds_without_imports"] < measured["seconds"]
 
 
-@pytest.mark.parametrize(
-    ("name", "settings"),
-    [
-        ("torchrl", {"num_envs": 2, "steps": 160}),
-        ("sb3_ppo", {"num_envs": 4, "n_steps": 8, "batch_size": 8, "n_epochs": 1}),
-        ("sb3_a2c", {"num_envs": 4}),
-    ],
-)
-def test_a_training_of_another_library_is_measured(forked, name, settings):
-    if name != "torchrl":
-        pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
-    measured = train_theirs(name, settings, seed=1, episodes=2, max_frames=1)
-    assert measured.keys() == KEYS and measured["frames"] > 0 and not measured["is_solved"]
-    assert all(0 < at <= measured["seconds"] for at, _ in measured["curve"])
-
-
 def test_a_failed_training_is_an_error(forked):
     with pytest.raises(RuntimeError, match="no_such failed"):
         train_theirs("no_such", {}, seed=0, episodes=1, max_frames=1)
