@@ -56,21 +56,6 @@ def run_forked(code, *args, cwd, stdout=None, environment=None):
     return subprocess.CompletedProcess(args, status, printed.get("stdout"), printed["stderr"])
 
 
-_run = subprocess.run
-
-
-def run_module_forked(command, *, check=False, env=None, **options):
-    """Stand in for `subprocess.run`: fork for `python -m MODULE ARGUMENT ...` in this folder."""
-    if command[1] != "-m":  # a program that a library asks about the machine, such as uname
-        return _run(command, check=check, env=env, **options)
-    _, _, module, *args = command
-    code = f"import runpy; runpy.run_module({module!r}, run_name='__main__', alter_sys=True)"
-    done = run_forked(code, *args, cwd=os.getcwd(), environment=env)
-    if check and done.returncode:
-        raise subprocess.CalledProcessError(done.returncode, command, done.stdout, done.stderr)
-    return done
-
-
 def _read(printed, name, reader):
     with open(reader) as stream:
         printed[name] = stream.read()

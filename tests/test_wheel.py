@@ -28,11 +28,7 @@ def test_wheel_contains_the_configuration_and_runs_without_the_checkout(tmp_path
     code += "from drone_rl.utils.settings import conf_dir; "
     code += "import hydra_plugins.drone_rl as plugins; assert 'site/' in plugins.__file__; "
     code += "assert str(conf_dir()).endswith('site/drone_rl/conf'), conf_dir(); main()"
-    for words, status, text in (
-        (["train", "--help", "all"], 0, "task.num_cubes=3"),
-        (["train", "-m", "seed=range(0)"], 2, "a sweep of no runs"),  # by a sweeper of the wheel
-    ):
-        command = [sys.executable, "-c", code, *words]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-        assert done.returncode == status, done.stderr
-        assert text in done.stdout + done.stderr
+    command = [sys.executable, "-c", code, "train", "-m", "seed=range(0)"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2, done.stderr
+    assert "a sweep of no runs" in done.stderr  # by a sweeper of the wheel

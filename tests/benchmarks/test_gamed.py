@@ -1,26 +1,12 @@
 """Policies that deceive an analysis with a known seed, rounding or forged files do not succeed."""
 
 import functools
-import json
 
 import pytest
 
 import drone_rl
 from benchmarks import gamed, gamed_certificates, gamed_memory, gamed_rounding
-from drone_rl.policies.zoo import certificate_path
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.progress import silent
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _few_episodes():
-    """Take fewer episodes, with which honest policies are accepted."""
-    with pytest.MonkeyPatch.context() as patch:
-        judge = functools.partial(
-            drone_rl.judge, episodes=150, certificate_flights=400, domain_flights=30
-        )
-        patch.setattr(gamed_certificates, "judge", judge)
-        yield
 
 
 def test_a_policy_that_depends_on_the_batch_is_not_good(tmp_path):
@@ -39,16 +25,10 @@ def test_non_finite_logits_are_an_error(tmp_path):
         "flying straight in a trivial task",
     ],
 )
-def test_forged_files_and_trivial_tasks_are_not_good(name, tmp_path):
+def test_forged_files_and_trivial_tasks_are_not_good(name, tmp_path, monkeypatch):
+    few = functools.partial(drone_rl.judge, episodes=50, certificate_flights=100)
+    monkeypatch.setattr(gamed_certificates, "judge", few)
     assert not gamed_certificates.cases(tmp_path)[name]()
-
-
-def test_honest_policies_are_proved(tmp_path):
-    policy = gamed_certificates._copy_shipped("proved", tmp_path)
-    certificate = gamed_certificates._honest_certificate()
-    certificate_path(policy.path).write_text(json.dumps(certificate))
-    judged = gamed_certificates.judge(policy, sampled=False, progress=silent)
-    assert judged.status("proved") == 0
 
 
 def test_deceived_analyses_are_counted(setup, monkeypatch):

@@ -6,7 +6,7 @@ import re
 import pytest
 
 from benchmarks.benchmark import Benchmark
-from benchmarks.commands import call, train
+from benchmarks.commands import train
 from benchmarks.ledger import Ledger, describe_machine, digest_code, make_origin
 from benchmarks.registry import BENCHMARKS, GROUPS, find_benchmarks
 from benchmarks.run import run_benchmarks
@@ -124,4 +124,3 @@ def test_the_digest_depends_on_the_measured_code_only(tmp_path, path, counts):
 def test_a_command_fails_with_the_end_of_its_errors(tmp_path):
     with pytest.raises(RuntimeError, match=r"drone-rl train task.* failed: .*num_cubs"):
         train(tmp_path, "task.num_cubs=3")
-    call("train", "task.num_cubs=3", statuses=(1, 2))

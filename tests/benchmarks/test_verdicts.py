@@ -15,26 +15,14 @@ from drone_rl.utils.seeding import RootSeed, Stream
 
 EPISODES = 400
 KINDS = {
-    "good": ["all cubes", "all cubes, slowly", "loses one episode in 50", "all of five cubes"],
-    "poor": [
-        "first cube only, then leaves", "turns the wrong way", "finds one cube of ten beside it",
-        "straight on in a narrow field", "straight on among large cubes",
-    ],
-    "one-sided (right)": ["blind on its left", "finds one cube of ten on its left"],
+    "good": ["all cubes", "loses one episode in 50"],
+    "poor": ["turns the wrong way", "straight on in a narrow field"],
+    "one-sided (right)": ["blind on its left"],
     "one-sided (left)": ["blind on its right"],
-    "good, but trivial": [
-        "all cubes where none stand aside", "straight on where none stand aside",
-    ],
-    "none of these": [
-        "first cube only, then straight on", "dithers at the third cube", "dodges cubes ahead",
-        "sees 4 m sideways", "blind to higher cubes", "half blind on its right",
-        "finds one cube of three beside it", "asleep at the fifth cube",
-    ],
-    "not certain": [
-        "loses one episode in 13", "all or nothing, nine in ten", "no time for all cubes",
-        "leaves at once, every other time", "finds three cubes of ten on its left",
-    ],
-}  # fmt: skip
+    "good, but trivial": ["straight on where none stand aside"],
+    "none of these": ["dithers at the third cube", "sees 4 m sideways"],
+    "not certain": ["all or nothing, nine in ten"],
+}
 PHRASES = {
     "dithers at the third cube": "third cube: in all 400 episodes; 100% of all end at the step",
     "sees 4 m sideways": "with cubes 4 to 6 m to its side: in all 221 episodes",

@@ -13,7 +13,6 @@ from tests.verification.checker.making import of_every_place
     ("policy", "status", "verdict"),
     [
         ("oracle", 0, "good"),
-        ("random", 10, "poor"),
         ("forward", 10, "poor"),
         ("right_and_forward", 11, "one-sided (right)"),
     ],
@@ -56,10 +55,6 @@ def test_a_proof_can_be_required(in_process, tmp_path, good, undecided, status, 
             *ONE, "certificate=c.json", "require=proved", "certificate_flights=0"
         )
         assert unchecked.returncode == 16 and "not re-checked" in unchecked.stdout
-        few = in_process(*ONE, "certificate=c.json", "require=proved", "certificate_flights=100")
-        assert few.returncode == 16 and "too much for a proof" in few.stdout
-        by_kind = in_process(*ONE, "certificate=c.json", "certificate_flights=100")
-        assert by_kind.returncode == 13  # ten flights are too few to be certain of a kind
 
 
 @pytest.mark.parametrize(
@@ -96,12 +91,8 @@ def test_an_operating_domain_can_be_required(in_process, tmp_path, good, needed,
     kept = json.loads((tmp_path / "v" / "verdict.json").read_text())
     assert bool(kept["required_domain"]["lacking"]) == (status == 17)
     if status == 0:
-        both = in_process(*many, "episodes=10", "require=proved")
-        assert both.returncode == 16
         unchecked = in_process(*many, "episodes=10", "domain_flights=0")
         assert unchecked.returncode == 17 and "no episodes re-checked it" in unchecked.stdout
-        few = in_process(*many, "episodes=10")
-        assert few.returncode == 13  # covered, but not certainly good where nothing is different
 
 
 def test_a_verdict_under_another_appearance_says_so(in_process, tmp_path):

@@ -1,45 +1,30 @@
-"""`drone-rl fly` until Ctrl-C, and its refusals."""
+"""`drone-rl fly` until Ctrl-C."""
 
 import re
 import signal
-import subprocess
-import sys
 import urllib.request
 
 import pytest
 
+from tests.cli.running import error_line, server
+
 pytest.importorskip("uvicorn")
 
 
-def start(tmp_path, *args):
-    command = [sys.executable, "-m", "drone_rl.cli.main", "fly", f"hydra.run.dir={tmp_path}/run"]
-    settings = [f"paths.outputs={tmp_path}", "saliency=false", "browser=false"]
-    return subprocess.Popen(
-        [*command, *settings, *args], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-
-
 def test_it_prints_the_url_and_ends_by_ctrl_c(tmp_path):
-    process = start(tmp_path, "policy=poor", "view=chase", "task.num_cubes=2")
-    line = process.stdout.readline()
-    assert line, process.stderr.read()
-    url = re.fullmatch(r"open (http://127\.0\.0\.1:\d+/[\w-]{32}/)\n", line)[1]
-    with urllib.request.urlopen(url, timeout=20) as answer:
-        assert answer.status == 200
-    process.send_signal(signal.SIGINT)
-    assert process.wait(30) == 0, process.stderr.read()
-    assert "Traceback" not in process.stderr.read()
+    settings = ["policy=poor", "view=chase", "task.num_cubes=2", "saliency=false", "browser=false"]
+    with server("fly", *settings, cwd=tmp_path) as process:
+        line = process.stdout.readline()
+        assert line, process.stderr.read()
+        url = re.fullmatch(r"open (http://127\.0\.0\.1:\d+/[\w-]{32}/)\n", line)[1]
+        with urllib.request.urlopen(url, timeout=120) as answer:
+            assert answer.status == 200
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    assert "Traceback" not in errors
 
 
-@pytest.mark.parametrize(
-    ("args", "message"),
-    [
-        (("policy=none",), "policy=none does not exist"),
-        (("dynamics.wind=[5,0,0]",), "moves nothing in computer-vision mode"),
-    ],
-)
-def test_wrong_settings_are_one_line(tmp_path, args, message):
-    process = start(tmp_path, *args)
-    _, errors = process.communicate(timeout=60)
-    assert process.returncode == 2
-    assert message in errors and "Traceback" not in errors
+def test_wrong_settings_are_one_line(in_process):
+    line = error_line(in_process("fly", "policy=none"))
+    assert "policy=none does not exist" in line

@@ -1,4 +1,4 @@
-"""A sweep that is killed and resumed, with one run that fails; sweeps on clusters."""
+"""A sweep that is killed and resumed, with one run that fails."""
 
 import json
 import os
@@ -11,14 +11,13 @@ import pytest
 import torch
 
 from drone_rl.utils.checkpoint import load_checkpoint
-from tests.cli.running import drone_rl
+from tests.cli.running import run_main
 
 pytestmark = pytest.mark.slow
 
-PROGRAM = [sys.executable, "-m", "drone_rl.cli.main"]
 TINY = ["experiment=smoke", "logger=csv", "collector.num_envs=4", "trainer.total_frames=1200"]
 ONE_BY_ONE = "hydra.launcher.num_jobs=1"
-SWEEP = [*PROGRAM, "train", "-m", *TINY, "seed=0,-1", "evaluate_after=10", ONE_BY_ONE]
+SWEEP = ["train", "-m", *TINY, "seed=0,-1", "evaluate_after=10", ONE_BY_ONE]
 FOLDER = "outputs/train/multiruns"
 
 
@@ -33,7 +32,8 @@ def kill_everything_of(folder):
 def sweep(tmp_path_factory):
     """Killed when its first run is half-way, then given again."""
     folder = tmp_path_factory.mktemp("killed")
-    process = subprocess.Popen(SWEEP, cwd=folder, stderr=subprocess.DEVNULL)
+    command = [sys.executable, "-m", "drone_rl.cli.main", *SWEEP]
+    process = subprocess.Popen(command, cwd=folder, stderr=subprocess.DEVNULL)
     while not any(
         len(metrics.read_text().splitlines()) > 3 for metrics in folder.rglob("metrics.csv")
     ):
@@ -43,15 +43,14 @@ def sweep(tmp_path_factory):
     process.wait()
     kill_everything_of(folder)
     assert not list(folder.rglob("result.json"))
-    done = subprocess.run(SWEEP, cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 1, done.stderr  # one of the runs is a mistake
+    assert run_main(folder, *SWEEP) == 1  # one of the runs is a mistake
     (found,) = (folder / FOLDER).iterdir()
     return found
 
 
-def test_a_killed_sweep_ends_like_an_uninterrupted_one(sweep, tmp_path):
+def test_a_killed_sweep_ends_like_an_uninterrupted_one(sweep, in_process, tmp_path):
     (run,) = sweep.glob("0_*seed-0*")
-    done = drone_rl("train", *TINY, "seed=0", "hydra.run.dir=alone", cwd=tmp_path)
+    done = in_process("train", *TINY, "seed=0", "hydra.run.dir=alone")
     assert done.returncode == 0, done.stderr
     one, two = (
         load_checkpoint(folder / "checkpoints" / "last.pt") for folder in (run, tmp_path / "alone")
@@ -76,18 +75,3 @@ def test_one_run_of_a_sweep_can_be_resumed(sweep, in_process):
     (run,) = sweep.glob("0_*seed-0*")
     in_process("train", f"resume={run}", "trainer.total_frames=1600", cwd=sweep)
     assert json.loads((run / "result.json").read_text())["frames"] >= 1600
-
-
-@pytest.mark.parametrize(
-    ("module", "launcher"),
-    [
-        ("submitit", ["hydra/launcher=slurm", "hydra.launcher.cluster=local"]),
-        ("ray", ["hydra/launcher=ray"]),
-    ],
-)
-def test_clusters_from_the_command_line(module, launcher, tmp_path):
-    pytest.importorskip(module, reason="pip install -e '.[slurm,ray]'")
-    sweep = [*PROGRAM, "train", "-m", *TINY, "seed=0", *launcher, "hydra.sweep.dir=sweep"]
-    subprocess.run(sweep, cwd=tmp_path, check=True)
-    summary = json.loads((tmp_path / "sweep" / "summary.json").read_text())
-    assert [run["state"] for run in summary["runs"]] == ["finished"]

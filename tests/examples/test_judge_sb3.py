@@ -22,10 +22,10 @@ def test_train_save_judge_and_explain(example, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(explain, "SECTIONS", few)  # all of them take a minute
     short = functools.partial(drone_rl.policy_from, task=drone_rl.TaskSettings(**SHORT))
     monkeypatch.setattr(drone_rl, "policy_from", short)
-    example.train(512, num_envs=32, steps=16).save(tmp_path / "ppo.zip")
+    example.train(64, num_envs=4, steps=16).save(tmp_path / "ppo.zip")
     model = sb3.PPO.load(tmp_path / "ppo.zip")
     with quick_figures():
-        example.trust(model, str(tmp_path), frames=40, episodes=6, perplexity=5)
+        example.trust(model, str(tmp_path), frames=24, episodes=6, perplexity=5)
     verdict, *_, report = capsys.readouterr().out.splitlines()
     assert "episodes are too few to be certain" in verdict
     page = Path(report).read_text()

@@ -12,4 +12,4 @@ def test_rewards_equal_those_of_the_policy(example, tmp_path, monkeypatch):
     monkeypatch.setattr(exporting, "_STEPS", 5)  # a few images suffice here
     target = tmp_path / "good.onnx"
     drone_rl.export_onnx("good", target)
-    assert example.fly(str(target), episodes=3) == [3.0] * 3
+    assert example.fly(str(target), episodes=1) == [3.0]

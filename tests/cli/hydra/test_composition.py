@@ -74,8 +74,7 @@ def test_whole_numbers_may_have_an_exponent(override, number):
     assert whole_numbers(override) == number
 
 
-@pytest.mark.parametrize("line", ["-m seed=1,2 device=cpu", "seed=1,2 -m device=cpu"])
-def test_a_command_gets_its_settings_and_status_for_each_run(monkeypatch, tmp_path, line):
+def test_a_command_gets_its_settings_and_status_for_each_run(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("HYDRA_FULL_ERROR", "1")  # as `guarded` does
     runs = []
@@ -85,7 +84,13 @@ def test_a_command_gets_its_settings_and_status_for_each_run(monkeypatch, tmp_pa
         return 10 + settings.seed, None
 
     monkeypatch.setattr(EvaluateCommand, "run", run)
-    words = [*line.split(), "hydra.sweep.dir=x", "hydra.sweep.subdir=${hydra.job.num}"]
+    words = [
+        "seed=1,2",
+        "-m",
+        "device=cpu",
+        "hydra.sweep.dir=x",
+        "hydra.sweep.subdir=${hydra.job.num}",
+    ]
     assert composition.run_command("evaluate", EvaluateCommand, words) == 12
     assert runs == [(1, "x/0"), (2, "x/1")]
     with pytest.raises(InputError, match="runs 0 and 1 have the same folder"):

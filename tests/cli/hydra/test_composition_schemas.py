@@ -116,10 +116,7 @@ def test_every_value_of_every_sweep_describes_a_policy(name, settings):
         assert describe(chosen).network.name
 
 
-@pytest.mark.parametrize(
-    "command",
-    ["evaluate", "play", "verdict", "prove", "check", "places", "shifts", "chain", "explain"],
-)
+@pytest.mark.parametrize("command", ["evaluate", "prove", "explain"])
 def test_any_setting_of_the_task_can_be_changed_for_a_trained_policy(command, config, settings):
     assert set(config(command).task) == set(kinds_of(TaskSettings)) | set(kinds_of(PillarsSettings))
     assert settings(command).task == {}
@@ -129,10 +126,8 @@ def test_any_setting_of_the_task_can_be_changed_for_a_trained_policy(command, co
 @pytest.mark.parametrize(
     "override",
     [
-        *("task.num_cubs=3", "sed=1", "task.num_cubes=three", "trainer.total_frames=many"),
-        *("network=no_such", "optimizer.learning_rate=1", "returns.gamma=high"),
-        *("transforms.standardize.mean=x", "logger.tensorboard.log=x", "network.patch=big"),
-        *("dynamics.mas=1", "dynamics.mass=heavy"),
+        *("task.num_cubs=3", "task.num_cubes=three", "network=no_such"),
+        *("transforms.standardize.mean=x", "logger.tensorboard.log=x"),
     ],
 )
 def test_typos_are_refused_by_hydra(override, config):
@@ -166,7 +161,7 @@ def test_further_arguments_are_passed_on(settings):
     assert made.defaults["amsgrad"] is True
 
 
-@pytest.mark.parametrize("command", ["evaluate", "play", "verdict", "shifts", "explain"])
+@pytest.mark.parametrize("command", ["evaluate", "explain"])
 def test_any_setting_of_the_dynamics_can_be_changed_for_a_trained_policy(command, settings):
     assert settings(command).dynamics == {}
     made = settings(command, "dynamics.wind=[5,0,0]", "dynamics.mode=simple_flight")
