@@ -1,92 +1,49 @@
-"""Programs of users run from a folder of their own, also with what they inherit from elsewhere."""
+"""Programs of users with Gymnasium and TorchRL, also with what they inherit from elsewhere."""
 
+import copy
 import os
+import pickle
 import subprocess
 import sys
 
 import pytest
-
-from tests.forked import run_forked
-
-pytest.importorskip("gymnasium", minversion="1.1", reason="Gymnasium is not installed")
-
-IDS = ["drone_rl/CollectCubes-v0", "drone_rl/Pillars-v0"]
-TORCHRL = {
-    "GymEnv": """
-env = GymEnv(NAME, frame_skip=2)
-check_env_specs(env)
-assert env.rollout(3).shape == (3,)
-""",
-    "GymWrapper": """
-env = GymWrapper(gymnasium.make(NAME))
-check_env_specs(env)
-assert env.rollout(3).shape == (3,)
-""",
-    "GymWrapper of a vector environment": """
-for mode in ("SameStep", "Disabled"):
-    env = GymWrapper(gymnasium.make_vec(NAME, num_envs=2, autoreset_mode=mode))
-    check_env_specs(env)
-    assert env.rollout(3, break_when_any_done=False).shape == (2, 3)
-""",
-    "Collector": """
-collector = Collector(GymEnv(NAME, observations="state"), frames_per_batch=60, total_frames=120)
-assert [len(batch) for batch in collector] == [60, 60]
-collector.shutdown()
-""",
-}
-GYMNASIUM = {
-    "vector wrappers": """
-env = gymnasium.make_vec(NAME, num_envs=2)
-env = vector.NormalizeReward(vector.NormalizeObservation(vector.RecordEpisodeStatistics(env)))
-act(env)
-""",
-    "wrappers": """
-env = wrappers.RecordEpisodeStatistics(gymnasium.make(NAME))
-act(wrappers.FrameStackObservation(wrappers.GrayscaleObservation(env), 4))
-""",
-    "sync": "act(gymnasium.make_vec(NAME, num_envs=2, vectorization_mode='sync'))",
-    "async": "act(gymnasium.make_vec(NAME, num_envs=2, vectorization_mode='async'))",
-    "entry point": """
-act(gymnasium.make_vec(NAME, num_envs=2, vectorization_mode="vector_entry_point"))
-""",
-}
-INHERITED = {
-    "no home": (
-        {"HOME": "/dev/null/home"},
-        """
-import warp
-from drone_rl.trust.plots.saving import new_chart
-from drone_rl.sim.rendering.devices import start_warp
-start_warp("cpu")
-assert os.access(warp.config.kernel_cache_dir, os.W_OK)
-""",
-    ),
-}
-
-
-def run(code, folder):
-    done = run_forked(code, cwd=folder)
-    assert done.returncode == 0, done.stderr
-
-
-@pytest.mark.parametrize("name", IDS)
-@pytest.mark.parametrize("program", TORCHRL)
-def test_torchrl_programs(tmp_path, program, name):
-    head = """
-import gymnasium, drone_rl
+import torch
 from torchrl.collectors import Collector
 from torchrl.envs import GymEnv, GymWrapper, check_env_specs
-"""
-    run(f"{head}NAME = {name!r}\n{TORCHRL[program]}", tmp_path)
+
+import drone_rl
+from drone_rl.envs import DroneEnv
+from drone_rl.sim.composer_task import make_environment
+from drone_rl.utils.errors import InputError
+
+gymnasium = pytest.importorskip("gymnasium", minversion="1.1", reason="Gymnasium is not installed")
+from gymnasium import wrappers  # noqa: E402
+from gymnasium.wrappers import vector  # noqa: E402
+
+CUBES = "drone_rl/CollectCubes-v0"
+IDS = [CUBES, "drone_rl/Pillars-v0"]
 
 
 @pytest.mark.parametrize("name", IDS)
-@pytest.mark.parametrize("program", GYMNASIUM)
-def test_gymnasium_programs(tmp_path, program, name):
-    head = """
-import gymnasium, drone_rl
-from gymnasium import wrappers
-from gymnasium.wrappers import vector
+def test_torchrl(name):
+    for env in (GymEnv(name, frame_skip=2), GymWrapper(gymnasium.make(name))):
+        check_env_specs(env)
+        assert env.rollout(3).shape == (3,)
+
+
+@pytest.mark.parametrize("mode", ["SameStep", "Disabled"])
+def test_torchrl_with_a_vector_environment(mode):
+    env = GymWrapper(gymnasium.make_vec(CUBES, num_envs=2, autoreset_mode=mode))
+    check_env_specs(env)
+    assert env.rollout(3, break_when_any_done=False).shape == (2, 3)
+
+
+def test_collector_of_torchrl():
+    env = GymEnv(CUBES, observations="state")
+    collector = Collector(env, frames_per_batch=60, total_frames=120)
+    assert [len(batch) for batch in collector] == [60, 60]
+    collector.shutdown()
+
 
 def act(env):
     env.reset(seed=0)
@@ -95,88 +52,89 @@ def act(env):
     assert observation in env.observation_space
     env.close()
 
+
+@pytest.mark.parametrize("mode", ["sync", "async", "vector_entry_point"])
+def test_vectorization_of_gymnasium(mode):
+    act(gymnasium.make_vec(CUBES, num_envs=2, vectorization_mode=mode))
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_wrappers_of_gymnasium(name):
+    env = vector.RecordEpisodeStatistics(gymnasium.make_vec(name, num_envs=2))
+    act(vector.NormalizeReward(vector.NormalizeObservation(env)))
+    env = wrappers.RecordEpisodeStatistics(gymnasium.make(name))
+    act(wrappers.FrameStackObservation(wrappers.GrayscaleObservation(env), 4))
+
+
+def test_inherited_environment_without_a_home(tmp_path):
+    code = """
+import os
+home = os.environ["HOME"]
+import drone_rl, warp
+from drone_rl.trust.plots.saving import new_chart
+from drone_rl.sim.rendering.devices import start_warp
+start_warp("cpu")
+assert os.access(warp.config.kernel_cache_dir, os.W_OK)
+assert os.environ["HOME"] == home
 """
-    run(f"{head}NAME = {name!r}\n{GYMNASIUM[program]}", tmp_path)
-
-
-@pytest.mark.parametrize("situation", INHERITED)
-def test_inherited_environment(tmp_path, situation):
-    variables, program = INHERITED[situation]
-    code = f"import os\nbefore = dict(os.environ)\nimport drone_rl\n{program}\n"
-    names = f"for name in {list(variables)}: assert os.environ[name] == before[name]\n"
     caches = ("WARP_CACHE_PATH", "XDG_CACHE_HOME")
     environment = {k: v for k, v in os.environ.items() if k not in caches}
     done = subprocess.run(
-        [sys.executable, "-c", code + names],
+        [sys.executable, "-c", code],
         cwd=tmp_path,
-        env={**environment, **variables},
+        env={**environment, "HOME": "/dev/null/home"},
         capture_output=True,
         text=True,
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    if "HOME" in variables:
-        assert "WARP_CACHE_PATH" in done.stderr
+    assert "WARP_CACHE_PATH" in done.stderr
 
-
-COPIES = """
-import copy, pickle, gymnasium, torch, drone_rl
-from drone_rl.envs import DroneEnv
 
 def copies(env):
     return copy.deepcopy(env), pickle.loads(pickle.dumps(env))
 
-env = DroneEnv(2)
-env.rollout(2)
-action = env.rand_action(env.reset())
-for other in copies(env):
-    assert torch.equal(env.last_pixels, other.last_pixels)
-first = [one.step(action.clone())["next", "pixels"] for one in (*copies(env), env)]
-assert torch.equal(first[0], first[2]) and torch.equal(first[1], first[2])
-for env in (gymnasium.make(NAME), gymnasium.make_vec(NAME, num_envs=2)):
-    env.reset(seed=0)
-    action = env.action_space.sample()
-    first = [one.step(action)[0] for one in (*copies(env), env)]
-    assert (first[0] == first[2]).all() and (first[1] == first[2]).all()
-"""
-CLOSED = """
-from drone_rl.envs import DroneEnv
-env = DroneEnv(2)
-env.close()
-assert env.rollout(2).shape == (2, 2)
-"""
-INFERENCE = """
-import torch
-from drone_rl.envs import DroneEnv
-with torch.inference_mode():
+
+def test_copies_continue_like_the_original():
     env = DroneEnv(2)
     env.rollout(2)
-with torch.autocast("cpu", torch.bfloat16):
-    assert env.rollout(2)["next", "reward"].dtype == torch.float32
-"""
+    action = env.rand_action(env.reset())
+    for other in copies(env):
+        assert torch.equal(env.last_pixels, other.last_pixels)
+    first = [one.step(action.clone())["next", "pixels"] for one in (*copies(env), env)]
+    assert torch.equal(first[0], first[2]) and torch.equal(first[1], first[2])
+    for env in (gymnasium.make(CUBES), gymnasium.make_vec(CUBES, num_envs=2)):
+        env.reset(seed=0)
+        action = env.action_space.sample()
+        first = [one.step(action)[0] for one in (*copies(env), env)]
+        assert (first[0] == first[2]).all() and (first[1] == first[2]).all()
 
 
-@pytest.mark.parametrize("program", [COPIES, CLOSED, INFERENCE])
-def test_copied_closed_and_inferring_environments(tmp_path, program):
-    run(f"NAME = {IDS[0]!r}\n{program}", tmp_path)
+def test_a_closed_environment_and_other_modes_of_torch():
+    env = DroneEnv(2)
+    env.close()
+    assert env.rollout(2).shape == (2, 2)
+    with torch.inference_mode():
+        env = DroneEnv(2)
+        env.rollout(2)
+    with torch.autocast("cpu", torch.bfloat16):
+        assert env.rollout(2)["next", "reward"].dtype == torch.float32
 
 
-@pytest.mark.parametrize(
-    ("program", "line"),
-    [
-        ("copy.deepcopy(make_environment(pixels=False))", "call make_environment again"),
-        ("pickle.dumps(make_environment(pixels=False))", "call make_environment again"),
-        ("torch.set_default_dtype(torch.float64); DroneEnv(1)", "set_default_dtype(torch.float32"),
-        ("torch.set_default_dtype(torch.float64); drone_rl.load_policy('good')", "float64"),
-        ("torch.set_default_device('meta'); DroneEnv(1)", "set_default_device('cpu')"),
-    ],
-)
-def test_what_is_not_supported_is_one_line(tmp_path, program, line):
-    head = """
-import copy, pickle, torch, drone_rl
-from drone_rl.envs import DroneEnv
-from drone_rl.sim.composer_task import make_environment
-"""
-    done = run_forked(head + program, cwd=tmp_path)
-    assert done.returncode and line in done.stderr.splitlines()[-1]
-    assert "InputError" in done.stderr.splitlines()[-1]
+@pytest.mark.parametrize("copied", [copy.deepcopy, pickle.dumps])
+def test_environments_of_dm_control_are_not_copied(copied):
+    with pytest.raises(InputError, match="call make_environment again"):
+        copied(make_environment(pixels=False))
+
+
+def test_other_default_types_and_devices_of_torch_are_refused():
+    torch.set_default_dtype(torch.float64)
+    try:
+        with pytest.raises(InputError, match=r"set_default_dtype\(torch.float32"):
+            DroneEnv(1)
+        with pytest.raises(InputError, match="float64"):
+            drone_rl.load_policy("good")
+    finally:
+        torch.set_default_dtype(torch.float32)
+    with torch.device("meta"), pytest.raises(InputError, match=r"set_default_device\('cpu'"):
+        DroneEnv(1)

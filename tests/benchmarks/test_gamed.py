@@ -26,7 +26,7 @@ def test_non_finite_logits_are_an_error(tmp_path):
     ],
 )
 def test_forged_files_and_trivial_tasks_are_not_good(name, tmp_path, monkeypatch):
-    few = functools.partial(drone_rl.judge, episodes=50, certificate_flights=100)
+    few = functools.partial(drone_rl.judge, episodes=150, certificate_flights=400)
     monkeypatch.setattr(gamed_certificates, "judge", few)
     assert not gamed_certificates.cases(tmp_path)[name]()
 
