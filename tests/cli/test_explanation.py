@@ -3,17 +3,14 @@
 from pathlib import Path
 
 import drone_rl
-from drone_rl.explanations import explain
 from drone_rl.explanations.explain import Explanations
 from drone_rl.utils.seeding import RootSeed
-from tests.explanations.quick import quick_figures
+from tests.explanations.quick import few_sections, quick_figures
 
 
-def test_explain_then_report(in_process, monkeypatch, tmp_path):
-    few = {name: explain.SECTIONS[name] for name in ("dataset", "evaluation")}
-    monkeypatch.setattr(explain, "SECTIONS", few)  # all of them take a minute
+def test_explain_then_report(in_process, tmp_path):
     few = ["frames=30", "episodes=8", "perplexity=5", "num_envs=32"]
-    with quick_figures():
+    with few_sections("dataset", "evaluation"), quick_figures():
         done = in_process("explain", "policy=poor", "require=good", *few, "hydra.run.dir=run")
         again = in_process("report", "explanations=run", "hydra.run.dir=again")
     assert "poor: poor" in done.stdout

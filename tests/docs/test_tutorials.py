@@ -15,11 +15,12 @@ from hydra.core.config_store import ConfigStore
 import drone_rl.explanations
 from drone_rl.cli.hydra import composition
 from drone_rl.config import TASKS
-from drone_rl.explanations import explain, report
+from drone_rl.explanations import report
 from drone_rl.explanations.report import page as report_page
 from drone_rl.sim.tasks.task import MAKERS
 from drone_rl.utils.settings import kinds_of, types_of
 from tests.docs.commands import check_commands
+from tests.explanations.quick import few_sections, quick_figures
 from tools.docs import session
 from tools.docs.blocks import PYTHON, find_pages, read_blocks
 from tools.docs.outputs import find_different_words
@@ -27,8 +28,8 @@ from tools.docs.rules import read_rules
 
 PAGES = [page for page in find_pages() if any(b.kind == PYTHON for b in read_blocks(page))]
 SHORT = (
-    "trainer=drone_rl.TrainerSettings(total_frames=1500, checkpoint_interval_s=0.0), "
-    "collector=drone_rl.config.learning.Episodes(num_envs=8)"
+    "trainer=drone_rl.TrainerSettings(total_frames=400, checkpoint_interval_s=0.0), "
+    "collector=drone_rl.config.learning.Episodes(num_envs=4)"
 )
 _MAIN = {
     "judge(training.policy)": "judge(training.policy, episodes=8)",
@@ -67,9 +68,9 @@ SMALLER = {
     },
     "docs/tutorials/learner.md": {
         "make_env(64": "make_env(8",
-        "total_frames=200_000": "total_frames=1_500",
-        "total_frames=20_000": "total_frames=3_000",
-        "total_frames=10_000": "total_frames=1_500",
+        "total_frames=200_000": "total_frames=500",
+        "total_frames=20_000": "total_frames=1_000",
+        "total_frames=10_000": "total_frames=500",
     },
     "docs/tutorials/sb3.md": {
         "num_envs=32": "num_envs=4",
@@ -99,8 +100,6 @@ def workplace(tmp_path, monkeypatch):
         folder = inside.joinpath(*package.__name__.split(".")[1:])
         monkeypatch.setattr(package, "__path__", [*package.__path__, str(folder)])
     monkeypatch.setattr(composition, "IMPORTED", [])  # other tests of this process don't find them
-    few = {name: explain.SECTIONS[name] for name in ("dataset", "evaluation")}
-    monkeypatch.setattr(explain, "SECTIONS", few)  # all of them take a minute
     monkeypatch.setattr(report_page, "PARTS", dict(report_page.PARTS))
     known, threads = set(sys.modules), torch.get_num_threads()
     templates = jinja2.FileSystemLoader(inside / "explanations" / "report" / "templates")
@@ -108,7 +107,13 @@ def workplace(tmp_path, monkeypatch):
     loader = jinja2.ChoiceLoader([theirs, templates])
     monkeypatch.setattr(jinja2, "PackageLoader", lambda _: loader)
     report_page._environment.cache_clear()  # another tutorial may have made it, with another loader
-    with patch.dict(TASKS), patch.dict(MAKERS):  # a page's tasks are registered until its end
+    few = few_sections("dataset", "evaluation")
+    with (
+        patch.dict(TASKS),
+        patch.dict(MAKERS),
+        few,
+        quick_figures(),
+    ):  # a page's tasks are registered until its end
         yield tmp_path
     report_page._environment.cache_clear()
     forget_choices()

@@ -8,10 +8,11 @@ from collections.abc import Iterator
 import pytest
 from matplotlib.figure import Figure
 
-from drone_rl.explanations import class_models, response
+from drone_rl.explanations import class_models, explain, response
 from drone_rl.explanations.explain import SECTIONS
 from drone_rl.explanations.report import attribution
 from drone_rl.trust.plots import saving
+from drone_rl.verification import places_section as places
 from drone_rl.verification.places_section import places_section
 
 ALL_SECTIONS = {**SECTIONS, "places": places_section}
@@ -26,6 +27,16 @@ def quick() -> Iterator[None]:
         for make in (response.response_map, response.outcome_map):
             patch.setitem(make.__kwdefaults__, "num_lateral", 9)
             patch.setitem(make.__kwdefaults__, "num_forward", 4)
+        yield
+
+
+@contextlib.contextmanager
+def few_sections(*names: str) -> Iterator[None]:
+    """Compute these sections alone; all of them take a minute."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(explain, "SECTIONS", {name: SECTIONS[name] for name in names})
+        refused = {"places": {"refused": "the test needs none"}}
+        patch.setattr(places, "places_section", lambda context: (refused, {}))
         yield
 
 
