@@ -62,9 +62,7 @@ def test_a_proof_can_be_required(in_process, tmp_path, good, undecided, status, 
     [
         ("oracle", ["episodes=150"], 0),
         ("oracle", ["episodes=10"], 13),
-        ("left", ["episodes=150"], 10),
         ("oracle", ["episodes=150", "task.lateral_bound=0.5"], 18),
-        ("forward", ["episodes=150", "task.lateral_bound=0.5"], 18),
     ],
 )
 def test_good_can_be_required(in_process, policy, more, status):

@@ -49,8 +49,6 @@ def test_usage_and_version_write_no_files(monkeypatch, capsys, tmp_path, args, p
         (["train", "ent_coef=0.01"], ["objective.entropy_coeff=0.01"]),
         (["train", "returns.gamma=high"], ["gamma=high", "a number", "gamma=0.95"]),
         (["train", "trainer.total_frames=0"], ["total_frames=0 trains nothing", "1 or more"]),
-        (["train", "task.spacing=-9"], ["spacing=-9", "from 0.001"]),
-        (["train", "optimizer.lr=1e38"], ["optimizer.lr=1e+38", "up to 1e+30"]),
         (["train", *(f"transforms.resize.{s}=2" for s in ("height", "width"))], ["2x2", "small"]),
         (["train", "resume=nowhere"], ["nowhere", "folder of a run"]),
         (["train", "hydra.run.dir=/dev/null/x"], ["/dev/null"]),
@@ -58,8 +56,6 @@ def test_usage_and_version_write_no_files(monkeypatch, capsys, tmp_path, args, p
         (["train", "task=nope"], ["task=nope", "one of collect_cubes, collect_one, pillars"]),
         (["train", "seed=0,1,2"], ["drone-rl train -m seed=0,1,2"]),
         (["train", "-m", "seed=0", "resume=latest"], ["resume=", "repeat its command"]),
-        (["train", "-m", "seed=0,1", "hydra.launcher.num_jobs=0"], ["num_jobs=0", "at least 1"]),
-        (["train", "-m", "seed=0,1", "hydra/launcher=pbs"], ["pbs", "slurm"]),
         (["train", "-m", "seed=interval(0,1)"], ["interval(0,1)", "hydra/sweeper=optuna"]),
         (["sweep-report"], ["folder=latest", "drone-rl train -m"]),
         (["sweep-report", "no/such"], ["no/such", "sweep.json"]),
@@ -69,12 +65,10 @@ def test_usage_and_version_write_no_files(monkeypatch, capsys, tmp_path, args, p
         (["verdict", "policy=god"], ["policy=god", "did you mean good?"]),
         (["verdict", "policy=good", "require=great"], ["require='great'", "good, proved"]),
         (["verdict", "policy=left", "certificate=c.json"], ["policy=left has no network"]),
-        (["verdict", "policy=good", "require_domain=no.yaml"], ["no.yaml can't be read"]),
         (["play", "policy=good", "format=rerun", "viewer=true"], ["format=rerun", "leave"]),
         (["shifts", "policy=good", "axes=wind"], ["axes=wind", "unknown", "object_color"]),
         (["bodies", "policies=[good,good]"], ["policies", "each once"]),
         (["export", "policy=good", "name=mine.onnx"], ["has an extension", "name=mine"]),
-        (["explain", "policy=good", "layer=conv9"], ["layer=conv9", "conv1, relu1"]),
         (["explain", "policy=good", "perplexity=500"], ["perplexity=500", "1 to 199"]),
         (["report", "explanations=nowhere"], ["nowhere", "explanation.json"]),
         (["prove", "policy=good", "task.vertical_bound=0.5"], ["vertical_bound=0.5 is not supp"]),
@@ -115,12 +109,11 @@ def test_an_output_that_is_full_is_one_line(tmp_path):
     assert done.stderr == "error: standard output can't be written (No space left on device)\n"
 
 
-@pytest.mark.parametrize("limit", [300, 3000])
-def test_a_full_disk_is_one_line_with_the_remedy(tmp_path, limit):
-    """A limit on the sizes of files stands in for a full disk, of Hydra's files and of others."""
+def test_a_full_disk_is_one_line_with_the_remedy(tmp_path):
+    """A limit on the sizes of files stands in for a full disk."""
     limited = (
         "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, -1))\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (3000, -1))\n"
     )
     settings = ["train", TINY[0], *TINY[2:], "logger=tensorboard", "hydra.run.dir=full"]
     done = drone_rl(*settings, cwd=tmp_path, setup=limited)

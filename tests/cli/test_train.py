@@ -34,16 +34,16 @@ def test_files_of_a_training(run):
 
 
 def test_a_training_with_a_critic_is_resumed(in_process, tmp_path):
-    words = ["train", *TINY, "objective=ppo", "objective.num_steps=20", "returns.gamma=0.9"]
-    for name, frames in (("whole", 320), ("half", 160)):
+    words = ["train", *TINY, "objective=ppo", "objective.num_steps=10", "returns.gamma=0.9"]
+    for name, frames in (("whole", 80), ("half", 40)):
         run = [f"hydra.run.dir={name}", f"trainer.total_frames={frames}"]
         assert in_process(*words, *run).returncode == 0
-    assert in_process("train", "resume=half", "trainer.total_frames=320").returncode == 0
+    assert in_process("train", "resume=half", "trainer.total_frames=80").returncode == 0
     one, two = (
         load_checkpoint(tmp_path / name / "checkpoints" / "last.pt") for name in ("whole", "half")
     )
     assert one["config"]["collector"]["_target_"] == "rollouts"
-    assert one["progress"]["frames"] == two["progress"]["frames"] == 320
+    assert one["progress"]["frames"] == two["progress"]["frames"] == 80
     for key in ("policy", "critic"):
         assert all(torch.equal(one[key][name], two[key][name]) for name in one[key])
 
@@ -191,7 +191,7 @@ def test_provable_training_in_rounds(in_process, tmp_path):
     assert done.returncode == 0, done.stderr
     noted = json.loads((tmp_path / "run" / "provable.json").read_text())
     assert noted["how"]["frames"] == 100 and len(noted["rounds"]) == 1  # the frames are spent
-    done = in_process("train", "resume=run", "trainer.total_frames=2000", "provable.rounds=2")
+    done = in_process("train", "resume=run", "trainer.total_frames=600", "provable.rounds=2")
     assert done.returncode == 0, done.stderr
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     frames = [row["frames"] for row in result["rounds"]]

@@ -50,9 +50,6 @@ def test_every_setting_of_a_command_is_typed(command, config):
     for name in numbers:
         with pytest.raises(ValidationError):
             composed[name] = "many"
-    for name in numbers[:1]:
-        with pytest.raises(HydraException):
-            config(command, [f"{name}=many"])
 
 
 PARTS = {**composition.PARTS, **composition.SEVERAL}
@@ -103,15 +100,12 @@ def test_every_experiment_composes_and_describes_a_policy(name, settings):
 
 
 @pytest.mark.parametrize("name", [name for _, name in files("sweep")])
-def test_every_value_of_every_sweep_describes_a_policy(name, settings):
+def test_the_first_and_last_values_of_every_sweep_describes_a_policy(name, settings):
     sweep = yaml.safe_load((CONF / "sweep" / f"{name}.yaml").read_text())
     params = sweep["hydra"]["sweeper"]["params"]
     listed = {k: str(v).split(",") for k, v in params.items() if "(" not in str(v)}
-    for key, values in listed.items():
-        if not (CONF / key).is_dir():  # numbers, of which the extremes are enough
-            listed[key] = [values[0], values[-1]]
-    for row in itertools.zip_longest(*listed.values()):
-        made = [f"{k}={v}" for k, v in zip(listed, row, strict=True) if v is not None]
+    for end in (0, -1):
+        made = [f"{key}={values[end]}" for key, values in listed.items()]
         chosen = settings("train", f"sweep={name}", *made).as_base(TrainSettings)
         assert describe(chosen).network.name
 
