@@ -20,9 +20,7 @@ def _composing_fast():
 def in_process(monkeypatch, capsys, tmp_path):
     """Runs a command in this process, which saves the seconds that imports take."""
     # Hydra's logging set-up would close the streams that pytest captures
-    monkeypatch.setattr("hydra.core.utils.configure_log", lambda *args: None)
-    monkeypatch.setattr("hydra._internal.hydra.configure_log", lambda *args: None)
-    monkeypatch.setattr("drone_rl.cli.hydra.launchers.configure_log", lambda *args: None)
+    monkeypatch.setattr("logging.config.DictConfigurator.configure", lambda self: None)
 
     def call(*args, cwd=tmp_path):
         monkeypatch.chdir(cwd)
