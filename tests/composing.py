@@ -4,12 +4,13 @@ import contextlib
 import copy
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
-from hydra._internal.sources_registry import SourcesRegistry
 from hydra.core.config_store import ConfigStore
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.plugins import Plugins
+from hydra.plugins.config_source import ConfigSource
 
 from drone_rl.cli.hydra import composition
 from drone_rl.config import TASKS
@@ -26,8 +27,8 @@ def composing_fast() -> Iterator[None]:
 
 
 def _keep_files(patch: pytest.MonkeyPatch) -> None:
-    Plugins.instance()  # registers a class of its own, not the one that an import returns
-    source = SourcesRegistry.instance().resolve("file")
+    sources: list[Any] = [*Plugins.instance().discover(ConfigSource)]
+    source = next(source for source in sources if source.scheme() == "file")
     load, kept = source.load_config, {}
 
     def load_once(self, config_path):
