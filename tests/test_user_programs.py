@@ -55,7 +55,7 @@ def act(env):
 
 @pytest.mark.parametrize("mode", ["sync", "async", "vector_entry_point"])
 def test_vectorization_of_gymnasium(mode):
-    act(gymnasium.make_vec(CUBES, num_envs=2, vectorization_mode=mode))
+    act(gymnasium.make_vec(CUBES, num_envs=1, vectorization_mode=mode))
 
 
 @pytest.mark.parametrize("name", IDS)
