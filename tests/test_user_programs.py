@@ -46,7 +46,7 @@ def test_collector_of_torchrl():
 
 
 def act(env):
-    env.reset(seed=0)
+    observation, _ = env.reset(seed=0)
     for _ in range(3):
         observation = env.step(env.action_space.sample())[0]
     assert observation in env.observation_space

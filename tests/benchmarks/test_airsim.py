@@ -1,26 +1,10 @@
 """The benchmark of the server: crafted messages, and what counts as survived."""
 
-import random
-
-import msgpack
 import pytest
 
 from benchmarks import airsim
 from drone_rl.flight.airsim.methods import METHODS, UNSUPPORTED
 from drone_rl.flight.airsim.serving import serve
-
-
-def test_crafted_messages_are_of_all_kinds():
-    draw = random.Random(0)
-    made = [airsim._crafted(draw) for _ in range(300)]
-    assert all(isinstance(one, bytes) and one for one in made)
-    good = 0
-    for one in made:
-        try:
-            good += isinstance(msgpack.unpackb(one, raw=False, strict_map_key=False), list)
-        except Exception:
-            continue
-    assert 50 < good < 250
 
 
 def test_survived_messages_are_counted():
@@ -43,12 +27,3 @@ def test_a_server_that_stops_answering_is_noticed():
 def test_every_method_of_the_client_is_accounted_for():
     unknown = airsim.METHODS_1_8 - METHODS.keys() - UNSUPPORTED.keys()
     assert unknown == set()
-
-
-def test_methods_that_the_server_is_to_have():
-    """Of 125 methods 28 need cars, lidar, distance sensors or Unreal."""
-    assert len(airsim.METHODS_1_8) == 125
-    wanted = airsim.asked_for()
-    assert len(wanted) == 97
-    assert not wanted & {"getLidarData", "getDistanceSensorData", "setCarControls", "simLoadLevel"}
-    assert wanted - METHODS.keys() == {"simCreateVoxelGrid", "simGetWorldExtents"}

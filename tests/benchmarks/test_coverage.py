@@ -8,10 +8,7 @@ from benchmarks.exact_coverage import Truth
 from benchmarks.simulated_policies import (
     A,
     L,
-    R,
     SimulatedPolicy,
-    _join,
-    _mixture,
     judge_samples,
     policies,
 )
@@ -39,25 +36,10 @@ def test_an_interval_that_assumes_independent_cubes_is_detected():
     assert coverage.coverage(coverage.OUTCOMES["all or nothing, 9 of 10"], 100, holds) < 0.8
 
 
-def test_every_kind_of_dependence_is_a_distribution():
-    for outcome in [*coverage.OUTCOMES.values(), *coverage.TIMES.values()]:
-        assert sum(outcome.probabilities) == pytest.approx(1.0)
-        assert len(outcome.values) == len(outcome.probabilities)
-    for outcome in coverage.OUTCOMES.values():
-        assert outcome.low <= min(outcome.values) <= max(outcome.values) <= outcome.high
-
-
 def test_coverage_of_proportions_is_the_minimum_over_true_rates():
     """With one episode the interval of no success ends at 0.975, where coverage is lowest."""
     rows = list(coverage._proportions(quick=True))
     assert rows[0]["coverage"] == pytest.approx(0.975, abs=1e-6)
-
-
-def test_types_and_their_probabilities():
-    half = _mixture(0.25, (L, R), (1, 1), (0, 1))
-    assert half.types == {((L, R), (1, 1), False): 0.25, ((L, R), (0, 1), False): 0.75}
-    joined = _join((0.5, half), (0.5, _mixture(1.0, (A, A), (1, 1), (1, 1))))
-    assert joined.types[(L, R), (0, 1), False] == 0.375
 
 
 def test_quantities_of_an_episode_type():
@@ -69,14 +51,6 @@ def test_quantities_of_an_episode_type():
     assert np.isnan(observed["collected right"])
     assert observed["above random"] == pytest.approx(0.5 - 1 / 6)
     assert observed["above forward"] == pytest.approx(0.5 - 1 / 6 - 5 / 6 * 0.3)
-
-
-def test_policies_are_on_both_sides_of_every_threshold():
-    kinds = {name: policy.kind for name, policy in policies().items()}
-    for name in {name.rsplit(" ", 1)[0] for name in kinds}:
-        assert len({kinds[f"{name} {shift}"] for shift in ("-0.03", "+0.03")}) == 2, name
-    assert set(kinds.values()) >= {*VerdictKind} - {VerdictKind.ONE_SIDED_LEFT}
-    assert kinds["all or nothing, success +0.00"] is VerdictKind.NONE  # exactly 0.9 is not more
 
 
 def test_intervals_that_are_too_narrow_are_detected(monkeypatch):

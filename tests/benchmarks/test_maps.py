@@ -4,8 +4,7 @@ import pytest
 import torch
 
 from benchmarks.adversarial_maps import adversarial_maps
-from benchmarks.known_map_policies import WINDOWS, make_policies, path_weights, trained
-from benchmarks.maps import shipped
+from benchmarks.known_map_policies import make_policies, path_weights
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.patches import placebo_maps
 from drone_rl.policies import MLP, SmallCNN
@@ -22,13 +21,6 @@ def images():
     x = absent + 0.7 * torch.randn(60, 1, *SIZE, generator=generator)
     brightness = x[:, 0, 8:18, 4:20].mean((1, 2))
     return absent, x, (brightness > brightness.median()).long()
-
-
-def test_shipped_policies_with_discrete_moves_are_used():
-    """`flight_velocity` has continuous actions, and others have two frames; they are left out."""
-    names = shipped(torch.zeros(1, 25, 64)).keys()
-    assert {"good", "poor", "proved", "flight"} <= names
-    assert not names & {"flight_velocity", "robust", "pillars_good"}
 
 
 def test_path_weights_sum_over_paths():
@@ -53,14 +45,6 @@ def test_a_policy_depends_on_pixels_with_nonzero_path_weights_only(images):
         assert torch.allclose(before, outside, atol=1e-6), policy.name
         moved = 0.5 * (before - inside).abs().sum(-1).max()
         assert (moved < 1e-6) if policy.is_blind else (moved > 1e-3), policy.name
-
-
-def test_a_trained_policy_has_weights_in_its_window_only(images):
-    _, x, targets = images
-    sees, blind = (trained(WINDOWS[name], x, targets) for name in ("left", "sky, left"))
-    assert (sees(x).argmax(-1) == targets).float().mean() > 0.8
-    weight = blind.layers.fc1.weight.view(16, *SIZE)
-    assert weight[:, 8:].abs().max() == 0 and weight[:, :8, :24].abs().min(0).values.max() > 0
 
 
 def test_adversarial_maps_differ_from_placebos_and_from_each_other(images):

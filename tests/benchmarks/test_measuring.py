@@ -1,13 +1,11 @@
 """Statistics of times, rates and memory by hand, and trainings of a few frames."""
 
 import dataclasses
-import json
 
 import pytest
-import torch
 import yaml
 
-from benchmarks import pipeline, revisions, scaling, speed, startup, sweeps, training
+from benchmarks import pipeline, revisions, scaling, speed, startup, training
 from benchmarks.memory import growth
 from benchmarks.pipeline import make_drone_env, paired, random_walk, rate
 from drone_rl.config import AppearanceSettings
@@ -74,16 +72,6 @@ def test_a_ratio_of_revisions_is_the_median_of_pairs():
     assert ratios == pytest.approx({"explain_s": 1.1, "collector_fps": 1.25})
 
 
-def test_start_up_times_are_medians_of_three_after_a_warm_up(setup, monkeypatch):
-    seconds = iter([9.0, 12.0, 4.0, 5.0, 3.0])  # the second run compiles kernels
-    monkeypatch.setattr(startup, "first_update_seconds", lambda *_: next(seconds))
-    monkeypatch.setattr(startup, "verdict_seconds", lambda *_: 6.0)
-    monkeypatch.setattr(startup, "import_seconds", lambda name="": 2.0 if name == "torch" else 0.1)
-    figures = startup.bench_startup(dataclasses.replace(setup, quick=False))
-    assert (figures["start_to_first_update_s"], figures["first_compile_s"]) == (4.0, 8.0)
-    assert (figures["import_torch_s"], figures["verdict_s"]) == (2.0, 6.0)
-
-
 def test_a_training_that_ends_without_an_update_is_an_error(tmp_path, monkeypatch):
     monkeypatch.setattr(startup, "PROGRAM", ("python", "-c", "raise SystemExit(3)"))
     with pytest.raises(RuntimeError, match="status 3"):
@@ -113,18 +101,3 @@ def test_a_training_is_evaluated_for_each_seed(setup, monkeypatch):
     assert (figures["seeds_solved"], figures["success_lower95"]) == (2, [0.9, 0.9])
     figures = training.bench_experiment(setup, "flight", num_seeds=1)
     assert figures["flight_frames"] == [30] and "experiment=flight" in runs[-1]
-
-
-def test_results_of_a_killed_sweep_are_equal_except_for_the_time(tmp_path, monkeypatch):
-    monkeypatch.setattr(sweeps, "load_checkpoint", lambda path: torch.load(path, weights_only=True))
-
-    def outcome(weight=1.0, **result):
-        checkpoints = tmp_path / "checkpoints"
-        checkpoints.mkdir(exist_ok=True)
-        torch.save({"policy": {"w": torch.tensor([weight])}}, checkpoints / "last.pt")
-        result = {"reason": "frames", "seconds": 1.0, **result}
-        (tmp_path / "result.json").write_text(json.dumps(result))
-        return sweeps._outcome(tmp_path)
-
-    assert outcome(seconds=99.0) == outcome()
-    assert outcome(weight=1.0 + 2**-20) != outcome() != outcome(reason="solved")

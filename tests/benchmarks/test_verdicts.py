@@ -65,12 +65,6 @@ def test_sampled_actions_of_an_uncertain_policy_fail():
     assert "in 17.0% of episodes" in verdict.sentence
 
 
-def test_seeking_equals_the_oracle():
-    ours, oracle = run("all cubes"), baselines(SCRIPTS["all cubes"].settings)["oracle"]
-    assert torch.equal(ours.length, oracle.length)
-    assert torch.equal(ours.goals.reached, oracle.goals.reached)
-
-
 def test_right_and_certain_verdicts_are_counted():
     rows = {"right": ("good", True, "good"), "wrong": ("good", True, "poor"),
             "open": ("good", False, "poor")}  # fmt: skip

@@ -55,15 +55,6 @@ def test_play_films(run, in_process):
     }
 
 
-def test_play_records_for_rerun(run, in_process):
-    pytest.importorskip("rerun", reason="rerun isn't installed: extra [rerun]")
-    done = in_process(
-        "play", f"policy={run}", "episodes=2", "format=rerun", "hydra.run.dir=r", cwd=run
-    )
-    assert done.returncode == 0, done.stderr
-    assert {p.name for p in (run / "r").glob("episode_*")} == {"episode_0.rrd", "episode_1.rrd"}
-
-
 def test_play_names_a_missing_extra(in_process, monkeypatch):
     monkeypatch.setitem(sys.modules, "rerun", None)
     line = error_line(in_process("play", "policy=good", "format=rerun"))

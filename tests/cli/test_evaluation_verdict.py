@@ -105,14 +105,6 @@ def test_a_verdict_under_another_appearance_says_so(in_process, tmp_path):
     assert "A certificate states" not in done.stdout
 
 
-def test_evaluation_under_another_appearance(in_process, tmp_path):
-    settings = ["policy=good", "task.num_cubes=1", "episodes=5", "videos=0", "baselines=false"]
-    done = in_process("evaluate", *settings, "appearance=dusk", "hydra.run.dir=e")
-    assert "another appearance" in done.stdout, done.stderr
-    kept = json.loads((tmp_path / "e" / "evaluation.json").read_text())
-    assert any(name.startswith("appearance.sun") for name in kept["unlike"])
-
-
 def test_latest_is_recorded_as_its_folder(run, in_process, tmp_path, monkeypatch, caplog):
     """Which run `latest` is changes with the next one."""
     monkeypatch.setattr("drone_rl.cli.settings.trained_policies", lambda _: [run / "checkpoints/x"])

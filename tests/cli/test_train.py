@@ -85,16 +85,6 @@ def test_a_refused_resume_changes_nothing(run, in_process, tmp_path, wrong):
     assert contents(folder) == before
 
 
-def test_a_refused_sweep_changes_nothing(in_process, tmp_path):
-    (tmp_path / "s" / "0").mkdir(parents=True)
-    (tmp_path / "s" / "0" / "run.yaml").write_text("")
-    (tmp_path / "s" / ".lock").write_text("")
-    before = contents(tmp_path / "s")
-    line = error_line(in_process("train", "-m", "seed=0,1", "hydra.sweep.dir=s"))
-    assert "holds other runs" in line
-    assert contents(tmp_path / "s") == before
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_the_printed_command_resumes_a_stopped_run(run, in_process, tmp_path, number, caplog):
     """Bit for bit the uninterrupted run; tests/cli/test_sweeps.py kills a process."""

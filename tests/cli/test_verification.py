@@ -54,9 +54,3 @@ def test_chances_of_one_placement(in_process, tmp_path):
     assert placement["cubes"] == [[15.0, 0.5, 2.5]]
     assert 0.9999 < placement["success"] < 1
     assert "more than 99.99%" in done.stdout.splitlines()[1]
-
-
-def test_chances_of_held_out_placements(in_process):
-    done = in_process("chain", "policy=right_and_forward", "placements=2", "seed=1", *ONE)
-    assert done.returncode == 0, done.stderr
-    assert "2 placements; success is least probable at cubes=[2.09944]" in done.stdout

@@ -31,10 +31,6 @@ def run(tmp_path):
     return tmp_path
 
 
-def test_a_single_run_is_unchanged():
-    assert complete(["seed=1", "network=mlp"]) == ["seed=1", "network=mlp"]
-
-
 def test_a_resumed_run_takes_its_recorded_settings(run):
     words = [f"resume={run}", "seed=3"]
     assert complete(words) == [
@@ -71,10 +67,6 @@ def test_the_newest_run_is_resumed(run, tmp_path, monkeypatch):
     found = complete(["resume=latest", "paths.outputs=mine"])
     assert "resume=mine/train/runs/b" in found
     assert "hydra.run.dir='mine/train/runs/b'" in found
-
-
-def test_a_folder_in_quotes_is_the_same_folder(run):
-    assert complete([f"resume='{run}'"]) == complete([f"resume={run}"])
 
 
 def test_a_folder_whose_name_hydra_would_parse_is_quoted(run):
