@@ -4,14 +4,12 @@ import math
 from collections.abc import Mapping, Sequence
 
 import torch
-from torch import Tensor
 
 from drone_rl.flight.commands import checks
 from drone_rl.flight.commands.command import PilotError
 from drone_rl.flight.commands.drone import Drone
 from drone_rl.flight.commands.state import PilotState
-from drone_rl.sim.coordinates import to_simulator
-from drone_rl.sim.rendering.appearance import product
+from drone_rl.sim.coordinates import attitude_of, to_simulator
 from drone_rl.sim.tasks.common import PropTask
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError, did_you_mean
@@ -59,10 +57,9 @@ class SceneDrone(Drone):
         """
         if not self.is_computer_vision:
             raise PilotError("set_pose: the drone has dynamics; make Pilot(mode='computer_vision')")
-        place = checks.numbers(position, "position", 3, -checks.FARTHEST, checks.FARTHEST)
+        place = checks.numbers(position, "position", 3)
         named = ((roll, "roll"), (pitch, "pitch"), (yaw, "yaw"))
-        angles = to_simulator(*(checks.radians(value, name) for value, name in named))
-        attitude = _attitude(*angles)[None]
+        attitude = attitude_of(*(checks.degrees(value, name) for value, name in named))[None]
         self.body = self.body.moved(torch.tensor([place], dtype=torch.float64), attitude)
         self.trajectory.append(self.time, self.body)
         return self.state
@@ -113,7 +110,7 @@ class SceneDrone(Drone):
             PilotError: The drone has no worlds, or their task does not let objects move.
         """
         worlds, index = self._object(name)
-        place = checks.numbers(position, "position", 3, -checks.FARTHEST, checks.FARTHEST)
+        place = checks.numbers(position, "position", 3)
         task = worlds.task
         if not isinstance(task, PropTask):
             raise PilotError(f"set_object_position: task {task.name} does not let objects move")
@@ -130,12 +127,3 @@ class SceneDrone(Drone):
 
 
 _GONE = (math.nan, math.nan, math.nan)
-
-
-def _attitude(roll: float, pitch: float, yaw: float) -> Tensor:
-    """Return the quaternion (w, x, y, z) of the simulator's angles, radians: yaw, pitch, roll."""
-    about = torch.zeros(3, 4, dtype=torch.float64)
-    half = torch.tensor([roll, pitch, yaw], dtype=torch.float64) / 2
-    about[:, 0] = half.cos()
-    about[[0, 1, 2], [1, 2, 3]] = half.sin()
-    return product(product(about[2], about[1]), about[0])

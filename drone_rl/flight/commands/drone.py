@@ -25,7 +25,7 @@ from drone_rl.flight.commands.command import (
 from drone_rl.flight.commands.path_following import GoHomeCommand
 from drone_rl.flight.commands.state import LandedState, PilotState, Sensors, Trajectory
 from drone_rl.flight.image_types import ImageRequest, images
-from drone_rl.sim.coordinates import to_simulator
+from drone_rl.sim.coordinates import attitude_of
 from drone_rl.sim.dynamics import FlightState, Goals, Obstacles, Quadrotor
 from drone_rl.sim.dynamics import state as fs
 from drone_rl.sim.dynamics.state import twist_about_z
@@ -97,15 +97,13 @@ class Drone:
         self.settings = self._quadrotor.settings
         """Vehicle and wind."""
         height = [] if self.is_computer_vision and np.size(start) == 3 else [self.settings.radius]
-        given = checks.numbers(start, "start", 3 - len(height), -checks.FARTHEST, checks.FARTHEST)
+        given = checks.numbers(start, "start", 3 - len(height))
         place = [[*given, *height]]
-        degrees = checks.real(yaw, "yaw", unit="degrees")
-        half = 0.5 * math.radians(to_simulator(0.0, 0.0, degrees)[2])
-        attitude = [[math.cos(half), 0.0, 0.0, math.sin(half)]]
+        attitude = attitude_of(0.0, 0.0, checks.degrees(yaw, "yaw"))
         self._seed = Whole(0, 2**31 - 1).read(seed, "seed")
         self.body = FlightState.at_rest(
             torch.tensor(place, dtype=torch.float64),
-            torch.tensor(attitude, dtype=torch.float64),
+            attitude[None],
             torch.tensor([self._seed]),
         )
         """The state as the simulator has it; a batch of one."""
@@ -186,7 +184,7 @@ class Drone:
 
     def advance(self, seconds: float) -> PilotState:
         """Advance simulated time and return the state; a negative duration is an `InputError`."""
-        self._advance(self._ticks_of(checks.duration(seconds, "seconds")))
+        self._advance(self._ticks_of(checks.DURATION.read(seconds, "seconds")))
         return self.state
 
     def cancel(self) -> None:
