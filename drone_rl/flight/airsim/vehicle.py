@@ -7,7 +7,7 @@ from typing import Any
 from drone_rl.flight.airsim.airframe import Airframe
 from drone_rl.flight.airsim.calls import remark
 from drone_rl.flight.airsim.messages import ned, to_world
-from drone_rl.flight.commands.command import Command, FlightFuture, PilotError
+from drone_rl.flight.commands.command import FlightFuture, PilotError
 from drone_rl.flight.commands.path_following import Drivetrain, YawMode
 from drone_rl.sim.coordinates import GeoPoint
 
@@ -45,11 +45,6 @@ class Vehicle(Airframe):
             raise PilotError("the simulation of this vehicle has diverged; call reset")
         if not self._is_armed:
             raise PilotError("this vehicle is not armed; call armDisarm(True)")
-
-    def _run(self, name: str, command: Command, wait: bool) -> bool | FlightFuture:
-        """See `Drone`; as in AirSim a drone on the ground takes off by any movement."""
-        self._require_armed(name)
-        return self._start(name, command, wait)
 
     def _moved(
         self, move: Callable[..., bool | FlightFuture], *args: Any, **kwargs: Any

@@ -57,6 +57,11 @@ class Drone:
     command is waited for.
     """
 
+    lifts_off = False
+    """Whether any movement takes off from the ground, as in AirSim."""
+    kept_states: int | None = None
+    """States that the trajectory keeps; all by default."""
+
     def __init__(
         self,
         dynamics: DynamicsSettings | Quadrotor | None = None,
@@ -114,14 +119,17 @@ class Drone:
         self._initial = copy.deepcopy((self.body, worlds.state if worlds else None, sensors))
         self.has_api_control = True
         """Whether commands are accepted; see `enable_api_control`."""
-        self.trajectory = Trajectory()
+        self._period = period_ticks(self.settings)
+        self.running: FlightFuture | None = None
+        """The running command, if any."""
+        self._begin(sensors)
+
+    def _begin(self, sensors: SensorSettings | None) -> None:
+        self.trajectory = Trajectory(self.kept_states)
         """The states since the drone was created or last reset."""
         self.trajectory.append(self.time, self.body)
         self._sensors = None if sensors is None else Sensors(self.body, sensors, self._seed)
         self._is_armed, self._landed = False, LandedState.LANDED
-        self._period = period_ticks(self.settings)
-        self.running: FlightFuture | None = None
-        """The running command, if any."""
         self._goals: Goals | None = None
         """Goals of the current control period."""
         self._left = 0
@@ -175,11 +183,7 @@ class Drone:
         self.body, state, sensors = copy.deepcopy(self._initial)
         if self.worlds is not None and state is not None:
             self.worlds.state = state
-        self.trajectory = Trajectory()
-        self.trajectory.append(self.time, self.body)
-        self._sensors = None if sensors is None else Sensors(self.body, sensors, self._seed)
-        self._is_armed, self._landed = False, LandedState.LANDED
-        self._goals, self._place, self._left, self._coasting = None, None, 0, 0
+        self._begin(sensors)
         return self.state
 
     def advance(self, seconds: float) -> PilotState:
@@ -279,9 +283,9 @@ class Drone:
             raise PilotError(f"{name}: the drone isn't armed; call arm() first")
 
     def _run(self, name: str, command: Command, wait: bool) -> bool | FlightFuture:
-        """Start a command that only a flying drone can run."""
+        """Start a command that only a flying drone can run, unless it `lifts_off`."""
         self._require_armed(name)
-        if not self._is_flying:
+        if not self._is_flying and not self.lifts_off:
             raise PilotError(f"{name}: the drone is on the ground; call take_off() first")
         return self._start(name, command, wait)
 
