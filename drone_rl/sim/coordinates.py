@@ -21,7 +21,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.sim.rendering.appearance import rotate
+from drone_rl.sim.rendering.appearance import product, rotate, turned
 
 Values = TypeVar("Values", Tensor, NDArray[Any])
 """A tensor or an array; functions return the kind that they take."""
@@ -77,6 +77,12 @@ def to_simulator(roll: float, pitch: float, yaw: float) -> Angles:
 def to_pilot(roll: float, pitch: float, yaw: float) -> Angles:
     """Convert the simulator's angles or rates about the drone's axes to a pilot's; units kept."""
     return roll, 0.0 - pitch, 0.0 - yaw  # not -0.0
+
+
+def attitude_of(roll: float, pitch: float, yaw: float) -> Tensor:
+    """Return the quaternion (w, x, y, z) of a pilot's angles, degrees. Shape: (4,), float64."""
+    x, y, z = to_simulator(roll, pitch, yaw)
+    return product(product(turned("yaw", z), turned("pitch", y)), turned("roll", x))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -323,8 +323,9 @@ def shown(value: Any) -> str:
 
 
 def _unboxed(value: Any) -> Any:
-    """Return the Python value of a number or truth value of NumPy, and anything else unchanged."""
-    is_scalar = type(value).__module__ == "numpy" and getattr(value, "shape", None) == ()
+    """Return the Python value of a number or truth value of NumPy or PyTorch; others unchanged."""
+    is_array = type(value).__module__ in ("numpy", "torch")
+    is_scalar = is_array and getattr(value, "shape", None) == ()
     return value.item() if is_scalar else value
 
 

@@ -1,6 +1,7 @@
 """A vehicle of the settings file: its start, its frames, and its state as AirSim's messages."""
 
 import copy
+import dataclasses
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
@@ -13,11 +14,11 @@ from drone_rl.config.sensors import SensorSettings
 from drone_rl.flight.airsim import messages
 from drone_rl.flight.airsim.cameras import CameraState
 from drone_rl.flight.airsim.collisions import Collision, CollisionRecord, Solids, collision_info
-from drone_rl.flight.airsim.messages import Map, Pose, nanoseconds, ned, to_world
-from drone_rl.flight.airsim.sensors import read_sensor
+from drone_rl.flight.airsim.messages import Map, Pose, nanoseconds, to_world
+from drone_rl.flight.airsim.sensors import SENSORS
 from drone_rl.flight.airsim.settings_file import POSING, Offset, VehicleChoice
 from drone_rl.flight.commands.pilot import Pilot
-from drone_rl.flight.commands.state import LandedState, Sensors, Trajectory
+from drone_rl.flight.commands.state import LandedState, Sensors
 from drone_rl.sim.coordinates import GeoPoint, geo_from_world, world_from_geo
 from drone_rl.sim.dynamics import FlightState, Obstacles, SingleQuadrotor
 from drone_rl.sim.dynamics.state import (
@@ -33,7 +34,6 @@ from drone_rl.sim.dynamics.state import (
     TICKS,
     TIME,
     VELOCITY,
-    BodyState,
 )
 from drone_rl.sim.rendering.appearance import rotate
 from drone_rl.sim.worlds import Worlds
@@ -44,8 +44,6 @@ _EARTH = 1e6
 """Half the height of the box that is the ground, metres."""
 _STANDS = 0.01
 """Metres above the ground up to which a vehicle stands on it."""
-_FAST = 50.0
-"""Speed up to which no vehicle passes a cube within one step, metres per second."""
 _FASTEST = 668.0
 """Speed of a rotor at full thrust, radians per second."""
 
@@ -56,6 +54,8 @@ class Airframe(Pilot):
     Positions are in NED, relative to the start position, metres; attitudes are those of FRD bodies
     in NED.
     """
+
+    lifts_off, kept_states = True, 1  # a server runs for days
 
     def __init__(
         self,
@@ -85,7 +85,7 @@ class Airframe(Pilot):
         """
         self.choice, self.geo_home, self.names = choice, home, tuple(names)
         self._object_id = object_id
-        start = _known(choice.start)
+        start = Offset(*messages.known(dataclasses.astuple(choice.start), (0.0,) * 6))
         x, y, up = to_world((start.x, start.y, start.z))
         posed = choice.kind == POSING
         up = max(dynamics.radius, height + up)
@@ -105,6 +105,8 @@ class Airframe(Pilot):
         self.home = self.body.position[0].clone()
         self._home = self.home.tolist()
         self._initial = (copy.deepcopy(self.body), None, None)  # the scene resets itself
+        self.cameras: dict[str, CameraState] = {}
+        """By our names of cameras."""
         self.epoch = 0
         """Time stamp of the vehicle's time 0: of its creation or last reset."""
         self.begin()
@@ -114,13 +116,10 @@ class Airframe(Pilot):
         self.has_api_control = self.choice.has_api_control
         self.collisions = CollisionRecord()
         self._before = self.body
-        self.came_from: torch.Tensor | None = None
-        """Where the last step began, if it was faster than `_FAST`. Shape: (3,)."""
         self._is_armed = self.choice.is_armed and not self.is_computer_vision
         self._hover()
         self._unseen: deque[tuple[FlightState, float]] = deque()
         """States that the sensors have not been updated to, and their seconds."""
-        self.trajectory = Trajectory(1)  # a server runs for days
         self.trajectory.append(self.time, self.body)
 
     def reset(self) -> Any:
@@ -135,9 +134,6 @@ class Airframe(Pilot):
         was_flying = self._is_flying
         self._advance(ticks)
         row = self.body.numbers.numpy()[0]
-        vx, vy, vz = row[VELOCITY : VELOCITY + 3].tolist()
-        is_fast = vx * vx + vy * vy + vz * vz > _FAST * _FAST
-        self.came_from = self._before.position[0] if is_fast else None
         if row[THING] != NOTHING and row[TIME] > (row[TICKS] - ticks + 0.5) * self.settings.tick:
             self._note_contact(row.tolist())
         if self._is_flying and not was_flying:
@@ -206,11 +202,8 @@ class Airframe(Pilot):
         home = self.home.tolist()
         return home[0] + x, home[1] + y, max(0.0, home[2] + z)
 
-    def _height(self, z: float) -> float:
-        return self._world((0.0, 0.0, z))[2]
-
-    def _relative(self, body: BodyState) -> list[float]:
-        return ned(body.position - self.home)
+    def _height(self, z: float | None) -> float | None:
+        return None if z is None else self._world((0.0, 0.0, z))[2]
 
     @property
     def pose(self) -> Pose:
@@ -330,7 +323,7 @@ class Airframe(Pilot):
 
     def sensor(self, kind: str) -> Map:
         """Return ImuData, BarometerData, MagnetometerData or GpsData."""
-        return read_sensor(self.sensors, kind, self.epoch)
+        return SENSORS[kind](self.sensors, self.epoch)
 
     def set_kinematics(self, pose: Pose, velocity: Sequence[float], rates: Sequence[float]) -> None:
         """Set pose, velocity, and rates about the axes of the FRD body; see `set_airsim_pose`."""
@@ -347,17 +340,13 @@ class Airframe(Pilot):
         Without `ignore_collision` it collides with the first obstacle on the straight line there,
         one of the `others` included, and stops before it.
         """
-        now = self.pose
-        place = [
-            n if math.isnan(v) else v for v, n in zip(pose.position, now.position, strict=True)
-        ]
-        turn = pose.attitude if not any(map(math.isnan, pose.attitude)) else now.attitude
-        there = self.home + torch.tensor(to_world(place), dtype=torch.float64)
+        pose = pose.merged(self.pose)
+        there = self.home + torch.tensor(to_world(pose.position), dtype=torch.float64)
         hit, radius = None, self.settings.radius
         solids = self._solids(others := [*others])
         if not ignore_collision:
             there, hit = solids.sweep(self.body.position[0], there, radius)
-        self.body = self.body.moved(there[None], messages.attitude_to_world(turn))
+        self.body = self.body.moved(there[None], messages.attitude_to_world(pose.attitude)[None])
         self._place, self._coasting = None, 0
         self.trajectory.append(self.time, self.body)
         gaps = zip(solids.names, solids.gaps(there, radius).tolist(), strict=True)
@@ -400,9 +389,3 @@ class Airframe(Pilot):
             rows.append((other.choice.name, at, (0.0, 0.0, 0.0), radius))
         names, *parts = zip(*rows, strict=True)
         return Solids(names, *(torch.tensor(part, dtype=torch.float64) for part in parts))
-
-
-def _known(offset: Offset) -> Offset:
-    """Replace NaN components by 0."""
-    values = (offset.x, offset.y, offset.z, offset.roll, offset.pitch, offset.yaw)
-    return Offset(*(0.0 if math.isnan(value) else value for value in values))

@@ -5,14 +5,11 @@ import logging
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
-from typing import Any
 
 _log = logging.getLogger(__name__)
 
 _NOTE: ContextVar[Callable[[str], None]] = ContextVar("note", default=lambda words: None)
 """Takes the remarks on the present call."""
-_MOST = 1000
-"""Different methods, and different remarks, that are counted."""
 
 
 def remark(words: str) -> None:
@@ -32,14 +29,13 @@ class Calls:
     def call(self, client: str, method: str) -> Iterator[None]:
         """Count a call, and log the remarks on it that are new, before it is answered."""
         method = _printable(method)
-        _count(self._made, method)
-        noted: set[str] = set()
+        self._made[method] += 1
 
         def note(words: str) -> None:
             words = f"{method}: {_printable(words)}"
-            if words not in noted and _count(self._remarks, words) == 1:
+            if words not in self._remarks:
                 _log.warning("%s: %s", client, words)
-            noted.add(words)
+            self._remarks[words] += 1
 
         token = _NOTE.set(note)
         try:
@@ -60,10 +56,3 @@ class Calls:
 def _printable(text: str) -> str:
     """Escape what would end a line of the log or control a terminal."""
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
-
-
-def _count(counter: Counter[Any], key: str) -> int:
-    """Count a key, unless there are too many; return its count."""
-    if key in counter or len(counter) < _MOST:
-        counter[key] += 1
-    return counter[key]

@@ -8,15 +8,16 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from drone_rl.flight.airsim.messages import to_world
+from drone_rl.flight.airsim.messages import known, to_world
 from drone_rl.flight.airsim.settings_file import CameraChoice, Capture, Offset
 from drone_rl.flight.image_types import ImageType
+from drone_rl.sim.coordinates import attitude_of, inverse
 from drone_rl.sim.entities import DRONE_CAMERAS, find_camera
 from drone_rl.sim.rendering import Mounting
-from drone_rl.sim.rendering.appearance import product, turned, zoom_for_fov
+from drone_rl.sim.rendering.appearance import product, zoom_for_fov
 
-_BASES = {"back_center": (180.0, 0.0, 0.0), "bottom_center": (0.0, -90.0, 0.0)}
-"""AirSim's yaw, pitch and roll of cameras that do not look ahead, degrees."""
+_BASES = {"back_center": (0.0, 0.0, 180.0), "bottom_center": (0.0, -90.0, 0.0)}
+"""AirSim's roll, pitch and yaw of cameras that do not look ahead, degrees."""
 _LEVEL = (1.0, 0.0, 0.0, 0.0)
 _DEFAULT = Capture()
 
@@ -53,11 +54,10 @@ class CameraState:
             2 * math.atan(math.tan(math.radians(vertical_fov) / 2) * capture.width / capture.height)
         )
         base = _attitude(self.name, Offset())
-        inverse = base * base.new_tensor([1.0, -1.0, -1.0, -1.0])
         zoom = zoom_for_fov(own, torch.tensor(capture.fov, dtype=torch.float64))
         spec = find_camera(self.name)
         offset = tuple(a - b for a, b in zip(self.position, spec.pos, strict=True))
-        turn = product(self.attitude, inverse)
+        turn = product(self.attitude, inverse(base))
         is_zoomed = abs(float(zoom) - 1) > 1e-9
         is_turned = not torch.allclose(turn.abs(), turn.new_tensor(_LEVEL))
         if not (any(offset) or is_turned or is_zoomed):
@@ -87,16 +87,12 @@ def make_cameras(
 
 def _camera(spec: Any, captures: Mapping[ImageType, Capture], own: CameraChoice) -> CameraState:
     offset = own.offset
-    given = to_world((offset.x, offset.y, offset.z))
-    x, y, z = (old if math.isnan(new) else new for old, new in zip(spec.pos, given, strict=True))
+    x, y, z = known(to_world((offset.x, offset.y, offset.z)), spec.pos)
     attitude = _attitude(spec.name, offset)
     return CameraState(spec.name, {**captures, **own.captures}, (x, y, z), attitude)
 
 
 def _attitude(name: str, offset: Offset) -> Tensor:
     """Return a camera's attitude in the drone's frame, at AirSim's angles where given. (4,)."""
-    given = (offset.yaw, offset.pitch, offset.roll)
-    base = _BASES.get(name, (0.0, 0.0, 0.0))
-    yaw, pitch, roll = (b if math.isnan(g) else g for b, g in zip(base, given, strict=True))
-    parts = (turned("yaw", -yaw), turned("pitch", -pitch), turned("roll", roll))
-    return product(product(parts[0], parts[1]), parts[2])
+    angles = (offset.roll, offset.pitch, offset.yaw)
+    return attitude_of(*known(angles, _BASES.get(name, (0.0, 0.0, 0.0))))

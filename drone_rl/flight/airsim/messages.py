@@ -3,7 +3,7 @@
 import datetime
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import torch
 from torch import Tensor
@@ -17,6 +17,8 @@ from drone_rl.utils.schema import shown
 
 Map = dict[str, Any]
 NANOSECONDS = 1_000_000_000
+LONGEST = 1e6
+"""Longest timeout or duration, seconds."""
 MAX_POINTS = 10_000
 """Most points of a path."""
 MAX_NAME = 50
@@ -35,12 +37,28 @@ class Pose(NamedTuple):
     Components may be NaN, for no change or for no such object.
     """
 
-    position: tuple[float, float, float]
-    attitude: tuple[float, float, float, float]
+    position: Sequence[float]
+    attitude: Sequence[float]
+
+    @classmethod
+    def of(cls, position: Tensor, attitude: Tensor) -> Self:
+        """Convert a position (3,) and an attitude (4,) of our world."""
+        return cls(ned(position), tuple(ned_attitude_from_world(attitude.double()).tolist()))
+
+    def merged(self, now: "Pose") -> "Pose":
+        """Replace NaN coordinates, and an attitude with NaN, by those of another pose."""
+        is_turned = not any(map(math.isnan, self.attitude))
+        attitude = self.attitude if is_turned else now.attitude
+        return Pose(known(self.position, now.position), attitude)
 
 
-NO_POSE = Pose((math.nan, math.nan, math.nan), (math.nan, math.nan, math.nan, math.nan))
+NO_POSE = Pose((math.nan,) * 3, (math.nan,) * 4)
 """Of an object that does not exist."""
+
+
+def known(values: Sequence[float], others: Sequence[float]) -> tuple[float, ...]:
+    """Replace NaN values by others."""
+    return tuple(o if math.isnan(v) else v for v, o in zip(values, others, strict=True))
 
 
 def vector(values: Sequence[float]) -> Map:
@@ -92,14 +110,9 @@ def read_date(text: str) -> int:
     return nanoseconds(seconds)
 
 
-def ned(values: Tensor) -> list[float]:
-    """Convert a vector of our world, or of our body's frame, to NED or FRD. Shape: (1, 3)."""
-    return ned_from_world(values[0].double()).tolist()
-
-
-def ned_attitude(values: Tensor) -> list[float]:
-    """Convert an attitude (1, 4) to that of an FRD body in NED."""
-    return ned_attitude_from_world(values[0].double()).tolist()
+def ned(values: Tensor) -> tuple[float, ...]:
+    """Convert a vector of our world, or of our body's frame, to NED or FRD. Shape: (3,)."""
+    return tuple(ned_from_world(values.double()).tolist())
 
 
 def to_world(values: Sequence[float]) -> tuple[float, float, float]:
@@ -109,14 +122,14 @@ def to_world(values: Sequence[float]) -> tuple[float, float, float]:
 
 
 def attitude_to_world(values: Sequence[float]) -> Tensor:
-    """Convert an attitude of an FRD body in NED, normalized, to ours. Shape: (1, 4).
+    """Convert an attitude of an FRD body in NED, normalized, to ours. Shape: (4,).
 
     Raises an `InputError` if it has no length.
     """
-    given = torch.tensor([list(values)], dtype=torch.float64)
+    given = torch.tensor(values, dtype=torch.float64)
     length = float(given.norm())
     if not 1e-6 < length < math.inf:
-        raise InputError(f"orientation={list(values)} is no rotation; give a unit quaternion")
+        raise InputError(f"orientation={[*values]} is no rotation; give a unit quaternion")
     return ned_attitude_from_world(given / length)
 
 
@@ -172,11 +185,9 @@ def read_map(
     Numbers are limited to `most` in magnitude. Raises an `InputError` if it is no map, or a value
     is missing or no number; NaN is accepted if `can_be_nan`.
     """
-    if not isinstance(value, Mapping):
-        raise InputError(f"{name}={shown(value)} is not a map; give {', '.join(keys)}")
     found = []
     for key in keys:
-        given = value.get(key, value.get(key.encode()))
+        given = part(value, name, key)
         if can_be_nan and isinstance(given, float) and math.isnan(given):
             found.append(given)
         else:
@@ -186,10 +197,14 @@ def read_map(
 
 def read_vector(
     value: Any, name: str, *, can_be_nan: bool = False, most: float = _LARGEST
-) -> tuple[float, float, float]:
+) -> list[float]:
     """Return the numbers of a Vector3r; errors as of `read_map`."""
-    x, y, z = read_map(value, name, ("x_val", "y_val", "z_val"), can_be_nan=can_be_nan, most=most)
-    return x, y, z
+    return read_map(value, name, ("x_val", "y_val", "z_val"), can_be_nan=can_be_nan, most=most)
+
+
+def read_attitude(value: Any, name: str, *, can_be_nan: bool = False) -> list[float]:
+    """Return the numbers of a Quaternionr, w first; errors as of `read_map`."""
+    return read_map(value, name, ("w_val", "x_val", "y_val", "z_val"), can_be_nan=can_be_nan)
 
 
 def read_pose(value: Any, name: str = "pose") -> Pose:
@@ -197,41 +212,41 @@ def read_pose(value: Any, name: str = "pose") -> Pose:
 
     Coordinates are limited to `checks.FARTHEST` in magnitude.
     """
-    parts = [_part(value, name, part) for part in ("position", "orientation")]
-    keys = ("w_val", "x_val", "y_val", "z_val")
-    w, x, y, z = read_map(parts[1], f"{name}.orientation", keys, can_be_nan=True)
-    position = read_vector(parts[0], f"{name}.position", can_be_nan=True, most=FARTHEST)
-    return Pose(position, (w, x, y, z))
+    place, turn = (part(value, name, key) for key in ("position", "orientation"))
+    position = read_vector(place, f"{name}.position", can_be_nan=True, most=FARTHEST)
+    return Pose(position, read_attitude(turn, f"{name}.orientation", can_be_nan=True))
 
 
-def _part(value: Any, name: str, part: str) -> Any:
+def part(value: Any, name: str, key: str) -> Any:
+    """Return a value of a map, None without one; an `InputError` if it is no map.
+
+    Keys may be bytes, as those of old clients.
+    """
     if not isinstance(value, Mapping):
-        raise InputError(f"{name}={shown(value)} is not a map; give position and orientation")
-    return value.get(part, value.get(part.encode()))
+        raise InputError(f"{name}={shown(value)} is not a map; give one with {key}")
+    return value.get(key, value.get(key.encode()))
 
 
-def read_path(value: Any, name: str = "path") -> list[tuple[float, float, float]]:
+def read_path(value: Any, name: str = "path") -> list[list[float]]:
     """Return the points of a path, at least one; errors as of `read_map`."""
     if not isinstance(value, list | tuple) or not 0 < len(value) <= MAX_POINTS:
         raise InputError(f"{name} is not a list of 1 to {MAX_POINTS} points; give one")
     return [read_vector(point, name, most=FARTHEST) for point in value]
 
 
-def read_yaw_mode(value: Any, drivetrain: Any) -> tuple[str, YawMode]:
-    """Return the drivetrain and the yaw mode of a movement.
+def read_drivetrain(value: Any, name: str) -> Drivetrain:
+    """Return the drivetrain of 0 or 1."""
+    is_forward = whole(value, name, 0, 1) == 1
+    return Drivetrain.FORWARD_ONLY if is_forward else Drivetrain.MAX_DEGREE_OF_FREEDOM
 
-    Raises:
-        InputError: Numbers are wrong, or a rate other than 0 is combined with ForwardOnly.
-    """
-    is_forward = whole(drivetrain, "drivetrain", 0, 1) == 1
-    if not isinstance(value, Mapping):
-        raise InputError(f"yaw_mode={shown(value)} is not a map; give is_rate and yaw_or_rate")
-    is_rate = flag(value.get("is_rate", value.get(b"is_rate")), "yaw_mode.is_rate")
-    most = MOST_TURN if is_rate else _LARGEST
-    (amount,) = read_map(value, "yaw_mode", ("yaw_or_rate",), most=most)
-    if is_forward and is_rate:
-        if amount != 0.0:
-            raise InputError("Yaw cannot be specified as rate if drivetrain is ForwardOnly")
-        is_rate = False
-    kind = Drivetrain.FORWARD_ONLY if is_forward else Drivetrain.MAX_DEGREE_OF_FREEDOM
-    return kind, YawMode(is_rate, math.remainder(amount, 360.0) if not is_rate else amount)
+
+def read_yaw_mode(value: Any, name: str) -> YawMode:
+    """Return the yaw mode of a map; errors as of `read_map`."""
+    is_rate = flag(part(value, name, "is_rate"), f"{name}.is_rate")
+    (amount,) = read_map(value, name, ("yaw_or_rate",), most=MOST_TURN if is_rate else _LARGEST)
+    return YawMode(is_rate, amount if is_rate else math.remainder(amount, 360.0))
+
+
+def read_seconds(value: Any, name: str) -> float:
+    """Return a timeout or duration within what pilots accept: clients send up to 3e38."""
+    return min(max(number(value, name), 0.0), LONGEST)

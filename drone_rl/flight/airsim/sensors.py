@@ -5,19 +5,9 @@ import math
 from torch import Tensor
 
 from drone_rl.flight.airsim import messages
-from drone_rl.flight.airsim.messages import Map, nanoseconds, ned, ned_attitude
+from drone_rl.flight.airsim.messages import Map, nanoseconds, ned
 from drone_rl.flight.commands.state import Sensors
-
-
-def read_sensor(sensors: Sensors, kind: str, epoch: int = 0) -> Map:
-    """Return ImuData, BarometerData, MagnetometerData or GpsData.
-
-    Args:
-        sensors: Sensors of one vehicle.
-        kind: imu, barometer, magnetometer or gps.
-        epoch: Time stamp of the vehicle's time 0.
-    """
-    return _SENSORS[kind](sensors, epoch)
+from drone_rl.sim.coordinates import ned_attitude_from_world
 
 
 def _time(of: Tensor, epoch: int) -> int:
@@ -28,11 +18,12 @@ def _time(of: Tensor, epoch: int) -> int:
 
 def _imu(sensors: Sensors, epoch: int) -> Map:
     reading = sensors.imu()
+    turn = ned_attitude_from_world(reading.attitude[0]).tolist()
     return {
         "time_stamp": _time(reading.time, epoch),
-        "orientation": messages.quaternion(ned_attitude(reading.attitude)),
-        "angular_velocity": messages.vector(ned(reading.angular_velocity)),
-        "linear_acceleration": messages.vector(ned(reading.specific_force)),
+        "orientation": messages.quaternion(turn),
+        "angular_velocity": messages.vector(ned(reading.angular_velocity[0])),
+        "linear_acceleration": messages.vector(ned(reading.specific_force[0])),
     }
 
 
@@ -50,7 +41,7 @@ def _magnetometer(sensors: Sensors, epoch: int) -> Map:
     reading = sensors.magnetometer()
     return {
         "time_stamp": _time(reading.time, epoch),
-        "magnetic_field_body": messages.vector(ned(reading.field)),
+        "magnetic_field_body": messages.vector(ned(reading.field[0])),
         "magnetic_field_covariance": [],
     }
 
@@ -64,7 +55,7 @@ def _gps(sensors: Sensors, epoch: int) -> Map:
             "geo_point": messages.geo_point(reading.place[0].tolist()),
             "eph": error,
             "epv": error,
-            "velocity": messages.vector(ned(reading.velocity)),
+            "velocity": messages.vector(ned(reading.velocity[0])),
             "fix_type": int(reading.fix[0]),
             "time_utc": _time(reading.time, epoch) // 1000,
         },
@@ -72,4 +63,5 @@ def _gps(sensors: Sensors, epoch: int) -> Map:
     }
 
 
-_SENSORS = {"imu": _imu, "barometer": _barometer, "magnetometer": _magnetometer, "gps": _gps}
+SENSORS = {"imu": _imu, "barometer": _barometer, "magnetometer": _magnetometer, "gps": _gps}
+"""Functions of the sensors of a vehicle and the time stamp of its time 0, by kind."""

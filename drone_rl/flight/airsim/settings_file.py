@@ -1,7 +1,7 @@
 """AirSim's settings.json: vehicles, cameras, clock, wind and server.
 
 The file may have single quotes, comments and trailing commas, as in the chapter's listings. Keys
-that AirSim has and this package does not need are ignored in silence; others are warned about.
+that this package does not know are ignored; those that are like known ones are warned about.
 """
 
 import dataclasses
@@ -19,7 +19,7 @@ from drone_rl.sim.coordinates import HOME, GeoPoint
 from drone_rl.sim.entities import find_camera
 from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.files import read_bytes
-from drone_rl.utils.schema import Flag, Kind, Maybe, OneOf, Real, Text, Whole, shown
+from drone_rl.utils.schema import Flag, OneOf, Real, Text, Whole, shown
 
 _log = logging.getLogger(__name__)
 
@@ -112,84 +112,44 @@ class AirsimSettings:
     """The file, as JSON."""
 
 
-@dataclasses.dataclass(frozen=True)
-class _Table:
-    """The keys of one object of the file."""
-
-    keys: Mapping[str, Any]
-    """Kinds of values; `_Table`, or a one-element list or mapping of it, for nested objects."""
-    unused: frozenset[str] = frozenset()
-    """Keys that AirSim has and that mean nothing here."""
-
-
-def _words(text: str) -> frozenset[str]:
-    return frozenset(text.split())
-
-
 _NUMBER = Real(-1e9, 1e9)
 _POSE = dict.fromkeys(("X", "Y", "Z", "Roll", "Pitch", "Yaw"), _NUMBER)
-_CAPTURE = _Table(
-    {
-        "ImageType": Whole(-1, 9),
-        "Width": Whole(1, 4096),
-        "Height": Whole(1, 4096),
-        "FOV_Degrees": Real(1.0, 170.0),
+_CAPTURE = {
+    "ImageType": Whole(-1, 9),
+    "Width": Whole(1, 4096),
+    "Height": Whole(1, 4096),
+    "FOV_Degrees": Real(1.0, 170.0),
+}
+_CAMERA = {**_POSE, "CaptureSettings": [_CAPTURE]}
+_VEHICLE = {
+    **_POSE,
+    "VehicleType": OneOf(_TYPES, also=("ArduCopter", "PhysXCar", "ArduRover")),
+    "DefaultVehicleState": OneOf(_STATES, also=("",)),
+    "AutoCreate": Flag(),
+    "AllowAPIAlways": Flag(),
+    "Cameras": {"": _CAMERA},
+}
+_FILE = {
+    "SettingsVersion": _NUMBER,
+    "SimMode": OneOf(SIM_MODES, also=("Car", "car", "")),
+    "UsageScenario": Text(),
+    "ApiServerPort": Whole(0, 65535),
+    "ApiServerEndpoint": Text(),  # unused
+    "LocalHostIp": Text(),
+    "ClockSpeed": Real(0.0, 1000.0, is_above=True),
+    "ClockType": Text(),  # unused
+    "OriginGeopoint": {
+        "Latitude": Real(-90.0, 90.0),
+        "Longitude": Real(-180.0, 180.0),
+        "Altitude": Real(-1000.0, 10_000.0),
     },
-    _words(
-        "AutoExposureSpeed AutoExposureBias AutoExposureMaxBrightness AutoExposureMinBrightness "
-        "MotionBlurAmount TargetGamma ProjectionMode OrthoWidth"
-    ),
-)
-_CAMERA = _Table(
-    {**_POSE, "CaptureSettings": [_CAPTURE]}, frozenset({"NoiseSettings", "Gimbal", "UnrealEngine"})
-)
-_VEHICLE = _Table(
-    {
-        **_POSE,
-        "VehicleType": OneOf(_TYPES, also=("ArduCopter", "PhysXCar", "ArduRover")),
-        "DefaultVehicleState": OneOf(_STATES, also=("",)),
-        "AutoCreate": Flag(),
-        "AllowAPIAlways": Flag(),
-        "Cameras": {"": _CAMERA},
-    },
-    _words(
-        "EnableCollisions EnableCollisionPassthrogh EnableTrace RC Sensors PawnPath IsFpvVehicle "
-        "UseSerial UseTcp TcpPort ControlIp ControlPort ControlPortLocal ControlPortRemote UdpIp "
-        "UdpPort SerialPort SerialBaudRate LockStep Parameters Model QgcHostIp LocalHostIp SitlIp "
-        "SitlPort SimSysID SimCompID VehicleSysID VehicleCompID OffboardSysID OffboardCompID"
-    ),
-)
-_FILE = _Table(
-    {
-        "SettingsVersion": _NUMBER,
-        "SimMode": OneOf(SIM_MODES, also=("Car", "car", "")),
-        "UsageScenario": Text(),
-        "ApiServerPort": Whole(0, 65535),
-        "LocalHostIp": Text(),
-        "ClockSpeed": Real(0.0, 1000.0, is_above=True),
-        "OriginGeopoint": _Table(
-            {
-                "Latitude": Real(-90.0, 90.0),
-                "Longitude": Real(-180.0, 180.0),
-                "Altitude": Real(-1000.0, 10_000.0),
-            }
-        ),
-        "Wind": _Table(dict.fromkeys(("X", "Y", "Z"), Real(-50.0, 50.0))),
-        "CameraDefaults": _CAMERA,
-        "Vehicles": {"": _VEHICLE},
-        "Recording": _Table({**RECORDING, "Cameras": [_Table(RECORDED)]}),
-        "SegmentationSettings": _Table(
-            {"InitMethod": OneOf(("CommonObjectsRandomIDs", "None"), also=("",))},
-            frozenset({"MeshNamingMethod", "OverrideExisting"}),
-        ),
-    },
-    _words(
-        "ClockType ViewMode SubWindows PawnPaths TimeOfDay LogMessagesVisible RpcEnabled "
-        "PhysicsEngineName EngineSound SpeedUnitFactor SpeedUnitLabel RecordUIVisible "
-        "MoveWorldOrigin PawnPaths CameraDirector DefaultSensors Beacons ExternalCameras "
-        "ShowLosDebugLines InitialInstanceSegmentation ApiServerEndpoint PhysicsEngine"
-    ),
-)
+    "Wind": dict.fromkeys(("X", "Y", "Z"), Real(-50.0, 50.0)),
+    "CameraDefaults": _CAMERA,
+    "Vehicles": {"": _VEHICLE},
+    "Recording": {**RECORDING, "Cameras": [RECORDED]},
+    "SegmentationSettings": {"InitMethod": OneOf(("CommonObjectsRandomIDs", "None"), also=("",))},
+}
+"""Keys of the file, with the kinds of their values; "" is any key, a list has one kind of items."""
 
 
 def find_settings() -> AirsimSettings | None:
@@ -246,7 +206,7 @@ def _read_text(path: Path) -> str:
 def parse_settings(text: str, name: str = "settings.json") -> AirsimSettings:
     """Read settings from the text of a file; see `read_settings` for errors."""
     data = _load(text, name)
-    found = _read(_FILE, data, "", name)
+    found = _read(_FILE, data, "", name) or {}
     if found.get("SimMode", "").lower() == "car":
         raise InputError(f"{name}: SimMode=Car is not supported; give {' or '.join(SIM_MODES)}")
     scenario = found.get("UsageScenario", "")
@@ -310,52 +270,39 @@ def _is_closed(comment: str) -> bool:
     return comment.startswith("//") or (len(comment) > 3 and comment.endswith("*/"))
 
 
-def _read(table: _Table, data: Any, path: str, name: str) -> dict[str, Any]:
-    """Return the values of the known keys of one object, except null and NaN.
+def _read(kind: Any, value: Any, where: str, name: str) -> Any:
+    """Return a value of a kind, or of a table of kinds, without keys that mean nothing here.
 
-    Unknown keys are warned about; a wrong value is an `InputError` with the key's path.
+    None stands for null and NaN, which mean the default. Keys like known ones are warned about; a
+    wrong value is an `InputError` with the key's path.
     """
-    if not isinstance(data, Mapping):
-        raise InputError(f"{name}: {path or 'the file'} is not an object; write {{...}}")
-    found: dict[str, Any] = {}
-    for key, value in data.items():
-        where = f"{path}.{key}" if path else key
-        kind = table.keys.get(key)
-        if kind is not None:
-            content = _read_as(kind, value, where, name)
-            if content is not None:
-                found[key] = content
-        elif key not in table.unused:
-            meant = did_you_mean(key, (*table.keys, *table.unused))
-            _log.warning("%s: %s is unknown and ignored%s", name, where, meant)
-    return found
-
-
-def _read_as(kind: Any, value: Any, where: str, name: str) -> Any:
-    """Return a value of a kind, which may be a table, or a list or mapping of a table.
-
-    None stands for null and NaN, which mean the default.
-    """
-    if value is None:
+    if value is None or (isinstance(value, float) and math.isnan(value)):
         return None
-    if isinstance(kind, _Table):
-        return _read(kind, value, where, name)
+    path = f"{name}: {where or 'the file'}"
     if isinstance(kind, list):
         if not isinstance(value, list):
-            raise InputError(f"{name}: {where} is not a list; write [...]")
-        return [_read(kind[0], v, f"{where}[{i}]", name) for i, v in enumerate(value)]
-    if isinstance(kind, Mapping):
-        if not isinstance(value, Mapping):
-            raise InputError(f"{name}: {where} is not an object; write {{...}}")
-        return {k: _read(kind[""], v, f"{where}.{k}", name) for k, v in value.items()}
-    return _value(kind, value, f"{name}: {where}")
+            raise InputError(f"{path} is not a list; write [...]")
+        return [_read(kind[0], item, f"{where}[{i}]", name) or {} for i, item in enumerate(value)]
+    if not isinstance(kind, Mapping):
+        return kind.read(value, path)
+    if not isinstance(value, Mapping):
+        raise InputError(f"{path} is not an object; write {{...}}")
+    return _read_table(kind, value, where, name)
 
 
-def _value(kind: Kind, value: Any, where: str) -> Any:
-    # AirSim's files may have NaN for a number, which means its default
-    if isinstance(value, float) and math.isnan(value):
-        return None
-    return Maybe(kind).read(value, where)
+def _read_table(
+    kind: Mapping[str, Any], value: Mapping[str, Any], where: str, name: str
+) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, item in value.items():
+        inner = f"{where}.{key}" if where else key
+        if key in kind or "" in kind:
+            content = _read(kind.get(key) or kind[""], item, inner, name)
+            if content is not None:
+                found[key] = content
+        elif meant := did_you_mean(key, kind):
+            _log.warning("%s: %s is unknown and ignored%s", name, inner, meant)
+    return found
 
 
 def _kind(mode: str) -> str:

@@ -11,15 +11,13 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.flight.airsim.cameras import CameraState, make_cameras
+from drone_rl.flight.airsim.cameras import make_cameras
 from drone_rl.flight.airsim.messages import (
     Pose,
     attitude_to_world,
     nanoseconds,
     ned,
-    ned_attitude,
     read_date,
-    read_pose,
     to_world,
 )
 from drone_rl.flight.airsim.messages import pose as pose_map
@@ -100,8 +98,6 @@ class Simulation:
         self._ticks = 0
         """Physics ticks that have passed."""
         self.vehicles: dict[str, Vehicle] = {}
-        self.cameras: dict[str, dict[str, CameraState]] = {}
-        """Of each vehicle, by our names of cameras."""
         for choice in settings.vehicles:
             self.add(choice)
         self.is_paused = False
@@ -151,19 +147,19 @@ class Simulation:
         )
         vehicle.epoch = self.stamp
         self.vehicles[choice.name] = vehicle
-        self.cameras[choice.name] = make_cameras(self.settings.captures, choice.cameras)
+        vehicle.cameras = make_cameras(self.settings.captures, choice.cameras)
         return vehicle
 
-    def add_named(self, name: str, kind: str, pose: Any) -> bool:
+    def add_named(self, name: str, kind: str, pose: Pose) -> bool:
         """Add a vehicle as `simAddVehicle` does; return whether its type is known."""
         found = {"simpleflight": FLYING, "computervision": POSING}.get(kind.lower())
         if found is None:
             return False
-        position, attitude = read_pose(pose)
         angles = Attitude(0.0, 0.0, 0.0)
-        if not any(map(math.isnan, attitude)):
-            angles = Attitude.of(attitude_to_world(attitude)[0].tolist())
-        start = Offset(*position, angles.roll, angles.pitch, angles.yaw)
+        if not any(map(math.isnan, pose.attitude)):
+            angles = Attitude.of(attitude_to_world(pose.attitude).tolist())
+        x, y, z = pose.position
+        start = Offset(x, y, z, angles.roll, angles.pitch, angles.yaw)
         self.add(VehicleChoice(name, found, start))
         return True
 
@@ -198,11 +194,11 @@ class Simulation:
         """Return the Pose of an object or a vehicle in NED, see `place`."""
         if name in self.vehicles:
             body = self.vehicles[name].body
-            x, y, z = ned(body.position)
-            w, i, j, k = ned_attitude(body.attitude)
+            found = Pose.of(body.position[0], body.attitude[0])
         else:
-            (x, y, z), (w, i, j, k) = self.stage.object_pose(name)
-        return pose_map(Pose((x, y, z + self._origin), (w, i, j, k)))
+            found = self.stage.object_pose(name)
+        x, y, z = found.position
+        return pose_map(found._replace(position=(x, y, z + self._origin)))
 
     def place(self, position: Sequence[float]) -> tuple[float, float, float]:
         """Return the position in our world of one in NED from where vehicles start by default."""
@@ -212,10 +208,8 @@ class Simulation:
     def move_vehicle(self, name: str, pose: Pose, *, ignore_collision: bool) -> None:
         """Set a vehicle's pose in NED, see `place` and `teleport`; NaN components stay."""
         vehicle = self.vehicles[name]
-        x, y, z = to_world(
-            [a - b for a, b in zip(self.place(pose.position), vehicle.home.tolist(), strict=True)]
-        )
-        self.teleport(vehicle, Pose((x, y, z), pose.attitude), ignore_collision=ignore_collision)
+        place = ned(torch.tensor(self.place(pose.position), dtype=torch.float64) - vehicle.home)
+        self.teleport(vehicle, pose._replace(position=place), ignore_collision=ignore_collision)
 
     def teleport(self, vehicle: Vehicle, pose: Pose, *, ignore_collision: bool) -> None:
         """Put a vehicle somewhere, see `Airframe.set_airsim_pose`; it touches cubes on its way."""
@@ -352,7 +346,7 @@ class Simulation:
         ticks = self._next_ticks()
         for vehicle in self.vehicles.values():
             vehicle.run(ticks)
-            self.touch(vehicle, vehicle.came_from)
+            self.touch(vehicle)
         self._bump()
         self._ticks += ticks
         self._record()
@@ -390,8 +384,8 @@ class Simulation:
             self.recording = None
 
     def _recorded(self, name: str, image: RecordedImage) -> Tensor:
-        camera = self.cameras[name][image.camera]
-        (shot,) = self.stage.render(self.vehicles[name].body, camera, [image.kind])
+        vehicle = self.vehicles[name]
+        (shot,) = self.stage.render(vehicle.body, vehicle.cameras[image.camera], [image.kind])
         return self.stage.image(image.kind, shot, as_float=image.as_float)
 
     def stop_recording(self) -> None:

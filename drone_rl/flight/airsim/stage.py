@@ -15,7 +15,7 @@ from torch import Tensor
 from drone_rl.config import CameraSettings
 from drone_rl.flight.airsim.cameras import CameraState
 from drone_rl.flight.airsim.collisions import nearest
-from drone_rl.flight.airsim.messages import NO_POSE, Pose, ned, ned_attitude, to_world
+from drone_rl.flight.airsim.messages import NO_POSE, Pose, known, ned, to_world
 from drone_rl.flight.airsim.patterns import matching
 from drone_rl.flight.airsim.scenes import make_task
 from drone_rl.flight.airsim.settings_file import Capture
@@ -157,10 +157,9 @@ class Stage:
             name = model.geom(geom).name.partition("/")[2]
             attitude = np.zeros(4)
             mujoco.mju_mat2Quat(attitude, data.geom_xmat[geom])
-            x, y, z = to_world(data.geom_xpos[geom].tolist())
-            w, i, j, k = ned_attitude(torch.tensor(attitude)[None])
             if name:
-                found[name] = Pose((x, y, z), (w, i, j, k))
+                place = torch.tensor(data.geom_xpos[geom])
+                found[name] = Pose.of(place, torch.tensor(attitude))
         return found
 
     def find(self, pattern: str) -> list[str]:
@@ -173,18 +172,15 @@ class Stage:
         if name in ("Ground", SKY):
             return Pose((0.0, 0.0, 0.0), level)
         if name in self._of_file:
-            own, by = self._of_file[name], ned(self.task.places(self.worlds.state)[:, 0])
-            x, y, z = (a + b for a, b in zip(own.position, by, strict=True))
-            return Pose((x, y, z), own.attitude)
+            own, by = self._of_file[name], ned(self.task.places(self.worlds.state)[0, 0])
+            whole = [a + b for a, b in zip(own.position, by, strict=True)]
+            return Pose(whole, own.attitude)
         if name in self._spawned:
-            x, y, z = to_world(self._spawned[name].place)
-            return Pose((x, y, z), level)
+            return Pose(to_world(self._spawned[name].place), level)
         if name in self._names:
-            place = self.task.places(self.worlds.state)[:, self._names.index(name)]
-            if float(place[0, 2]) < -HIDDEN_DEPTH / 2:
-                return NO_POSE
-            x, y, z = ned(place)
-            return Pose((x, y, z), level)
+            place = self.task.places(self.worlds.state)[0, self._names.index(name)]
+            if float(place[2]) >= -HIDDEN_DEPTH / 2:
+                return Pose(ned(place), level)
         return NO_POSE
 
     def move_object(self, name: str, place: Sequence[float]) -> bool:
@@ -192,14 +188,11 @@ class Stage:
         now = to_world(self.object_pose(name).position)
         if any(map(math.isnan, now)) or name in ("Ground", SKY, *self._of_file):
             return False
-        x, y, z = (n if math.isnan(v) else v for v, n in zip(place, now, strict=True))
+        x, y, z = known(place, now)
         if name in self._spawned:
             self._spawned[name] = dataclasses.replace(self._spawned[name], place=(x, y, z))
-            return True
-        known = self._placed
-        if known.shape[-2] != len(self._names):
-            return False
-        known[0, self._names.index(name)] = torch.tensor((x, y, z), dtype=known.dtype)
+        else:
+            self._placed[0, self._names.index(name)] = self._placed.new_tensor((x, y, z))
         return True
 
     def spawn(self, name: str, asset: str, place: Sequence[float], size: float) -> str:

@@ -11,65 +11,40 @@ from torch import Tensor
 from drone_rl.config import DynamicsSettings
 from drone_rl.sim.dynamics import Quadrotor
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import shown
+from drone_rl.utils.schema import Real, Several, shown
 
 FARTHEST = 1e6
 """Greatest magnitude of a coordinate, metres, and by default of any number."""
+COORDINATE = Real(-FARTHEST, FARTHEST)
+DURATION = Real(0.0, FARTHEST)
+"""Seconds."""
+SPEED = Real(0.0, 100.0, is_above=True)
+"""Metres per second."""
+SHARE = Real(0.0, 1.0)
 
 
-def real(
-    value: Any,
-    name: str,
-    low: float = -FARTHEST,
-    high: float = FARTHEST,
-    *,
-    is_above: bool = False,
-    unit: str = "",
-) -> float:
-    """Return a finite number from `low` (above it if `is_above`) to `high`.
-
-    Raises:
-        InputError: The value is not such a number; the message has its name and unit.
-    """
-    try:
-        number = float(value)
-    except (TypeError, ValueError, OverflowError, RuntimeError):
-        number = math.nan
-    if not low <= number <= high or (is_above and number == low):
-        least = f"above {low:g}" if is_above else f"of {low:g} or more"
-        words = f"a finite number {least}, up to {high:g}{f' ({unit})' if unit else ''}"
-        raise InputError(f"{name}={_shown(value)} is invalid; give {words}")
-    return number
+def numbers(values: Any, name: str, count: int, kind: Real = COORDINATE) -> tuple[float, ...]:
+    """Return `count` numbers of a sequence, array or tensor; an `InputError` if it has others."""
+    given = values.tolist() if isinstance(values, Tensor | np.ndarray) else values
+    return Several(kind, count, count).read(given, name)
 
 
-def numbers(values: Any, name: str, count: int, low: float, high: float) -> list[float]:
-    """Return `count` finite numbers, each from `low` to `high`.
-
-    Raises:
-        InputError: The values are not such numbers.
-    """
-    try:
-        given = list(values)
-    except TypeError:
-        given = []
-    if len(given) != count:
-        raise InputError(f"{name}={_shown(values)} is invalid; give {count} numbers")
-    return [real(value, f"{name}[{i}]", low, high) for i, value in enumerate(given)]
-
-
-def duration(value: Any, name: str = "duration") -> float:
-    """Return a duration in seconds, which must not be negative."""
-    return real(value, name, 0.0, unit="s")
-
-
-def speed(value: Any, name: str = "speed") -> float:
-    """Return a speed above 0, at most 100 m/s."""
-    return real(value, name, 0.0, 100.0, is_above=True, unit="m/s")
+def degrees(value: Any, name: str, limit: float = 3600.0) -> float:
+    """Return an angle or rate in degrees, at most `limit` either way."""
+    return Real(-limit, limit).read(value, name)
 
 
 def radians(value: Any, name: str, limit: float = 3600.0) -> float:
-    """Convert an angle (or rate) given in degrees, at most `limit` either way."""
-    return math.radians(real(value, name, -limit, limit, unit="degrees"))
+    """Convert an angle or rate in degrees, at most `limit` either way."""
+    return math.radians(degrees(value, name, limit))
+
+
+def height(value: Any, name: str = "z") -> float:
+    """Return a height above the ground, metres; a negative one is an `InputError`."""
+    number = COORDINATE.read(value, name)
+    if number < 0.0:
+        raise InputError(f"{name}={number:g} is below the ground; z points up here, give 0 or more")
+    return number
 
 
 def time_limit(timeout: float | None, length: float, speed: float) -> float:
@@ -77,17 +52,7 @@ def time_limit(timeout: float | None, length: float, speed: float) -> float:
 
     By default it is three times the expected time plus 10 s; a negative one is an `InputError`.
     """
-    if timeout is None:
-        return 10.0 + 3.0 * length / speed
-    return duration(timeout, "timeout")
-
-
-def height(value: Any, name: str = "z") -> float:
-    """Return a height above the ground, metres; a negative one is an `InputError`."""
-    number = real(value, name, unit="m")
-    if number < 0.0:
-        raise InputError(f"{name}={number:g} is below the ground; z points up here, give 0 or more")
-    return number
+    return 10.0 + 3.0 * length / speed if timeout is None else DURATION.read(timeout, "timeout")
 
 
 def path(points: Any) -> Tensor:
@@ -97,18 +62,16 @@ def path(points: Any) -> Tensor:
         InputError: The path is empty or a point is invalid.
     """
     try:
-        places = np.asarray(points, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError, RuntimeError) as error:
-        raise InputError(f"path={_shown(points)} is invalid; give points (x, y, z)") from error
-    if places.size == 0:
-        raise InputError("path has no points; give at least one (x, y, z)")
-    if places.ndim != 2 or places.shape[1] != 3:
-        raise InputError(f"a path of shape {places.shape} is invalid; give points (x, y, z)")
-    for number, place in enumerate(places):
-        for axis, value in zip("xyz", place, strict=True):
-            check = height if axis == "z" else real
-            check(value.item(), f"path[{number}].{axis}")
-    return torch.from_numpy(places.copy())[None]
+        places: np.ndarray = np.array(points, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError, RuntimeError):
+        places = np.zeros(0)
+    if places.ndim != 2 or places.shape[1] != 3 or not len(places):
+        raise InputError(f"path={shown(points)} has no points; give some, each (x, y, z)")
+    for number, (x, y, z) in enumerate(places.tolist()):
+        COORDINATE.read(x, f"path[{number}].x")
+        COORDINATE.read(y, f"path[{number}].y")
+        height(z, f"path[{number}].z")
+    return torch.from_numpy(places)[None]
 
 
 def quadrotor(
@@ -128,9 +91,3 @@ def quadrotor(
             "Pilot(mass=1.3), or worlds=Worlds(1, task) for a scene"
         )
     return Quadrotor((dynamics or DynamicsSettings()).replace(mode="simple_flight", **changes))
-
-
-def _shown(value: Any) -> str:
-    """Return a value for a message, on one line."""
-    is_simple = isinstance(value, str | int | float)
-    return shown(value) if is_simple else " ".join(repr(value).split())

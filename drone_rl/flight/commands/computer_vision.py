@@ -1,17 +1,16 @@
 """Computer-vision mode (Table 1): poses without dynamics, and the objects of the scene."""
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 
 import torch
-from torch import Tensor
 
 from drone_rl.flight.commands import checks
 from drone_rl.flight.commands.command import PilotError
 from drone_rl.flight.commands.drone import Drone
 from drone_rl.flight.commands.state import PilotState
-from drone_rl.sim.coordinates import to_simulator
-from drone_rl.sim.rendering.appearance import product
+from drone_rl.sim.coordinates import attitude_of, to_simulator
 from drone_rl.sim.tasks.common import PropTask
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError, did_you_mean
@@ -21,22 +20,21 @@ STEP = 0.25
 """Metres that a key moves the drone."""
 TURN = 5.0
 """Degrees that a key turns the drone."""
-KEYS: Mapping[str, tuple[tuple[float, float, float], tuple[float, float, float]]] = {
-    "forward": ((STEP, 0.0, 0.0), (0.0, 0.0, 0.0)),
-    "backward": ((-STEP, 0.0, 0.0), (0.0, 0.0, 0.0)),
-    "left": ((0.0, STEP, 0.0), (0.0, 0.0, 0.0)),
-    "right": ((0.0, -STEP, 0.0), (0.0, 0.0, 0.0)),
-    "up": ((0.0, 0.0, STEP), (0.0, 0.0, 0.0)),
-    "down": ((0.0, 0.0, -STEP), (0.0, 0.0, 0.0)),
-    "roll_left": ((0.0, 0.0, 0.0), (-TURN, 0.0, 0.0)),
-    "roll_right": ((0.0, 0.0, 0.0), (TURN, 0.0, 0.0)),
-    "pitch_up": ((0.0, 0.0, 0.0), (0.0, TURN, 0.0)),
-    "pitch_down": ((0.0, 0.0, 0.0), (0.0, -TURN, 0.0)),
-    "yaw_left": ((0.0, 0.0, 0.0), (0.0, 0.0, -TURN)),
-    "yaw_right": ((0.0, 0.0, 0.0), (0.0, 0.0, TURN)),
+_AXES = {
+    "forward backward": STEP,
+    "left right": STEP,
+    "up down": STEP,
+    "roll_right roll_left": TURN,
+    "pitch_up pitch_down": TURN,
+    "yaw_right yaw_left": TURN,
 }
-"""What each key adds: metres forward, left and up in the drone's heading; degrees of roll, pitch
-and yaw."""
+KEYS: Mapping[str, tuple[int, float]] = {
+    key: (axis, sign * step)
+    for axis, (pair, step) in enumerate(_AXES.items())
+    for key, sign in zip(pair.split(), (1.0, -1.0), strict=True)
+}
+"""Which number each key changes, and by how much: metres forward, left and up in the drone's
+heading; degrees of roll, pitch and yaw."""
 
 
 class SceneDrone(Drone):
@@ -59,10 +57,9 @@ class SceneDrone(Drone):
         """
         if not self.is_computer_vision:
             raise PilotError("set_pose: the drone has dynamics; make Pilot(mode='computer_vision')")
-        place = checks.numbers(position, "position", 3, -checks.FARTHEST, checks.FARTHEST)
+        place = checks.numbers(position, "position", 3)
         named = ((roll, "roll"), (pitch, "pitch"), (yaw, "yaw"))
-        angles = to_simulator(*(checks.radians(value, name) for value, name in named))
-        attitude = _attitude(*angles)[None]
+        attitude = attitude_of(*(checks.degrees(value, name) for value, name in named))[None]
         self.body = self.body.moved(torch.tensor([place], dtype=torch.float64), attitude)
         self.trajectory.append(self.time, self.body)
         return self.state
@@ -76,15 +73,17 @@ class SceneDrone(Drone):
             raise InputError(
                 f"key={key!r} is unknown; give one of: {', '.join(KEYS)}{did_you_mean(key, KEYS)}"
             )
-        count, state = Whole(1, 100_000, "times").read(times, "times"), self.state
-        move, turn = KEYS[key]
+        count, state = Whole(1, 100_000).read(times, "times"), self.state
+        axis, step = KEYS[key]
+        change = [0.0] * 6
+        change[axis] = count * step
+        forward, left, up = change[:3]
         *_, heading = to_simulator(0.0, 0.0, math.radians(state.attitude.yaw))
         cos, sin = math.cos(heading), math.sin(heading)
-        forward, left, up = (count * part for part in move)
         x, y, z = state.position
         there = (x + cos * forward - sin * left, y + sin * forward + cos * left, z + up)
-        now = (state.attitude.roll, state.attitude.pitch, state.attitude.yaw)
-        after = (old + count * part for old, part in zip(now, turn, strict=True))
+        now = dataclasses.astuple(state.attitude)
+        after = (old + part for old, part in zip(now, change[3:], strict=True))
         roll, pitch, yaw = (math.remainder(angle, 360.0) for angle in after)
         return self.set_pose(there, roll=roll, pitch=pitch, yaw=yaw)
 
@@ -113,7 +112,7 @@ class SceneDrone(Drone):
             PilotError: The drone has no worlds, or their task does not let objects move.
         """
         worlds, index = self._object(name)
-        place = checks.numbers(position, "position", 3, -checks.FARTHEST, checks.FARTHEST)
+        place = checks.numbers(position, "position", 3)
         task = worlds.task
         if not isinstance(task, PropTask):
             raise PilotError(f"set_object_position: task {task.name} does not let objects move")
@@ -130,12 +129,3 @@ class SceneDrone(Drone):
 
 
 _GONE = (math.nan, math.nan, math.nan)
-
-
-def _attitude(roll: float, pitch: float, yaw: float) -> Tensor:
-    """Return the quaternion (w, x, y, z) of the simulator's angles, radians: yaw, pitch, roll."""
-    about = torch.zeros(3, 4, dtype=torch.float64)
-    half = torch.tensor([roll, pitch, yaw], dtype=torch.float64) / 2
-    about[:, 0] = half.cos()
-    about[[0, 1, 2], [1, 2, 3]] = half.sin()
-    return product(product(about[2], about[1]), about[0])

@@ -25,7 +25,7 @@ from drone_rl.flight.commands.command import (
 from drone_rl.flight.commands.path_following import GoHomeCommand
 from drone_rl.flight.commands.state import LandedState, PilotState, Sensors, Trajectory
 from drone_rl.flight.image_types import ImageRequest, images
-from drone_rl.sim.coordinates import to_simulator
+from drone_rl.sim.coordinates import attitude_of
 from drone_rl.sim.dynamics import FlightState, Goals, Obstacles, Quadrotor
 from drone_rl.sim.dynamics import state as fs
 from drone_rl.sim.dynamics.state import twist_about_z
@@ -56,6 +56,11 @@ class Drone:
     A new command replaces the running one. Simulated time advances only by `advance`, or while a
     command is waited for.
     """
+
+    lifts_off = False
+    """Whether any movement takes off from the ground, as in AirSim."""
+    kept_states: int | None = None
+    """States that the trajectory keeps; all by default."""
 
     def __init__(
         self,
@@ -97,15 +102,13 @@ class Drone:
         self.settings = self._quadrotor.settings
         """Vehicle and wind."""
         height = [] if self.is_computer_vision and np.size(start) == 3 else [self.settings.radius]
-        given = checks.numbers(start, "start", 3 - len(height), -checks.FARTHEST, checks.FARTHEST)
+        given = checks.numbers(start, "start", 3 - len(height))
         place = [[*given, *height]]
-        degrees = checks.real(yaw, "yaw", unit="degrees")
-        half = 0.5 * math.radians(to_simulator(0.0, 0.0, degrees)[2])
-        attitude = [[math.cos(half), 0.0, 0.0, math.sin(half)]]
+        attitude = attitude_of(0.0, 0.0, checks.degrees(yaw, "yaw"))
         self._seed = Whole(0, 2**31 - 1).read(seed, "seed")
         self.body = FlightState.at_rest(
             torch.tensor(place, dtype=torch.float64),
-            torch.tensor(attitude, dtype=torch.float64),
+            attitude[None],
             torch.tensor([self._seed]),
         )
         """The state as the simulator has it; a batch of one."""
@@ -116,14 +119,17 @@ class Drone:
         self._initial = copy.deepcopy((self.body, worlds.state if worlds else None, sensors))
         self.has_api_control = True
         """Whether commands are accepted; see `enable_api_control`."""
-        self.trajectory = Trajectory()
+        self._period = period_ticks(self.settings)
+        self.running: FlightFuture | None = None
+        """The running command, if any."""
+        self._begin(sensors)
+
+    def _begin(self, sensors: SensorSettings | None) -> None:
+        self.trajectory = Trajectory(self.kept_states)
         """The states since the drone was created or last reset."""
         self.trajectory.append(self.time, self.body)
         self._sensors = None if sensors is None else Sensors(self.body, sensors, self._seed)
         self._is_armed, self._landed = False, LandedState.LANDED
-        self._period = period_ticks(self.settings)
-        self.running: FlightFuture | None = None
-        """The running command, if any."""
         self._goals: Goals | None = None
         """Goals of the current control period."""
         self._left = 0
@@ -177,16 +183,12 @@ class Drone:
         self.body, state, sensors = copy.deepcopy(self._initial)
         if self.worlds is not None and state is not None:
             self.worlds.state = state
-        self.trajectory = Trajectory()
-        self.trajectory.append(self.time, self.body)
-        self._sensors = None if sensors is None else Sensors(self.body, sensors, self._seed)
-        self._is_armed, self._landed = False, LandedState.LANDED
-        self._goals, self._place, self._left, self._coasting = None, None, 0, 0
+        self._begin(sensors)
         return self.state
 
     def advance(self, seconds: float) -> PilotState:
         """Advance simulated time and return the state; a negative duration is an `InputError`."""
-        self._advance(self._ticks_of(checks.duration(seconds, "seconds")))
+        self._advance(self._ticks_of(checks.DURATION.read(seconds, "seconds")))
         return self.state
 
     def cancel(self) -> None:
@@ -281,9 +283,9 @@ class Drone:
             raise PilotError(f"{name}: the drone isn't armed; call arm() first")
 
     def _run(self, name: str, command: Command, wait: bool) -> bool | FlightFuture:
-        """Start a command that only a flying drone can run."""
+        """Start a command that only a flying drone can run, unless it `lifts_off`."""
         self._require_armed(name)
-        if not self._is_flying:
+        if not self._is_flying and not self.lifts_off:
             raise PilotError(f"{name}: the drone is on the ground; call take_off() first")
         return self._start(name, command, wait)
 

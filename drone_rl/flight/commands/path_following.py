@@ -13,7 +13,7 @@ from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.dynamics import GRAVITY
-from drone_rl.flight.commands.checks import real
+from drone_rl.flight.commands.checks import degrees
 from drone_rl.flight.commands.command import ACCURACY, PERIOD, Command, Land
 from drone_rl.sim.coordinates import to_simulator
 from drone_rl.sim.dynamics import FlightState, Goals, Mode
@@ -60,7 +60,7 @@ class YawMode:
     def __post_init__(self) -> None:
         """Check both values."""
         Flag().read(self.is_rate, "is_rate")
-        number = real(self.yaw_or_rate, "yaw_or_rate", -3600.0, 3600.0, unit="degrees")
+        number = degrees(self.yaw_or_rate, "yaw_or_rate")
         object.__setattr__(self, "yaw_or_rate", number)
 
 
@@ -80,17 +80,17 @@ class YawControl:
         """
         drivetrain = OneOf(tuple(Drivetrain)).read(drivetrain, "drivetrain")
         self.is_forward = drivetrain == Drivetrain.FORWARD_ONLY
-        self.yaw_mode = yaw_mode or YawMode(is_rate=not self.is_forward)
+        self.yaw_mode = yaw_mode or YawMode()
         if not isinstance(self.yaw_mode, YawMode):
             raise InputError(
                 f"yaw_mode={yaw_mode!r} is not a YawMode; give YawMode(is_rate, yaw_or_rate)"
             )
-        if self.is_forward and self.yaw_mode.is_rate:
+        is_rate = self.yaw_mode.is_rate and self.yaw_mode.yaw_or_rate != 0.0
+        if self.is_forward and is_rate:
             raise InputError(
                 f"yaw_mode={self.yaw_mode} turns at a rate, but drivetrain=forward_only faces the "
                 "direction of travel; give is_rate=False, or max_degree_of_freedom"
             )
-        is_rate = self.yaw_mode.is_rate and self.yaw_mode.yaw_or_rate != 0.0
         self.mode = Mode.RATE if is_rate else Mode.ANGLE
         """Goal mode of the heading."""
         self._heading = body.heading.clone()

@@ -36,7 +36,7 @@ from drone_rl.sim.coordinates import to_simulator
 from drone_rl.sim.dynamics import FlightState, Goals, Mode
 from drone_rl.sim.dynamics.control import Modes, rotor_goals
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Instance, OneOf
+from drone_rl.utils.schema import Instance, OneOf, Real
 
 MOVING = 0.05
 """Speed in m/s above which a drone can't take off."""
@@ -66,7 +66,7 @@ class Sticks:
     def __post_init__(self) -> None:
         """Check the positions."""
         for field in dataclasses.fields(self):
-            number = checks.real(getattr(self, field.name), field.name, -1.0, 1.0)
+            number = Real(-1.0, 1.0).read(getattr(self, field.name), field.name)
             object.__setattr__(self, field.name, number)
 
 
@@ -131,7 +131,7 @@ class Pilot(SceneDrone):
         self, timeout: float | None = None, *, speed: float = TAKEOFF_SPEED, wait: bool = True
     ) -> bool | FlightFuture:
         """Fly to the starting position at the present height and land there."""
-        pace = checks.speed(speed)
+        pace = checks.SPEED.read(speed, "speed")
         position = self.body.position
         over = torch.cat([self.home[:2], position[0, 2:]])[None, None]
         away, height = float((over[0] - position).norm()), float(position[0, 2])
@@ -142,7 +142,9 @@ class Pilot(SceneDrone):
 
     def hover(self, duration: float = 0.0, *, wait: bool = True) -> bool | FlightFuture:
         """Hold the position for some seconds and afterwards."""
-        return self._run("hover", Hover(self.body, checks.duration(duration)), wait)
+        return self._run(
+            "hover", Hover(self.body, checks.DURATION.read(duration, "duration")), wait
+        )
 
     def move_by_angle(
         self,
@@ -196,7 +198,7 @@ class Pilot(SceneDrone):
         self, shares: Sequence[float], duration: float, *, wait: bool = True
     ) -> bool | FlightFuture:
         """Set all rotors: front right, rear left, front left, rear right, each from 0 to 1."""
-        rotors = checks.numbers(shares, "shares", 4, 0.0, 1.0)
+        rotors = checks.numbers(shares, "shares", 4, checks.SHARE)
         goals = rotor_goals(torch.tensor([rotors], dtype=torch.float64))
         return self._hold("move_by_rotors", goals, duration, wait)
 
@@ -218,10 +220,7 @@ class Pilot(SceneDrone):
         `z` is the height to hold in place of `vz`, metres. `frame` is "world", or "body" for `vx`
         ahead of the drone and `vy` to its left, not with `Drivetrain.FORWARD_ONLY`.
         """
-        x, y, up = (
-            checks.real(v, n, -100.0, 100.0, unit="m/s")
-            for v, n in ((vx, "vx"), (vy, "vy"), (vz, "vz"))
-        )
+        x, y, up = (Real(-100.0, 100.0).read(v, n) for v, n in ((vx, "vx"), (vy, "vy"), (vz, "vz")))
         if z is not None and up != 0.0:
             raise InputError(f"z={z} and vz={up:g} are both given; give one of them")
         control = YawControl(self.body, drivetrain, yaw_mode)
@@ -240,7 +239,7 @@ class Pilot(SceneDrone):
         def goals(body: FlightState) -> Goals:
             return goals_of(body, modes, x, y, control.goal(travel), height)
 
-        command = TimedCommand(goals, checks.duration(duration))
+        command = TimedCommand(goals, checks.DURATION.read(duration, "duration"))
         return self._run("move_by_velocity", command, wait)
 
     def move_along(
@@ -262,7 +261,7 @@ class Pilot(SceneDrone):
         from the speed if negative; `adaptive_lookahead` is added per metre of distance from the
         path. A lookahead that is too short is an `InputError`.
         """
-        points, pace = checks.path(path), checks.speed(speed)
+        points, pace = checks.path(path), checks.SPEED.read(speed, "speed")
         whole = torch.cat([self.body.position[:, None], points], 1)
         length = float(whole.diff(dim=1).norm(dim=-1).sum())
         command = PathCommand(
@@ -271,8 +270,8 @@ class Pilot(SceneDrone):
             pace,
             checks.time_limit(timeout, length, pace),
             yaw_control=YawControl(self.body, drivetrain, yaw_mode),
-            lookahead=checks.real(lookahead, "lookahead", unit="m"),
-            adaptive=checks.real(adaptive_lookahead, "adaptive_lookahead", 0.0, 100.0),
+            lookahead=checks.COORDINATE.read(lookahead, "lookahead"),
+            adaptive=Real(0.0, 100.0).read(adaptive_lookahead, "adaptive_lookahead"),
             braking=braking_time(self.settings),
         )
         return self._run("move_along", command, wait)
@@ -303,8 +302,8 @@ class Pilot(SceneDrone):
         It fails after 20 s by default. `margin` is the heading error in degrees at which it
         succeeds, once the drone no longer turns.
         """
-        limit = 20.0 if timeout is None else checks.duration(timeout, "timeout")
-        near = math.radians(checks.real(margin, "margin", 0.0, 180.0, is_above=True))
+        limit = 20.0 if timeout is None else checks.DURATION.read(timeout, "timeout")
+        near = math.radians(Real(0.0, 180.0, is_above=True).read(margin, "margin"))
         *_, heading = to_simulator(0.0, 0.0, checks.radians(yaw, "yaw"))
         command = RotateToCommand(self.body, heading, near, limit)
         return self._run("rotate_to", command, wait)
@@ -312,7 +311,7 @@ class Pilot(SceneDrone):
     def rotate_by(self, rate: float, duration: float, *, wait: bool = True) -> bool | FlightFuture:
         """Turn at a rate, degrees per second to the right, for some seconds."""
         *_, turn = to_simulator(0.0, 0.0, checks.radians(rate, "rate"))
-        command = RotateByCommand(self.body, turn, checks.duration(duration))
+        command = RotateByCommand(self.body, turn, checks.DURATION.read(duration, "duration"))
         return self._run("rotate_by", command, wait)
 
     def move_by_manual(
@@ -331,8 +330,8 @@ class Pilot(SceneDrone):
         `vx_max` and `vy_max` are the speeds at full stick, forward in the heading at the start and
         sideways, m/s; `z_max` is the goal's height above the drone at full throttle, metres.
         """
-        fastest = checks.speed(vx_max, "vx_max"), checks.speed(vy_max, "vy_max")
-        climb = checks.real(z_max, "z_max", 0.0, unit="m")
+        fastest = checks.SPEED.read(vx_max, "vx_max"), checks.SPEED.read(vy_max, "vy_max")
+        climb = Real(0.0).read(z_max, "z_max")
         control = YawControl(self.body, drivetrain, yaw_mode)
         modes: Modes = (Mode.VELOCITY, Mode.VELOCITY, control.mode, Mode.POSITION)
         cos, sin = self.body.heading.cos(), self.body.heading.sin()
@@ -346,12 +345,14 @@ class Pilot(SceneDrone):
             z = (body.position[:, 2] + sticks.throttle * climb).clamp(min=0.0)
             return goals_of(body, modes, x, y, heading, z)
 
-        command = TimedCommand(goals, checks.duration(duration))
+        command = TimedCommand(goals, checks.DURATION.read(duration, "duration"))
         return self._run("move_by_manual", command, wait)
 
     def _hold(self, name: str, goals: Goals, duration: float, wait: bool) -> bool | FlightFuture:
         """Keep the same goals for some seconds."""
-        return self._run(name, TimedCommand(lambda body: goals, checks.duration(duration)), wait)
+        return self._run(
+            name, TimedCommand(lambda body: goals, checks.DURATION.read(duration, "duration")), wait
+        )
 
     def _lift(self, z: float | None, throttle: float | None) -> tuple[Mode, float]:
         """Return the vertical goal and its mode; hold the present height by default.
@@ -364,4 +365,4 @@ class Pilot(SceneDrone):
             return Mode.POSITION, height
         if z is not None:
             raise InputError(f"z={z} and throttle={throttle} are both given; give one of them")
-        return Mode.THROTTLE, checks.real(throttle, "throttle", 0.0, 1.0)
+        return Mode.THROTTLE, checks.SHARE.read(throttle, "throttle")

@@ -5,7 +5,7 @@ import logging
 import math
 import struct
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from PIL import Image
 from torch import Tensor
 
 from drone_rl.config.commands import CAMERAS, FLY_MODES, FlySettings
-from drone_rl.flight.fly_page.pilots import CONTROLS, Controls, VelocityPilot, make_pilot
+from drone_rl.flight.fly_page.pilots import CONTROLS, Controls, Sticks, VelocityPilot, make_pilot
 from drone_rl.flight.fly_page.recorder import Recorder
 from drone_rl.flight.fly_page.saliency import LiveSaliency
 from drone_rl.flight.fly_page.world import Seen, World
@@ -43,7 +43,7 @@ _MESSAGES: Mapping[str, Record] = {
     "take_off": Record({}),
     "land": Record({}),
 }
-"""Fields of each type of message."""
+"""Fields of each type of message, which are the arguments of a method of `Flight`."""
 _PAUSE = 2.0
 """Seconds after an episode of the policy before the next one begins."""
 _LOOK_PERIOD = 0.1
@@ -84,27 +84,13 @@ class Flight:
         """Seconds flown since the start."""
         self._wants_saliency, self._shows_saliency = settings.saliency, settings.saliency
         self._over = 0.0
-        self._seen, self._seen_at, self._looks = self.world.see(), 0.0, 0
+        self._seen, self._seen_at = self.world.see(), 0.0
         levels = [
             self.world.scenes.transform(torch.full_like(self._seen.frame, v)) for v in (0, 255)
         ]
         self._levels = float(levels[0].min()), float(levels[1].max())
         """What is shown as black and as white."""
-        self._images: dict[str, tuple[Any, bytes]] = {}
         self._number = 0
-        self._handlers: dict[str, Callable[..., None]] = {
-            "hold": lambda controls: self.controls.hold(controls),
-            "sticks": lambda values: self.controls.set_sticks(values),
-            "pilot": self.set_pilot,
-            "mode": self.set_mode,
-            "camera": self._set_camera,
-            "set": self._set,
-            "record": self.record,
-            "saliency": self._set_saliency,
-            "reset": self.reset,
-            "take_off": lambda: self._flying("take_off").take_off(),
-            "land": lambda: self._flying("land").land(),
-        }
         self._flyer = make_pilot(self._kind, self.world, self._note_step)
 
     # Messages
@@ -113,23 +99,35 @@ class Flight:
         """Do what a browser's message says; an `InputError` if it is wrong or impossible."""
         given = dict(as_mapping(message, "message"))
         kind = OneOf(tuple(_MESSAGES)).read(given.pop("type", None), "type")
-        self._handlers[kind](**_MESSAGES[kind].read(given, kind))
+        getattr(self, f"_{kind}")(**_MESSAGES[kind].read(given, kind))
 
-    def set_pilot(self, pilot: str) -> None:
+    def _hold(self, controls: Sequence[str]) -> None:
+        self.controls.hold(controls)
+
+    def _sticks(self, values: Sticks) -> None:
+        self.controls.set_sticks(values)
+
+    def _take_off(self) -> None:
+        self._flying("take_off").take_off()
+
+    def _land(self) -> None:
+        self._flying("land").land()
+
+    def _pilot(self, pilot: str) -> None:
         """Hand over to the policy, or back to a person."""
         if pilot == self.pilot:
             return
         self._finish_recording()
         self.pilot = pilot
         if pilot == "policy" and self.world.is_over:
-            self.reset()
+            self._reset()
         self._change_flyer()
         self.note = "You fly."
         if pilot == "policy":
             moved = ", from the task's altitude and heading" if self.mode != "actions" else ""
             self.note = f"The policy {self.world.policy.name} flies{moved}."
 
-    def set_mode(self, mode: str) -> None:
+    def _mode(self, mode: str) -> None:
         """Choose how a person flies."""
         if mode == self.mode:
             return
@@ -139,7 +137,7 @@ class Flight:
         if self.pilot == "person":
             self._change_flyer()
 
-    def reset(self) -> None:
+    def _reset(self) -> None:
         """Start a new episode."""
         self._finish_recording()
         self.world.reset()
@@ -147,20 +145,20 @@ class Flight:
         self.note = "A new episode begins."
         self._change_flyer()
 
-    def record(self, on: bool) -> None:
+    def _record(self, on: bool) -> None:
         """Turn recording on or off; a person then flies by the policy's actions."""
         if on and self.mode != "actions":
-            self.set_mode("actions")
+            self._mode("actions")
             self.note = "Demonstrations consist of the policy's actions, now your controls."
         if not on:
             self._finish_recording()
         self.recorder.is_on = on
         self._problem = None if on else self._problem
 
-    def _set_camera(self, camera: str) -> None:
+    def _camera(self, camera: str) -> None:
         self.camera = camera
 
-    def _set_saliency(self, on: bool) -> None:
+    def _saliency(self, on: bool) -> None:
         self._shows_saliency = on
         self._wants_saliency |= on
 
@@ -221,7 +219,7 @@ class Flight:
         if self.world.is_over and self.pilot == "policy":
             self._over += seconds
             if self._over >= _PAUSE:
-                self.reset()
+                self._reset()
         if self._wants_saliency:
             self.saliency.start()
         self.saliency.poll()
@@ -308,37 +306,21 @@ class Flight:
         now = time.monotonic()
         is_free = self.pilot == "person" and self.mode != "actions"
         if not is_free or now - self._seen_at >= _LOOK_PERIOD:
-            before, self._seen, self._seen_at = self._seen, self.world.see(), now
-            self._looks += self._seen is not before
+            self._seen, self._seen_at = self.world.see(), now
         return self._seen
 
     def _view(self) -> bytes:
-        def draw() -> bytes:
-            picture = Image.fromarray(self.world.render(self.camera).numpy())
-            return encode(picture, "jpeg", quality=JPEG_QUALITY)
-
-        return self._kept("view", (self.world.version, self.camera), draw)
+        picture = Image.fromarray(self.world.render(self.camera).numpy())
+        return encode(picture, "jpeg", quality=JPEG_QUALITY)
 
     def _observed(self) -> bytes:
         """Return the observation, with the heat map if there is one to show."""
         seen = self._look()
+        observation = seen.observation[0].numpy()
+        picture = shown_picture(observation, *self._levels, self.world.scenes.channels)
         shows = self._shows_saliency and self.saliency.state == "shown"
-
-        def draw() -> bytes:
-            observation = seen.observation[0].numpy()
-            picture = shown_picture(observation, *self._levels, self.world.scenes.channels)
-            heat = self.saliency.heat(seen) if shows else None
-            shown = picture if heat is None else heated(picture, heat)
-            return encode(Image.fromarray(shown), "png")
-
-        return self._kept("observation", (self._looks, shows), draw)
-
-    def _kept(self, name: str, key: Any, draw: Callable[[], bytes]) -> bytes:
-        """Return an image, drawn again if its key has changed."""
-        known = self._images.get(name)
-        if known is None or known[0] != key:
-            self._images[name] = known = (key, draw())
-        return known[1]
+        heat = self.saliency.heat(seen) if shows else None
+        return encode(Image.fromarray(picture if heat is None else heated(picture, heat)), "png")
 
 
 def packed(state: Mapping[str, Any], images: Sequence[tuple[str, str, bytes]]) -> bytes:

@@ -2,17 +2,15 @@
 
 import abc
 from collections.abc import Callable, Iterable
-from typing import Any
 
 import torch
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.flight.commands.command import Command, FlightFuture
 from drone_rl.flight.commands.computer_vision import KEYS, STEP, TURN
 from drone_rl.flight.commands.path_following import YawMode
 from drone_rl.flight.commands.pilot import Pilot
-from drone_rl.flight.commands.state import LandedState, Trajectory
+from drone_rl.flight.commands.state import LandedState
 from drone_rl.flight.fly_page.world import World
 from drone_rl.sim.dynamics import FlightState, Obstacles, Quadrotor
 
@@ -185,10 +183,7 @@ class ActionPilot(_Steps):
 class _Drone(Pilot):
     """A drone that is taken over in flight, and whose trajectory is not kept."""
 
-    def __init__(self, *args: Any, **options: Any) -> None:
-        """See `Pilot`."""
-        super().__init__(*args, **options)
-        self.trajectory = Trajectory(1)  # a page may be open for days
+    lifts_off, kept_states = True, 1  # a page may be open for days
 
     def take_over(self, body: FlightState) -> None:
         """Continue with a drone that flies, or is posed, anywhere."""
@@ -209,11 +204,6 @@ class _Drone(Pilot):
         """Advance by a control period."""
         self._advance(self._period)
 
-    def _run(self, name: str, command: Command, wait: bool) -> bool | FlightFuture:
-        """Start a movement, which as in AirSim also takes off a drone on the ground."""
-        self._require_armed(name)
-        return self._start(name, command, wait)
-
 
 class PosePilot(FlyPilot):
     """Computer-vision mode: controls change the pose by steps of 0.25 m and 5 degrees."""
@@ -231,7 +221,7 @@ class PosePilot(FlyPilot):
         keys = [*controls.presses]
         controls.presses.clear()
         for name in controls.repeating:
-            rate = speed / STEP if any(KEYS[name][0]) else _TURN_RATE / TURN
+            rate = speed / STEP if KEYS[name][0] < 3 else _TURN_RATE / TURN
             self._left[name] += seconds * rate
             count = int(self._left[name])
             self._left[name] -= count

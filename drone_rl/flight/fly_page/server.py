@@ -31,13 +31,9 @@ _log = logging.getLogger(__name__)
 ADDRESS = "127.0.0.1"
 MAX_MESSAGE = 4096
 """Bytes of one message of a browser."""
-MAX_PAGES = 8
-"""Pages that can be open at once."""
 _ASKED_BY = "drone-rl fly"
 _IN_FLIGHT = 3
 """Frames that a page may have received but not displayed yet."""
-_MOST_WAITING = 256
-"""Messages that wait for the simulation; more are refused."""
 _CLOSED = object()
 """The message that a page was closed."""
 _PATIENCE_S = 30.0
@@ -175,11 +171,6 @@ class FlyPage:
         """Address of the page, with its token."""
         self._pages: set[_Page] = set()
         self._messages: queue.SimpleQueue[tuple[Any, _Page]] = queue.SimpleQueue()
-        self._frame: bytes | None = None
-        self._handing = threading.Lock()
-        """Guards the frame that the simulation's thread hands to the server's."""
-        self._holder: _Page | None = None
-        """The page whose keys or sticks were the last to change."""
         self._failure: Exception | None = None
         self._is_stopping = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -260,11 +251,8 @@ class FlyPage:
 
     async def _talk(self, socket: Any) -> None:
         """Serve one page until it is closed."""
-        if len(self._pages) >= MAX_PAGES:
-            await socket.close(1013, f"{MAX_PAGES} pages are open")
-            return
         page, self._loop = _Page(), asyncio.get_running_loop()
-        self._pages.add(page)  # before the first await: several pages may open at once
+        self._pages.add(page)
         tasks: list[asyncio.Task[None]] = []
         try:
             await socket.accept()
@@ -291,19 +279,13 @@ class FlyPage:
                 given = None
             if isinstance(given, dict) and given.get("type") == "ack":
                 page.acknowledge()
-                continue
-            if self._messages.qsize() < _MOST_WAITING:
-                self._messages.put((given, page))
             else:
-                page.tell("too many messages; slow down")
+                self._messages.put((given, page))
 
-    def _publish(self) -> None:
-        """Offer the newest frame to all pages."""
-        with self._handing:
-            frame, self._frame = self._frame, None
-        if frame is not None:
-            for page in self._pages:
-                page.offer(frame)
+    def _publish(self, frame: bytes) -> None:
+        """Offer a frame to all pages."""
+        for page in self._pages:
+            page.offer(frame)
 
     # The simulation's thread
 
@@ -326,33 +308,20 @@ class FlyPage:
             if self._pages:
                 self._flight.advance(now - before)
                 if frame := self._flight.frame():
-                    self._offer(frame)
+                    _call_soon(self._loop, self._publish, frame)
             before, due = now, max(due + period, time.monotonic() - period)
             self._is_stopping.wait(max(0.0, due - time.monotonic()))
 
     def _handle_messages(self) -> None:
-        for _ in range(_MOST_WAITING):
-            try:
-                given, page = self._messages.get_nowait()
-            except queue.Empty:
-                return
+        for _ in range(self._messages.qsize()):
+            given, page = self._messages.get()
             if given is _CLOSED:
-                if page is self._holder:
-                    self._flight.release()
+                self._flight.release()
                 continue
             try:
                 self._flight.handle(given)
-                if given["type"] in ("hold", "sticks"):
-                    self._holder = page
             except InputError as error:
                 _call_soon(self._loop, page.tell, str(error))
-
-    def _offer(self, frame: bytes) -> None:
-        """Hand a frame to the server's thread; it replaces one that is still to be taken."""
-        with self._handing:
-            is_waiting, self._frame = self._frame is not None, frame
-        if not is_waiting:
-            _call_soon(self._loop, self._publish)
 
 
 def _call_soon(

@@ -96,8 +96,7 @@ class Watched:
         """Render the vehicle from behind, or one of its cameras. Shape: (H, W, 3), uint8."""
         stage, vehicle = self._simulation.stage, self._simulation.find("")
         if self._camera != CHASE.name:
-            camera = self._simulation.cameras[vehicle.choice.name][self._camera]
-            (shot,) = stage.render(vehicle.body, camera, [ImageType.SCENE])
+            (shot,) = stage.render(vehicle.body, vehicle.cameras[self._camera], [ImageType.SCENE])
             return stage.image(ImageType.SCENE, shot, as_float=False)
         worlds = copy.copy(stage.worlds)
         worlds.state = copy.copy(worlds.state)

@@ -80,8 +80,6 @@ class World:
         """Speed of the wind, metres a second, and where it comes from; see `set_wind`."""
         self.episode = 0
         """Number of episodes begun."""
-        self.version = 0
-        """Changes whenever images may change."""
         self.reset()
 
     # State
@@ -265,7 +263,6 @@ class World:
         self._change()
 
     def _change(self) -> None:
-        self.version += 1
         self._seen: Seen | None = None
         self._lit: Appearance | None = None
 

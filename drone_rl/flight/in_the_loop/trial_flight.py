@@ -8,7 +8,6 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.flight.commands import checks
 from drone_rl.flight.commands.path_following import (
     Paths,
     direction_at,
@@ -20,6 +19,7 @@ from drone_rl.flight.in_the_loop.control import Setpoint, velocity_to
 from drone_rl.flight.in_the_loop.drone import DroneInTheLoop, FlightControllerError, Guidance
 from drone_rl.flight.in_the_loop.instruments import Readings, Vector
 from drone_rl.sim.dynamics import FlightState
+from drone_rl.utils.schema import Real
 
 LANDING_SPEED = 0.5
 """Sink rate, metres per second."""
@@ -45,7 +45,7 @@ class Course:
     def __post_init__(self) -> None:
         """Check the numbers; an `InputError` names the first that is out of range."""
         for field in dataclasses.fields(self):
-            checks.real(getattr(self, field.name), field.name, 0.1, 1000.0)
+            Real(0.1, 1000.0).read(getattr(self, field.name), field.name)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,7 +8,7 @@ from unittest.mock import MagicMock
 import msgpack
 import pytest
 
-from drone_rl.flight.airsim.connection import MAX_MESSAGE, Connection
+from drone_rl.flight.airsim.server import MAX_MESSAGE, Connection
 from tests.flight.airsim.conftest import CV, YAW, Client
 
 PING = bytes([0x94, 0x00, 0x00, 0xA4, *b"ping", 0x90])

@@ -29,11 +29,11 @@ def test_maps_have_the_keys_of_airsim_in_order():
 
 def test_frames_by_hand():
     """Two metres to the left and three up are -2 east and -3 down."""
-    assert messages.ned(torch.tensor([[1.0, 2.0, 3.0]])) == [1.0, -2.0, -3.0]
+    assert messages.ned(torch.tensor([1.0, 2.0, 3.0])) == (1.0, -2.0, -3.0)
     assert messages.to_world((1.0, -2.0, -3.0)) == (1.0, 2.0, 3.0)
     # a quarter turn to the left, seen from above, is one of -90 degrees about the down axis
-    left = torch.tensor([[HALF, 0.0, 0.0, HALF]])
-    assert messages.ned_attitude(left) == pytest.approx([HALF, 0.0, 0.0, -HALF])
+    left = torch.tensor([HALF, 0.0, 0.0, HALF])
+    assert Pose.of(torch.zeros(3), left).attitude == pytest.approx((HALF, 0.0, 0.0, -HALF))
     back = messages.attitude_to_world([2 * HALF, 0.0, 0.0, -2 * HALF])
     torch.testing.assert_close(back.float(), left)
 
@@ -50,17 +50,17 @@ def test_frames_by_hand():
         (lambda v: messages.text(v, "t"), 7, "t=7 is not a text"),
         (lambda v: messages.text(v, "t"), "x" * 10_001, "is not a text"),
         (messages.read_pose, 7, "pose=7 is not a map"),
-        (messages.read_pose, {"position": {}}, "pose.orientation=None is not a map"),
+        (messages.read_pose, {"position": {}}, "pose.position.x_val=None is not a number"),
         (lambda v: messages.read_vector(v, "v"), {"x_val": 1, "y_val": 2}, "v.z_val=None"),
-        (messages.read_path, [], "path is not a list of 1 to"),
-        (messages.read_path, [{"x_val": 1, "y_val": 2, "z_val": math.nan}], r"path.z_val=nan"),
-        (messages.attitude_to_world, [0.0, 0.0, 0.0, 0.0], "is no rotation"),
+        (lambda v: messages.read_path(v, "path"), [], "path is not a list of 1 to"),
         (
-            lambda v: messages.read_yaw_mode(v, 1),
-            {"is_rate": True, "yaw_or_rate": 5.0},
-            "ForwardOnly",
+            lambda v: messages.read_path(v, "path"),
+            [{"x_val": 1, "y_val": 2, "z_val": math.nan}],
+            r"path.z_val=nan",
         ),
-        (lambda v: messages.read_yaw_mode({}, v), 2, "drivetrain=2 is out of range"),
+        (messages.attitude_to_world, [0.0, 0.0, 0.0, 0.0], "is no rotation"),
+        (lambda v: messages.read_yaw_mode(v, "yaw_mode"), {}, "yaw_mode.is_rate=None is neither"),
+        (lambda v: messages.read_drivetrain(v, "drivetrain"), 2, "drivetrain=2 is out of range"),
     ],
 )
 def test_wrong_values_are_refused(read, value, message):
@@ -71,7 +71,7 @@ def test_wrong_values_are_refused(read, value, message):
 def test_numbers_are_limited():
     assert messages.number(2, "x", 0.0, 1.0) == 1.0
     assert messages.number(-math.inf, "x", 0.0, 1.0) == 0.0
-    assert messages.read_pose(pose(2e6, 0.0, 0.0)).position == (1e6, 0.0, 0.0)
+    assert messages.read_pose(pose(2e6, 0.0, 0.0)).position == [1e6, 0.0, 0.0]
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,7 @@ def test_wrong_dates_are_refused(text):
 def test_old_clients_send_bytes():
     assert messages.text(b"fly", "t") == "fly"
     given = {b"x_val": 1, b"y_val": 2, b"z_val": 3}
-    assert messages.read_vector(given, "v") == (1.0, 2.0, 3.0)
+    assert messages.read_vector(given, "v") == [1.0, 2.0, 3.0]
 
 
 def test_nan_in_a_pose_means_no_change():
@@ -100,10 +100,8 @@ def test_nan_in_a_pose_means_no_change():
 
 
 def test_yaw_modes():
-    held = messages.read_yaw_mode({"is_rate": True, "yaw_or_rate": 0.0}, 1)
-    assert held[0] == "forward_only" and not held[1].is_rate
-    turned = messages.read_yaw_mode({"is_rate": False, "yaw_or_rate": 270.0}, 0)
-    assert turned[1].yaw_or_rate == -90.0
+    turned = messages.read_yaw_mode({"is_rate": False, "yaw_or_rate": 270.0}, "yaw_mode")
+    assert turned.yaw_or_rate == -90.0
 
 
 @pytest.mark.parametrize(

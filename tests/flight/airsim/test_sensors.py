@@ -26,7 +26,7 @@ def test_gps_knows_the_place_of_a_drone_that_has_flown_before_its_first_reading(
     vehicle = make()
     assert not vehicle.sensor("gps")["is_valid"]
     vehicle.reset()
-    vehicle.allow(True)
+    vehicle.enable_api_control(True)
     fly(vehicle, vehicle.takeoff(20.0))
     for _ in range(60):
         vehicle.run(vehicle.period)

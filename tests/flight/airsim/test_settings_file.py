@@ -4,13 +4,11 @@ import dataclasses
 import json
 import logging
 import math
-import os
 import time
 
 import pytest
 
 from drone_rl.flight.airsim.settings_file import (
-    MAX_BYTES,
     Capture,
     VehicleChoice,
     find_settings,
@@ -91,20 +89,12 @@ def test_all_parts_of_a_file():
     assert two == VehicleChoice("Two", "ComputerVision", has_api_control=True)
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        (
-            "{'a//b': 1, \"c\": 'it\\'s', 'd': 'say \"x\"', }",
-            {"a//b": 1, "c": "it's", "d": 'say "x"'},
-        ),
-        ('{"x": [1, 2, /* two */ ], // end\n}', {"x": [1, 2]}),
-    ],
-)
-def test_quotes_comments_and_commas(text, expected):
-    from drone_rl.flight.airsim.settings_file import _as_json
-
-    assert json.loads("".join(_as_json(text))) == expected
+def test_quotes_comments_and_commas():
+    text = (
+        """{'Vehicles': {'a//b': {}, "c": {}, 'it\\'s': {}, 'say "x"': {} /* last */ }, // end\n}"""
+    )
+    found = [vehicle.name for vehicle in parse_settings(text).vehicles]
+    assert found == ["a//b", "c", "it's", 'say "x"']
 
 
 def test_many_slashes_after_a_comma_are_one_comment():
@@ -125,22 +115,19 @@ def test_null_and_nan_mean_the_default():
     assert vehicle.name == "A"
 
 
-def test_unknown_keys_are_warned_about_and_others_are_not(caplog):
+def test_misspelled_keys_are_warned_about_and_others_are_not(caplog):
     with caplog.at_level(logging.WARNING):
-        parse_settings('{"SimMod": "Multirotor", "ViewMode": "", "Vehicles": {"A": {"Xx": 1}}}')
+        parse_settings('{"SimMod": "Multirotor", "ViewMode": "", "Vehicles": {"A": {"Camera": 1}}}')
     first, second = (record.getMessage() for record in caplog.records)
     assert "SimMod is unknown and ignored" in first and "SimMode" in first
-    assert "Vehicles.A.Xx is unknown" in second
+    assert "did you mean Cameras" in second
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("{'SimMode': 'Car'}", "SimMode=Car is not supported; give Multirotor or ComputerVision"),
-        ("{'SimMode': 'Boat'}", "SimMode='Boat' is unknown; give Multirotor, ComputerVision$"),
         ("{'ApiServerPort': 70000}", "ApiServerPort=70000 is out of range"),
-        ("{'ApiServerPort': '1'}", "ApiServerPort='1'"),
-        ("{'ClockSpeed': 0}", "ClockSpeed=0 is out of range"),
         ("{'Vehicles': {'A': {'X': 'far'}}}", "Vehicles.A.X='far'"),
         (
             "{'Vehicles': {'A': {'VehicleType': 'PhysXCar'}}}",
@@ -151,11 +138,8 @@ def test_unknown_keys_are_warned_about_and_others_are_not(caplog):
             "Cameras.side: camera 'side' is unknown",
         ),
         ("{'Vehicles': []}", "Vehicles is not an object"),
-        ("{'Vehicles': {'A': 1}}", "Vehicles.A is not an object"),
         ("{'CameraDefaults': {'CaptureSettings': {}}}", "CaptureSettings is not a list"),
         ("[]", "the file is not an object"),
-        ("{'SimMode'}", "line 1 is not JSON"),
-        ("{\n\n'a': }", "line 3 is not JSON"),
         ("{/* a\n\n */\n'a': }", "line 4 is not JSON"),
         ('{"a": ' + "1" * 5000 + "}", "too many digits"),
         ("[" * 100_000, "nested too deeply|not JSON"),
@@ -174,9 +158,6 @@ def test_files_that_can_not_be_read(tmp_path):
     (tmp_path / "latin.json").write_bytes(b'{"a": "\xe9"}')
     with pytest.raises(InputError, match="not text in UTF-8"):
         read_settings(tmp_path / "latin.json")
-    (tmp_path / "large.json").write_bytes(b" " * (MAX_BYTES + 1))
-    with pytest.raises(InputError, match="at most"):
-        read_settings(tmp_path / "large.json")
     (tmp_path / "bom.json").write_text("\ufeff" + LISTING_1, "utf-8")
     assert read_settings(tmp_path / "bom.json").port == 41451
 
@@ -187,13 +168,6 @@ def test_what_is_never_closed_is_refused_in_linear_time(text):
     with pytest.raises(InputError, match="not JSON"):
         parse_settings(text)
     assert time.perf_counter() - begin < 2.0
-
-
-def test_a_file_is_not_read_beyond_its_limit(tmp_path):
-    (tmp_path / "huge.json").touch()
-    os.truncate(tmp_path / "huge.json", 2**40)
-    with pytest.raises(InputError, match="at most"):
-        read_settings(tmp_path / "huge.json")
 
 
 def test_px4_is_warned_about(caplog):

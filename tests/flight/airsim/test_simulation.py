@@ -9,7 +9,6 @@ from drone_rl.flight.airsim.messages import Pose, nanoseconds
 from drone_rl.flight.airsim.settings_file import parse_settings
 from drone_rl.flight.airsim.simulation import Simulation, Wait
 from drone_rl.utils.errors import InputError
-from tests.flight.airsim.conftest import pose
 from tests.flight.airsim.flying import FREE, KEEP
 
 
@@ -104,7 +103,7 @@ def test_time_stamps_of_vehicles_go_on_after_a_reset_and_from_their_creation(mak
     simulation = make(clock="lockstep")
     simulation.wait_for(simulation.continue_for(1.0), [].append)
     simulation.advance(60.0, math.inf)
-    simulation.add_named("B", "simpleflight", pose(0.0, 5.0, 0.0))
+    simulation.add_named("B", "simpleflight", Pose((0.0, 5.0, 0.0), (1.0, 0.0, 0.0, 0.0)))
     now = simulation.stamp
     assert now == 1_704_067_200_000_000_000 + nanoseconds(simulation.time)  # from 2024-01-01
     assert simulation.time >= 1.0
@@ -141,19 +140,18 @@ def test_the_wall_clock_has_the_present_time(make):
 def test_added_vehicles_have_the_heading_of_their_pose(make):
     """They look east, 90 degrees to the right."""
     simulation, half = make(), math.sqrt(0.5)
-    east = {"w_val": half, "x_val": 0.0, "y_val": 0.0, "z_val": half}
+    east = Pose((0.0, 5.0, 0.0), (half, 0.0, 0.0, half))
     for kind in ("simpleflight", "computervision"):
-        simulation.add_named(kind, kind, pose(0.0, 5.0, 0.0, east))
+        simulation.add_named(kind, kind, east)
         assert simulation.find(kind).pose.attitude == pytest.approx((half, 0.0, 0.0, half))
-    unknown = dict.fromkeys(east, math.nan)
-    simulation.add_named("C", "simpleflight", pose(0.0, 9.0, 0.0, unknown))
+    simulation.add_named("C", "simpleflight", Pose((0.0, 9.0, 0.0), (math.nan,) * 4))
     assert simulation.find("C").pose.attitude == (1.0, 0.0, 0.0, 0.0)
 
 
 def test_reset_keeps_the_time_and_drops_api_control(make):
     simulation = make(clock="lockstep")
     vehicle = simulation.find("")
-    vehicle.allow(True)
+    vehicle.enable_api_control(True)
     future, answers = vehicle.takeoff(20.0), []
     simulation.wait_for(Wait(lambda: future.done, future.result), answers.append)
     simulation.advance(0.0, math.inf)

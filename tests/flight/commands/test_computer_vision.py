@@ -145,7 +145,7 @@ def test_a_drone_resets_to_the_ground(flying):
     ("act", "message"),
     [
         (lambda p: p.set_pose([0, 0, math.nan]), r"position\[2\]=nan"),
-        (lambda p: p.set_pose([0, 0]), "give 3 numbers"),
+        (lambda p: p.set_pose([0, 0]), "give a list of 3 values"),
         (lambda p: p.set_pose([0, 0, 1], yaw=math.inf), "yaw=inf"),
         (lambda p: p.press("foward"), "did you mean forward"),
         (lambda p: p.press("up", 0), "times=0"),

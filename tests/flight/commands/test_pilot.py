@@ -183,7 +183,7 @@ def test_sticks_are_read_while_time_passes(flying):
 @pytest.mark.parametrize(
     ("name", "given", "choices", "told"),
     [
-        ("move_along", ([],), {}, "path has no points"),
+        ("move_along", ([],), {}, "has no points"),
         ("move_along", ([(0, 0, math.nan)],), {}, "nan"),
         ("move_to", (1, 2, -3), {}, "below the ground"),
         ("move_to", (1, 2, 3), {"speed": 0}, "speed=0"),
@@ -206,14 +206,14 @@ def test_sticks_are_read_while_time_passes(flying):
         ("move_by_angle", (0, 0, 1), {"yaw": 3, "yaw_rate": 2}, "yaw=3 and yaw_rate=2"),
         ("move_by_angle", (0, 0, 1), {"throttle": 1.5}, "throttle=1.5"),
         ("move_by_rates", (0, math.nan, 0, 1), {}, "pitch=nan"),
-        ("move_by_rotors", ([0.5] * 3, 1), {}, "give 4 numbers"),
+        ("move_by_rotors", ([0.5] * 3, 1), {}, "give a list of 4 values"),
         ("move_by_rotors", ([0.5, 0.5, 2, 0.5], 1), {}, r"shares\[2\]=2"),
         ("rotate_to", (math.nan,), {}, "yaw=nan"),
         ("rotate_to", (9,), {"margin": 0}, "margin=0"),
         ("rotate_to", (9,), {"timeout": -1}, "timeout=-1"),
         ("rotate_by", (9, -1), {}, "duration=-1"),
         ("move_by_manual", (0, 1, 1, 1), {}, "vx_max=0"),
-        ("move_by_manual", (1, 1, -1, 1), {}, "z_max=-1 is invalid; give a finite number of 0"),
+        ("move_by_manual", (1, 1, -1, 1), {}, "z_max=-1"),
     ],
 )
 def test_what_is_refused_before_anything_moves(flying, name, given, choices, told):

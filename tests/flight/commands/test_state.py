@@ -1,14 +1,12 @@
 import math
 
-import numpy as np
 import pytest
 import torch
 
 from drone_rl.config.sensors import GpsSettings, SensorSettings
-from drone_rl.flight.commands.computer_vision import _attitude
 from drone_rl.flight.commands.pilot import Pilot
 from drone_rl.flight.commands.state import Collision, LandedState, PilotState, Sensors, Trajectory
-from drone_rl.sim.coordinates import HOME, Attitude, to_simulator
+from drone_rl.sim.coordinates import HOME, Attitude, attitude_of
 from drone_rl.sim.dynamics import FlightState
 from drone_rl.sim.dynamics.state import DEPTH, GROUND, NORMAL, THING
 
@@ -38,8 +36,7 @@ def test_angles(quaternion, angles):
 def test_yaw_is_known_with_the_nose_straight_up_or_down(pitch, roll, yaw):
     """There yaw and roll turn about one axis, in opposite senses with the nose up."""
     turn = yaw - roll if pitch > 0 else yaw + roll
-    quaternion = _attitude(*np.radians(to_simulator(roll, pitch, yaw)).tolist())
-    found = Attitude.of(quaternion.tolist())
+    found = Attitude.of(attitude_of(roll, pitch, yaw).tolist())
     assert (found.roll, found.pitch, found.yaw) == pytest.approx((0, pitch, turn), abs=1e-4)
 
 

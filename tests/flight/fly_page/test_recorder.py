@@ -1,29 +1,17 @@
 """Recorded flights: which steps become demonstrations."""
 
-import sys
-import types
-
 import numpy as np
 import pytest
 
+from drone_rl.training import demonstrations
 from tests.flight.fly_page.test_flight import run, state_of
-
-
-class Written(list):
-    """A stand-in for `drone_rl.training.demonstrations`: what would have been written."""
-
-    def module(self):
-        made = types.ModuleType("drone_rl.training.demonstrations")
-        made.FlightConditions = lambda *parts: parts
-        made.Demonstration = lambda conditions, **arrays: {"conditions": conditions, **arrays}
-        made.add_demonstration = lambda folder, one: self.append((folder, one))
-        return made
 
 
 @pytest.fixture
 def written(monkeypatch):
-    found = Written()
-    monkeypatch.setitem(sys.modules, "drone_rl.training.demonstrations", found.module())
+    """Folders and demonstrations that would have been written."""
+    found = []
+    monkeypatch.setattr(demonstrations, "add_demonstration", lambda *one: found.append(one))
     return found
 
 
@@ -44,19 +32,13 @@ def test_steps_of_a_person_become_a_demonstration(make_flight, written, tmp_path
     flight.handle({"type": "record", "on": False})
     assert state_of(flight)["recording"] == {"on": False, "steps": 0, "saved": 1, "problem": None}
     ((folder, one),) = written
-    assert folder == tmp_path / "demonstrations" and one["pilot"] == "person"
-    assert one["actions"].tolist() == [0, 1, 2] and one["actions"].dtype == np.int64
-    assert one["images"].shape == (3, 25, 64, 3) and one["images"].dtype == np.uint8
-    assert np.array_equal(one["images"][0], frame.numpy())
-    assert one["rewards"].tolist() == [0.0, 0.0, 0.0] and one["rewards"].dtype == np.float32
-    assert one["done"].tolist() == [False, False, False]
-    policy = flight.world.policy
-    assert one["conditions"] == (
-        policy.task,
-        policy.description.camera,
-        policy.dynamics,
-        policy.actions,
-    )
+    assert folder == tmp_path / "demonstrations" and one.pilot == "person"
+    assert one.actions.tolist() == [0, 1, 2] and one.actions.dtype == np.int64
+    assert one.images.shape == (3, 25, 64, 3) and one.images.dtype == np.uint8
+    assert np.array_equal(one.images[0], frame.numpy())
+    assert one.rewards.tolist() == [0.0, 0.0, 0.0] and one.rewards.dtype == np.float32
+    assert one.done.tolist() == [False, False, False]
+    assert one.conditions == demonstrations.FlightConditions(*flight.world.conditions)
 
 
 def test_each_episode_of_the_policy_is_a_demonstration(make_flight, written):
@@ -67,8 +49,8 @@ def test_each_episode_of_the_policy_is_a_demonstration(make_flight, written):
     flight.handle({"type": "record", "on": False})
     assert len(written) >= 2
     for _, one in written[:2]:
-        assert one["pilot"] == "policy" and one["done"].sum() == 1 and one["done"][-1]
-        assert one["rewards"].sum() == 3.0
+        assert one.pilot == "policy" and one.done.sum() == 1 and one.done[-1]
+        assert one.rewards.sum() == 3.0
 
 
 def test_recording_switches_to_the_policys_actions(make_flight, written):
@@ -80,7 +62,7 @@ def test_recording_switches_to_the_policys_actions(make_flight, written):
     flight.handle({"type": "mode", "mode": "computer_vision"})  # ends this demonstration
     press(flight, "forward")
     flight.handle({"type": "record", "on": False})
-    assert [len(one["actions"]) for _, one in written] == [1]
+    assert [len(one.actions) for _, one in written] == [1]
 
 
 @pytest.mark.parametrize(
@@ -96,7 +78,7 @@ def test_a_demonstration_has_one_flyer_one_episode_and_one_wind(make_flight, wri
     flight.handle({"type": "record", "on": True})
     press(flight, "forward", "left")
     flight.handle(message)
-    assert [(one["pilot"], len(one["actions"])) for _, one in written] == [("person", 2)]
+    assert [(one.pilot, len(one.actions)) for _, one in written] == [("person", 2)]
     assert flight.recorder.is_on
 
 
@@ -115,8 +97,7 @@ def test_a_folder_that_cannot_be_written_is_reported_and_ends_recording(
         raise OSError(28, "No space left on device")
 
     flight = make_flight()
-    module = sys.modules["drone_rl.training.demonstrations"]
-    monkeypatch.setattr(module, "add_demonstration", refuse)
+    monkeypatch.setattr(demonstrations, "add_demonstration", refuse)
     flight.handle({"type": "record", "on": True})
     press(flight, "forward")
     flight.handle({"type": "reset"})
@@ -132,7 +113,6 @@ def test_a_folder_that_cannot_be_written_is_reported_and_ends_recording(
 
 
 def test_files_are_demonstrations_that_a_training_reads(make_flight, tmp_path):
-    demonstrations = pytest.importorskip("drone_rl.training.demonstrations")
     flight = make_flight()
     flight.handle({"type": "record", "on": True})
     press(flight, "forward", "right")

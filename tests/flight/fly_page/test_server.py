@@ -3,10 +3,8 @@
 import contextlib
 import json
 import socket
-import sys
 import threading
 import time
-import types
 import urllib.error
 import urllib.request
 
@@ -167,15 +165,6 @@ def test_a_slow_page_gets_few_frames_and_the_newest(page):
         assert late["frame"] >= seen["frame"]
 
 
-def test_more_pages_than_allowed_are_refused(page):
-    with contextlib.ExitStack() as stack:
-        for _ in range(server.MAX_PAGES):
-            stack.enter_context(connected(page))
-        with pytest.raises(exceptions.InvalidStatus) as refused, connected(page):
-            pass
-        assert refused.value.response.status_code == 403
-
-
 def test_closing_a_page_lets_go_of_its_keys(page):
     with connected(page) as (opened, _):
         send(opened, type="reset")
@@ -185,19 +174,6 @@ def test_closing_a_page_lets_go_of_its_keys(page):
         first = wait_for(opened, lambda s: True)
         later = wait_for(opened, lambda s: s["time"] > first["time"] + 1.0)
         assert later["position"] == first["position"]
-
-
-def test_closing_a_page_leaves_the_keys_of_another_held(page):
-    with connected(page) as (opened, _):
-        with connected(page) as (other, _):
-            send(other, type="hold", controls=[])
-            send(other, type="set", name="light", value=0.9)
-            wait_for(other, lambda s: s["settings"]["light"] == 0.9)
-            send(opened, type="reset")
-            send(opened, type="hold", controls=["forward"])
-            wait_for(opened, lambda s: s["steps"] >= 1)
-        begun = wait_for(opened, lambda s: s["steps"] >= 1)["steps"]
-        wait_for(opened, lambda s: s["steps"] >= begun + 4)
 
 
 def test_time_stands_still_without_a_page(page):
@@ -240,15 +216,9 @@ def fly_by_oracle(opened, episodes):
 
 def test_the_oracle_flies_demonstrations_through_the_protocol(page, monkeypatch):
     written = []
-    try:
-        from drone_rl.training import demonstrations
-    except ImportError:
-        demonstrations = types.ModuleType("drone_rl.training.demonstrations")
-        demonstrations.FlightConditions = lambda *parts: parts
-        demonstrations.Demonstration = lambda conditions, **arrays: types.SimpleNamespace(**arrays)
-        monkeypatch.setitem(sys.modules, "drone_rl.training.demonstrations", demonstrations)
     monkeypatch.setattr(
-        demonstrations, "add_demonstration", lambda folder, one: written.append(one), raising=False
+        "drone_rl.training.demonstrations.add_demonstration",
+        lambda folder, one: written.append(one),
     )
     with connected(page) as (opened, _):
         state = fly_by_oracle(opened, 2)
@@ -294,11 +264,3 @@ def test_a_bug_in_the_simulation_ends_the_page_and_is_raised(monkeypatch):
             wait_for(talking, lambda s: False)
         with pytest.raises(RuntimeError, match="a bug"):
             opened.wait()
-
-
-def test_too_many_messages_are_refused(page, monkeypatch):
-    with connected(page) as (opened, _):
-        monkeypatch.setattr(server, "_MOST_WAITING", 0)
-        send(opened, type="reset")
-        state = wait_for(opened, lambda s: "error" in s)
-        assert state == {"error": "too many messages; slow down"}

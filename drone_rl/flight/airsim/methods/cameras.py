@@ -1,15 +1,24 @@
 """Methods that report, or set, where cameras are and what they see."""
 
 import dataclasses
+import functools
 import math
-from collections.abc import Sequence
 from typing import Any
 
+import torch
+
 from drone_rl.flight.airsim import messages
-from drone_rl.flight.airsim.cameras import CameraState
-from drone_rl.flight.airsim.messages import Map, number, read_map, read_pose, text, to_world
-from drone_rl.flight.airsim.methods.registry import method, sim_vehicle_at
-from drone_rl.flight.airsim.simulation import Simulation
+from drone_rl.flight.airsim.messages import (
+    Map,
+    Pose,
+    attitude_to_world,
+    number,
+    read_attitude,
+    read_pose,
+    text,
+    to_world,
+)
+from drone_rl.flight.airsim.methods.registry import SIM_VEHICLE, given, vehicle_method
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.flight.image_types import ImageType
 from drone_rl.sim.entities import find_camera
@@ -19,36 +28,34 @@ _NEAR = 10.0
 """Unreal's near plane, centimetres."""
 
 
-def read_camera(value: Any) -> str:
+def read_camera(value: Any, name: str = "camera_name") -> str:
     """Return our name of a camera."""
-    return find_camera(value if isinstance(value, int) else text(value, "camera_name")).name
+    return find_camera(value if isinstance(value, int) else text(value, name)).name
 
 
-def camera_in_world(
-    simulation: Simulation, vehicle: Vehicle, camera: str
-) -> tuple[list[float], list[float]]:
-    """Return a camera's pose in NED relative to the start: metres, quaternion (w, x, y, z)."""
-    state = simulation.cameras[vehicle.choice.name][camera]
+CAMERA = given(read_camera, "camera_name")
+camera_method = functools.partial(vehicle_method, vehicle=SIM_VEHICLE)
+"""Like `vehicle_method`; errors name the vehicle's Sim-API."""
+
+
+def camera_in_world(vehicle: Vehicle, camera: str) -> Pose:
+    """Return a camera's pose in NED relative to the start."""
+    state = vehicle.cameras[camera]
     turn = product(vehicle.body.attitude[0].double(), state.attitude)
-    place = vehicle.place_of(state) - vehicle.home
-    return messages.ned(place[None]), messages.ned_attitude(turn[None])
+    return Pose.of(vehicle.place_of(state) - vehicle.home, turn)
 
 
-@method("getCameraInfo", least=1)
-def _camera_pose(simulation: Simulation, args: Sequence[Any]) -> Map:
-    camera = read_camera(args[0])
-    vehicle = sim_vehicle_at(simulation, args, 1)
-    place, turn = camera_in_world(simulation, vehicle, camera)
-    capture = simulation.cameras[vehicle.choice.name][camera].capture(ImageType.SCENE)
-    pose = {"position": messages.vector(place), "orientation": messages.quaternion(turn)}
-    return {"pose": pose, "fov": capture.fov}
+@camera_method("getCameraInfo", CAMERA)
+def _camera_pose(vehicle: Vehicle, camera: str) -> Map:
+    fov = vehicle.cameras[camera].capture(ImageType.SCENE).fov
+    return {"pose": messages.pose(camera_in_world(vehicle, camera)), "fov": fov}
 
 
-@method("simGetCameraInfo", least=1)
-def _camera_info(simulation: Simulation, args: Sequence[Any]) -> Map:
-    capture = camera_at(simulation, args, 1).capture(ImageType.SCENE)
+@camera_method("simGetCameraInfo", CAMERA)
+def _camera_info(vehicle: Vehicle, camera: str) -> Map:
+    capture = vehicle.cameras[camera].capture(ImageType.SCENE)
     matrix = _projection(capture.fov, capture.width, capture.height)
-    return {**_camera_pose(simulation, args), "proj_mat": {"matrix": matrix}}
+    return {**_camera_pose(vehicle, camera), "proj_mat": {"matrix": matrix}}
 
 
 def _projection(fov: float, width: int, height: int) -> list[list[float]]:
@@ -65,42 +72,26 @@ def _projection(fov: float, width: int, height: int) -> list[list[float]]:
     ]
 
 
-@method("simSetCameraPose", least=2)
-def _set_camera_pose(simulation: Simulation, args: Sequence[Any]) -> None:
-    camera, pose = camera_at(simulation, args), read_pose(args[1])
-    given = to_world(pose.position)
-    x, y, z = (
-        old if math.isnan(new) else new for old, new in zip(camera.position, given, strict=True)
-    )
-    attitude = camera.attitude
-    if not any(map(math.isnan, pose.attitude)):
-        attitude = messages.attitude_to_world(pose.attitude)[0]
-    put_camera(simulation, args, dataclasses.replace(camera, position=(x, y, z), attitude=attitude))
+def change_camera(vehicle: Vehicle, camera: str, **changes: Any) -> None:
+    """Change a camera of a vehicle."""
+    vehicle.cameras[camera] = dataclasses.replace(vehicle.cameras[camera], **changes)
 
 
-@method("simSetCameraOrientation", "setCameraOrientation", least=2)
-def _set_camera_orientation(simulation: Simulation, args: Sequence[Any]) -> None:
-    keys = ("w_val", "x_val", "y_val", "z_val")
-    attitude = messages.attitude_to_world(read_map(args[1], "orientation", keys))[0]
-    camera = camera_at(simulation, args)
-    put_camera(simulation, args, dataclasses.replace(camera, attitude=attitude))
+@camera_method("simSetCameraPose", CAMERA, given(read_pose, "pose"))
+def _set_camera_pose(vehicle: Vehicle, camera: str, pose: Pose) -> None:
+    state = vehicle.cameras[camera]
+    whole = pose.merged(Pose.of(torch.tensor(state.position, dtype=torch.float64), state.attitude))
+    attitude = attitude_to_world(whole.attitude)
+    change_camera(vehicle, camera, position=to_world(whole.position), attitude=attitude)
 
 
-@method("simSetCameraFov", least=2)
-def _set_camera_fov(simulation: Simulation, args: Sequence[Any]) -> None:
-    fov = number(args[1], "fov_degrees", 1.0, 170.0)
-    put_camera(simulation, args, dataclasses.replace(camera_at(simulation, args), fov=fov))
+@camera_method(
+    "simSetCameraOrientation setCameraOrientation", CAMERA, given(read_attitude, "orientation")
+)
+def _set_camera_orientation(vehicle: Vehicle, camera: str, attitude: list[float]) -> None:
+    change_camera(vehicle, camera, attitude=attitude_to_world(attitude))
 
 
-def camera_at(simulation: Simulation, args: Sequence[Any], index: int = 2) -> CameraState:
-    """Return the camera of the first argument, of the vehicle that another one names."""
-    vehicle = sim_vehicle_at(simulation, args, index)
-    return simulation.cameras[vehicle.choice.name][read_camera(args[0])]
-
-
-def put_camera(
-    simulation: Simulation, args: Sequence[Any], camera: CameraState, index: int = 2
-) -> None:
-    """Replace a camera of the vehicle that an argument names."""
-    vehicle = sim_vehicle_at(simulation, args, index)
-    simulation.cameras[vehicle.choice.name][camera.name] = camera
+@camera_method("simSetCameraFov", CAMERA, given(number, "fov_degrees", 1.0, 170.0))
+def _set_camera_fov(vehicle: Vehicle, camera: str, fov: float) -> None:
+    change_camera(vehicle, camera, fov=fov)

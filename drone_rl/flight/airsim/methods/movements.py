@@ -2,232 +2,137 @@
 
 import functools
 import math
-from collections.abc import Sequence
 from typing import Any
 
-from drone_rl.flight.airsim.calls import remark
-from drone_rl.flight.airsim.messages import MOST_TURN, number, read_path, read_yaw_mode
-from drone_rl.flight.airsim.methods.registry import argument, method, vehicle_at
-from drone_rl.flight.airsim.simulation import Simulation, Wait
-from drone_rl.flight.airsim.vehicle import limit
-from drone_rl.flight.commands.checks import FARTHEST
-from drone_rl.flight.commands.command import FlightFuture
+from drone_rl.flight.airsim.messages import (
+    FARTHEST,
+    MOST_TURN,
+    number,
+    read_drivetrain,
+    read_map,
+    read_path,
+    read_seconds,
+    read_yaw_mode,
+)
+from drone_rl.flight.airsim.methods.registry import Argument, given, method, vehicle_method
+from drone_rl.flight.airsim.simulation import Simulation
+from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.flight.commands.path_following import AUTOMATIC
+from drone_rl.flight.commands.pilot import Sticks
 from drone_rl.sim.coordinates import GeoPoint
-from drone_rl.utils.errors import InputError
 
-_FASTEST = 100.0
+_FASTEST, _SLOWEST = 100.0, 0.001
 """Metres per second."""
-_SLOWEST = 0.001
+_QUARTER, _TURN = math.pi / 2, math.radians(MOST_TURN)
+
+
+def _limits(names: str, low: float, high: float) -> dict[str, tuple[float, float]]:
+    return dict.fromkeys(names.split(), (low, high))
+
+
 _LIMITS = {
-    **dict.fromkeys(("vx", "vy", "vz"), (-_FASTEST, _FASTEST)),
-    **dict.fromkeys(("velocity", "vx_max", "vy_max"), (_SLOWEST, _FASTEST)),
-    **dict.fromkeys(("x", "y", "z", "z_min", "altitude", "lookahead"), (-FARTHEST, FARTHEST)),
-    **dict.fromkeys(("roll", "pitch"), (-math.pi / 2, math.pi / 2)),
-    **dict.fromkeys(
-        ("roll_rate", "pitch_rate", "yaw_rate"), (-math.radians(MOST_TURN), math.radians(MOST_TURN))
-    ),
-    **dict.fromkeys(
-        ("throttle", "front_right", "rear_left", "front_left", "rear_right"), (0.0, 1.0)
-    ),
-    "adaptive_lookahead": (0.0, 100.0),
+    **_limits("vx vy vz", -_FASTEST, _FASTEST),
+    **_limits("velocity vx_max vy_max", _SLOWEST, _FASTEST),
+    **_limits("x y z z_min altitude", -FARTHEST, FARTHEST),
+    **_limits("roll pitch", -_QUARTER, _QUARTER),
+    **_limits("roll_rate pitch_rate yaw_rate", -_TURN, _TURN),
+    **_limits("throttle front_right rear_left front_left rear_right", 0.0, 1.0),
     "latitude": (-90.0, 90.0),
     "longitude": (-360.0, 360.0),
 }
 """Lowest and highest values of arguments, by name: metres, seconds, radians."""
 
 
-def _flown(future: FlightFuture | None) -> Any:
-    """Return a wait for the end of a movement; False if API control is off."""
-    if future is None:
-        remark("ignored, because API control is off; call enableApiControl(True)")
-        return False
-    return Wait(lambda: future.done, lambda: future.result())
+def _numbers(names: str) -> list[Argument]:
+    return [given(number, name, *_LIMITS.get(name, ())) for name in names.split()]
 
 
-def _number(value: Any, name: str) -> float:
-    return number(value, name, *_LIMITS.get(name, ()))
+def _timeout(default: float = 1e6) -> Argument:
+    return given(read_seconds, "timeout_sec", default=default)
 
 
-def _numbers(args: Sequence[Any], *names: str) -> list[float]:
-    """Return the first arguments, one for each name, as numbers within `_LIMITS`."""
-    return [_number(value, name) for value, name in zip(args, names, strict=False)]
+_DURATION = given(read_seconds, "duration")
+_YAW_MODE = given(read_yaw_mode, "yaw_mode", default={"is_rate": True, "yaw_or_rate": 0.0})
+_HEADING = (given(read_drivetrain, "drivetrain", default=0), _YAW_MODE)
+_LOOKAHEAD = (
+    given(number, "lookahead", -FARTHEST, FARTHEST, default=AUTOMATIC),
+    given(number, "adaptive_lookahead", 0.0, 100.0, default=1.0),
+)
+_STICKS = ("pitch", "roll", "throttle", "yaw")
+_TO_POINT = (*_numbers("velocity"), _timeout(), *_HEADING, *_LOOKAHEAD)
+
+vehicle_method("takeoff", _timeout(20.0))(Vehicle.takeoff)
+vehicle_method("land", _timeout(60.0))(Vehicle.land_down)
+vehicle_method("goHome", _timeout())(Vehicle.return_home)
+vehicle_method("hover")(Vehicle.hold)
+vehicle_method("rotateToYaw", *_numbers("yaw"), _timeout(), given(number, "margin", default=5.0))(
+    Vehicle.turn_to
+)
+vehicle_method("rotateByYawRate", given(number, "yaw_rate", -MOST_TURN, MOST_TURN), _DURATION)(
+    Vehicle.turn_by
+)
+vehicle_method("moveByManual", *_numbers("vx_max vy_max z_min"), _DURATION, *_HEADING)(
+    Vehicle.move_manually
+)
+vehicle_method("moveOnPath", given(read_path, "path"), *_TO_POINT)(Vehicle.move_path)
+vehicle_method("moveToZ", *_numbers("z velocity"), _timeout(), _YAW_MODE, *_LOOKAHEAD)(
+    Vehicle.move_height
+)
 
 
-@method("takeoff")
-def _takeoff(simulation: Simulation, args: Sequence[Any]) -> Any:
-    timeout = number(argument(args, 0, 20.0), "timeout_sec")
-    return _flown(vehicle_at(simulation, args, 1).takeoff(timeout))
+@vehicle_method("moveToPosition", *_numbers("x y z"), *_TO_POINT)
+def _move_to(vehicle: Vehicle, x: float, y: float, z: float, *more: Any) -> Any:
+    return vehicle.move_path([(x, y, z)], *more)
 
 
-@method("land")
-def _land(simulation: Simulation, args: Sequence[Any]) -> Any:
-    timeout = number(argument(args, 0, 60.0), "timeout_sec")
-    return _flown(vehicle_at(simulation, args, 1).land_down(timeout))
+@vehicle_method("moveToGPS", *_numbers("latitude longitude altitude"), *_TO_POINT)
+def _move_to_place(vehicle: Vehicle, north: float, east: float, up: float, *more: Any) -> Any:
+    return vehicle.move_geo(GeoPoint(north, east, up), *more)
 
 
-@method("goHome")
-def _home(simulation: Simulation, args: Sequence[Any]) -> Any:
-    # version 1.1 passes nothing
-    timeout = number(argument(args, 0, 1e6), "timeout_sec")
-    return _flown(vehicle_at(simulation, args, 1).return_home(timeout))
-
-
-@method("hover")
-def _hover(simulation: Simulation, args: Sequence[Any]) -> Any:
-    return _flown(vehicle_at(simulation, args, 0).hold())
-
-
-def _move_velocity(
-    simulation: Simulation, args: Sequence[Any], *, has_height: bool, in_body: bool
+def _move_by_velocity(
+    vehicle: Vehicle, vx: float, vy: float, third: float, *more: Any, at_height: bool, in_body: bool
 ) -> Any:
-    third = "z" if has_height else "vz"
-    vx, vy, vz, seconds = _numbers(args, "vx", "vy", third, "duration")
-    if seconds <= 0.0:
-        return not has_height  # as AirSim answers
-    drivetrain, yaw = read_yaw_mode(argument(args, 5, _HELD), argument(args, 4, 0))
-    vehicle = vehicle_at(simulation, args, 6)
-    future = vehicle.move_velocity(
-        (vx, vy, 0.0 if has_height else vz),
-        limit(seconds),
-        drivetrain,
-        yaw,
-        z=vz if has_height else None,
-        in_body=in_body,
-    )
-    return _flown(future)
+    if more[0] <= 0.0:  # the duration
+        return not at_height  # as AirSim answers
+    vz, z = (0.0, third) if at_height else (third, None)
+    return vehicle.move_velocity((vx, vy, vz), *more, z=z, in_body=in_body)
 
 
-_HELD = {"is_rate": True, "yaw_or_rate": 0.0}
+for _at_height, _label, _names in ((False, "", "vx vy vz"), (True, "Z", "vx vy z")):
+    for _in_body, _frame in ((False, ""), (True, "BodyFrame")):
+        vehicle_method(f"moveByVelocity{_label}{_frame}", *_numbers(_names), _DURATION, *_HEADING)(
+            functools.partial(_move_by_velocity, at_height=_at_height, in_body=_in_body)
+        )
 
-for _label, _has_height, _in_body in (
-    ("moveByVelocity", False, False),
-    ("moveByVelocityZ", True, False),
-    ("moveByVelocityBodyFrame", False, True),
-    ("moveByVelocityZBodyFrame", True, True),
+
+def _named(vehicle: Vehicle, *values: float, move: Any, names: str) -> Any:
+    *held, seconds = values
+    return move(vehicle, seconds, **dict(zip(names.split(), held, strict=True)))
+
+
+for _move, _label, _names in (
+    (Vehicle.set_rotors, "moveByMotorPWMs", "front_right rear_left front_left rear_right"),
+    (Vehicle.spin, "moveByAngleRatesZ", "roll_rate pitch_rate yaw_rate z"),
+    (Vehicle.spin, "moveByAngleRatesThrottle", "roll_rate pitch_rate yaw_rate throttle"),
+    (Vehicle.tilt, "moveByRollPitchYawZ", "roll pitch yaw z"),
+    (Vehicle.tilt, "moveByRollPitchYawThrottle", "roll pitch yaw throttle"),
+    (Vehicle.tilt, "moveByRollPitchYawrateZ", "roll pitch yaw_rate z"),
+    (Vehicle.tilt, "moveByRollPitchYawrateThrottle", "roll pitch yaw_rate throttle"),
+    # versions up to 1.5
+    (Vehicle.tilt, "moveByAngleZ moveByAngle", "pitch roll z yaw"),
+    (Vehicle.tilt, "moveByAngleThrottle", "pitch roll throttle yaw_rate"),
 ):
-    method(_label, least=4)(
-        functools.partial(_move_velocity, has_height=_has_height, in_body=_in_body)
+    vehicle_method(_label, *_numbers(_names), _DURATION)(
+        functools.partial(_named, move=_move, names=_names)
     )
-
-
-def _lookahead(args: Sequence[Any], index: int) -> tuple[float, float]:
-    lookahead = _number(argument(args, index, AUTOMATIC), "lookahead")
-    return lookahead, _number(argument(args, index + 1, 1.0), "adaptive_lookahead")
-
-
-@method("moveOnPath", least=2)
-def _move_path(simulation: Simulation, args: Sequence[Any]) -> Any:
-    speed, timeout = _number(args[1], "velocity"), number(argument(args, 2, 1e6), "timeout_sec")
-    drivetrain, yaw = read_yaw_mode(argument(args, 4, _HELD), argument(args, 3, 0))
-    vehicle = vehicle_at(simulation, args, 7)
-    path = read_path(args[0])
-    ahead = _lookahead(args, 5)
-    return _flown(vehicle.move_path(path, speed, timeout, drivetrain, yaw, *ahead))
-
-
-@method("moveToPosition", least=4)
-def _move_to(simulation: Simulation, args: Sequence[Any]) -> Any:
-    x, y, z, speed = _numbers(args, "x", "y", "z", "velocity")
-    timeout = number(argument(args, 4, 1e6), "timeout_sec")
-    drivetrain, yaw = read_yaw_mode(argument(args, 6, _HELD), argument(args, 5, 0))
-    vehicle = vehicle_at(simulation, args, 9)
-    future = vehicle.move_path([(x, y, z)], speed, timeout, drivetrain, yaw, *_lookahead(args, 7))
-    return _flown(future)
-
-
-@method("moveToGPS", least=4)
-def _move_geo(simulation: Simulation, args: Sequence[Any]) -> Any:
-    *place, speed = _numbers(args, "latitude", "longitude", "altitude", "velocity")
-    timeout = number(argument(args, 4, 1e6), "timeout_sec")
-    drivetrain, yaw = read_yaw_mode(argument(args, 6, _HELD), argument(args, 5, 0))
-    vehicle = vehicle_at(simulation, args, 9)
-    ahead = _lookahead(args, 7)
-    return _flown(vehicle.move_geo(GeoPoint(*place), speed, timeout, drivetrain, yaw, *ahead))
-
-
-@method("moveToZ", least=2)
-def _move_z(simulation: Simulation, args: Sequence[Any]) -> Any:
-    z, speed = _numbers(args, "z", "velocity")
-    timeout = number(argument(args, 2, 1e6), "timeout_sec")
-    _, yaw = read_yaw_mode(argument(args, 3, _HELD), 0)
-    vehicle = vehicle_at(simulation, args, 6)
-    return _flown(vehicle.move_height(z, speed, timeout, yaw, *_lookahead(args, 4)))
-
-
-@method("rotateToYaw", least=1)
-def _rotate_to(simulation: Simulation, args: Sequence[Any]) -> Any:
-    yaw, timeout = number(args[0], "yaw"), number(argument(args, 1, 1e6), "timeout_sec")
-    margin = number(argument(args, 2, 5.0), "margin")
-    return _flown(vehicle_at(simulation, args, 3).turn_to(yaw, timeout, margin))
-
-
-@method("rotateByYawRate", least=2)
-def _rotate_by(simulation: Simulation, args: Sequence[Any]) -> Any:
-    rate, seconds = number(args[0], "yaw_rate", -MOST_TURN, MOST_TURN), number(args[1], "duration")
-    if seconds <= 0.0:
-        return True
-    future = vehicle_at(simulation, args, 2).turn_by(rate, limit(seconds))
-    return _flown(future)
-
-
-@method("moveByManual", least=4)
-def _manual(simulation: Simulation, args: Sequence[Any]) -> Any:
-    vx, vy, z, seconds = _numbers(args, "vx_max", "vy_max", "z_min", "duration")
-    drivetrain, yaw = read_yaw_mode(argument(args, 5, _HELD), argument(args, 4, 0))
-    vehicle = vehicle_at(simulation, args, 6)
-    future = vehicle.move_manually(vx, vy, z, limit(seconds), drivetrain, yaw)
-    return _flown(future)
 
 
 @method("waitOnLastTask")
-def _wait_on_last(simulation: Simulation, args: Sequence[Any]) -> Any:
-    future = simulation.find("").running
-    return True if future is None else _flown(future)
+def _wait_on_last(simulation: Simulation) -> Any:
+    return simulation.find("").running or True
 
 
-@method("moveByRC", "setRCData", least=1)
-def _by_rc(simulation: Simulation, args: Sequence[Any]) -> None:
-    if not isinstance(args[0], dict):
-        raise InputError("rcdata is not a map; give RCData")
-    vehicle_at(simulation, args, 1).set_sticks(args[0])
-
-
-def _tilt(simulation: Simulation, args: Sequence[Any], *, order: str) -> Any:
-    names = order.split()
-    *values, seconds = _numbers(args, *names, "duration")
-    held = dict(zip(names, values, strict=True))
-    vehicle = vehicle_at(simulation, args, 5)
-    return _flown(vehicle.tilt(seconds=limit(seconds), **held))
-
-
-for _label, _order in (
-    ("moveByRollPitchYawZ", "roll pitch yaw z"),
-    ("moveByRollPitchYawThrottle", "roll pitch yaw throttle"),
-    ("moveByRollPitchYawrateZ", "roll pitch yaw_rate z"),
-    ("moveByRollPitchYawrateThrottle", "roll pitch yaw_rate throttle"),
-    # versions up to 1.5
-    ("moveByAngleZ", "pitch roll z yaw"),
-    ("moveByAngle", "pitch roll z yaw"),
-    ("moveByAngleThrottle", "pitch roll throttle yaw_rate"),
-):
-    method(_label, least=5)(functools.partial(_tilt, order=_order))
-
-
-def _spin(simulation: Simulation, args: Sequence[Any], *, lift: str) -> Any:
-    names = ("roll_rate", "pitch_rate", "yaw_rate", lift, "duration")
-    *rates, value, seconds = _numbers(args, *names)
-    vehicle = vehicle_at(simulation, args, 5)
-    return _flown(vehicle.spin(rates, limit(seconds), **{lift: value}))
-
-
-for _label, _lift in (("moveByAngleRatesZ", "z"), ("moveByAngleRatesThrottle", "throttle")):
-    method(_label, least=5)(functools.partial(_spin, lift=_lift))
-
-
-@method("moveByMotorPWMs", least=5)
-def _motors(simulation: Simulation, args: Sequence[Any]) -> Any:
-    names = ("front_right", "rear_left", "front_left", "rear_right", "duration")
-    *shares, seconds = _numbers(args, *names)
-    vehicle = vehicle_at(simulation, args, 5)
-    return _flown(vehicle.set_rotors(shares, limit(seconds)))
+@vehicle_method("moveByRC setRCData", given(read_map, "rcdata", _STICKS, most=1.0))
+def _by_rc(vehicle: Vehicle, values: list[float]) -> None:
+    vehicle.sticks = Sticks(*values)

@@ -1,4 +1,4 @@
-"""The registry of RPC methods, and the arguments that many have."""
+"""The registry of RPC methods: their names, arguments and functions."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -6,9 +6,38 @@ from typing import Any
 
 from drone_rl.flight.airsim.messages import text
 from drone_rl.flight.airsim.methods.support import UNSUPPORTED
-from drone_rl.flight.airsim.simulation import Simulation
-from drone_rl.flight.airsim.vehicle import Vehicle
+from drone_rl.flight.airsim.simulation import Simulation, Wait
+from drone_rl.flight.commands.command import FlightFuture
 from drone_rl.utils.errors import InputError, did_you_mean
+
+_REQUIRED = object()
+
+
+@dataclasses.dataclass(frozen=True)
+class Argument:
+    """How an argument of a method is read."""
+
+    read: Callable[[Simulation, Any], Any]
+    """Returns what a function takes of a simulation and what the client sent."""
+    default: Any = _REQUIRED
+    """What counts as sent where a client sends fewer arguments."""
+
+
+def given(
+    read: Callable[..., Any], name: str, *limits: Any, default: Any = _REQUIRED, **more: Any
+) -> Argument:
+    """Return an argument that a reader of `messages` reads, such as `number` or `read_pose`."""
+    return Argument(lambda simulation, value: read(value, name, *limits, **more), default)
+
+
+def _find(simulation: Simulation, value: Any, *, is_sim_api: bool = False) -> Any:
+    return simulation.find(text(value, "vehicle_name"), is_sim_api=is_sim_api)
+
+
+VEHICLE = Argument(_find, "")
+"""A vehicle by its name, the first one by default; errors name its API, as in AirSim."""
+SIM_VEHICLE = Argument(lambda simulation, value: _find(simulation, value, is_sim_api=True), "")
+"""The same; errors name its Sim-API."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -16,8 +45,10 @@ class Method:
     """How a method is called and computed."""
 
     compute: Callable[..., Any]
-    least: int
-    """Fewest arguments; surplus ones are ignored."""
+    """Takes the simulation, or else the vehicle that the last argument names, and the others."""
+    arguments: Sequence[Argument]
+    """Surplus ones are ignored."""
+    is_of_vehicle: bool = False
 
 
 class UnknownMethodError(Exception):
@@ -28,11 +59,21 @@ METHODS: dict[str, Method] = {}
 """All methods, by their names."""
 
 
-def method(*names: str, least: int = 0) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Register a function of (simulation, arguments) under names of RPC methods."""
+def method(names: str, *arguments: Argument) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Register a function of a simulation and arguments under names, which spaces separate."""
+    return _register(names, arguments, is_of_vehicle=False)
 
+
+def vehicle_method(
+    names: str, *arguments: Argument, vehicle: Argument = VEHICLE
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Register a function of a vehicle and arguments; clients send the vehicle's name last."""
+    return _register(names, (*arguments, vehicle), is_of_vehicle=True)
+
+
+def _register(names: str, arguments: Sequence[Argument], *, is_of_vehicle: bool) -> Any:
     def register(compute: Callable[..., Any]) -> Callable[..., Any]:
-        METHODS.update(dict.fromkeys(names, Method(compute, least)))
+        METHODS.update(dict.fromkeys(names.split(), Method(compute, arguments, is_of_vehicle)))
         return compute
 
     return register
@@ -50,35 +91,19 @@ def call(simulation: Simulation, name: str, args: Sequence[Any]) -> Any:
         if name in UNSUPPORTED:
             raise InputError(f"{name} is not supported: this server has no {UNSUPPORTED[name]}")
         raise UnknownMethodError(name)
-    if len(args) < found.least:
-        raise InputError(
-            f"{name} was called with {len(args)} arguments; give {found.least} or more"
-        )
-    result = found.compute(simulation, args)
+    sent = [*args, *(argument.default for argument in found.arguments[len(args) :])]
+    if _REQUIRED in sent:
+        least = sum(argument.default is _REQUIRED for argument in found.arguments)
+        raise InputError(f"{name} was called with {len(args)} arguments; give {least} or more")
+    values = [a.read(simulation, v) for a, v in zip(found.arguments, sent, strict=False)]
+    first = values.pop() if found.is_of_vehicle else simulation
+    result = found.compute(first, *values)
     simulation.settle()  # it may have ended other calls, as cancelLastTask and simPause do
+    if isinstance(result, FlightFuture):
+        return Wait(lambda: result.done, result.result)
     return result
 
 
 def suggestion(name: str) -> str:
     """Return a hint at methods with a similar name."""
     return did_you_mean(name, METHODS)
-
-
-def argument(args: Sequence[Any], index: int, default: Any = None) -> Any:
-    """Return an argument, or the default where fewer are given."""
-    return args[index] if len(args) > index else default
-
-
-def name_at(args: Sequence[Any], index: int) -> str:
-    """Return the name of a vehicle; "" where none is given."""
-    return text(argument(args, index, ""), "vehicle_name")
-
-
-def vehicle_at(simulation: Simulation, args: Sequence[Any], index: int) -> Vehicle:
-    """Return the vehicle that an argument names; errors name its API, as in AirSim."""
-    return simulation.find(name_at(args, index))
-
-
-def sim_vehicle_at(simulation: Simulation, args: Sequence[Any], index: int) -> Vehicle:
-    """Return the vehicle that an argument names; errors name its Sim-API, as in AirSim."""
-    return simulation.find(name_at(args, index), is_sim_api=True)

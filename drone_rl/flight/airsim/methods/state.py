@@ -1,47 +1,75 @@
 """Methods that report, or set, the state of a vehicle."""
 
-from collections.abc import Callable, Sequence
+import functools
 from typing import Any
 
 from drone_rl.flight.airsim import messages
-from drone_rl.flight.airsim.messages import Map, flag, read_map, read_pose, read_vector
-from drone_rl.flight.airsim.methods.registry import method, sim_vehicle_at, vehicle_at
+from drone_rl.flight.airsim.messages import Map, Pose, flag, read_map, read_pose, text
+from drone_rl.flight.airsim.methods.registry import (
+    SIM_VEHICLE,
+    VEHICLE,
+    given,
+    method,
+    vehicle_method,
+)
+from drone_rl.flight.airsim.sensors import SENSORS
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.sim.coordinates import GeoPoint
 
+_sim_vehicle_method = functools.partial(vehicle_method, vehicle=SIM_VEHICLE)
 
-@method("getMultirotorState")
-def _state(simulation: Simulation, args: Sequence[Any]) -> Map:
-    return vehicle_at(simulation, args, 0).multirotor_state()
+vehicle_method("getMultirotorState")(Vehicle.multirotor_state)
+vehicle_method("getRotorStates")(Vehicle.rotor_states)
+_sim_vehicle_method("simGetVehiclePose simGetPose")(lambda vehicle: messages.pose(vehicle.pose))
+_sim_vehicle_method("simGetGroundTruthKinematics")(Vehicle.kinematics)
+_sim_vehicle_method("simGetCollisionInfo")(Vehicle.collision)
 
-
-@method("simGetVehiclePose", "simGetPose")
-def _pose(simulation: Simulation, args: Sequence[Any]) -> Map:
-    return messages.pose(sim_vehicle_at(simulation, args, 0).pose)
-
-
-@method("simSetVehiclePose", "simSetPose", least=2)
-def _set_pose(simulation: Simulation, args: Sequence[Any]) -> None:
-    vehicle = sim_vehicle_at(simulation, args, 2)
-    ignore = flag(args[1], "ignore_collision")
-    simulation.teleport(vehicle, read_pose(args[0]), ignore_collision=ignore)
-
-
-@method("simGetGroundTruthKinematics")
-def _kinematics(simulation: Simulation, args: Sequence[Any]) -> Map:
-    return sim_vehicle_at(simulation, args, 0).kinematics()
+# of version 1.1
+vehicle_method("getCollisionInfo")(lambda vehicle: vehicle.collision(is_legacy=True))
+vehicle_method("getPosition")(lambda vehicle: vehicle.kinematics()["position"])
+vehicle_method("getVelocity")(lambda vehicle: vehicle.kinematics()["linear_velocity"])
+vehicle_method("getOrientation")(lambda vehicle: vehicle.kinematics()["orientation"])
+vehicle_method("getLandedState")(lambda vehicle: vehicle.multirotor_state()["landed_state"])
+vehicle_method("getGpsLocation")(Vehicle.geo_point)
+vehicle_method("getRCData")(lambda vehicle: vehicle.multirotor_state()["rc_data"])
 
 
-@method("simSetKinematics", least=2)
-def _set_kinematics(simulation: Simulation, args: Sequence[Any]) -> None:
-    pose = read_pose(args[0], "state")
-    velocity, rates = (
-        read_vector(args[0].get(name), f"state.{name}")
-        for name in ("linear_velocity", "angular_velocity")
+for _kind in SENSORS:  # of each there is one, whatever its name
+    vehicle_method(f"get{_kind.title()}Data", given(text, "sensor_name", default=""))(
+        lambda vehicle, _, kind=_kind: vehicle.sensor(kind)
     )
-    vehicle = sim_vehicle_at(simulation, args, 2)
-    vehicle.set_kinematics(pose, velocity, rates)
+
+
+@method(
+    "simSetVehiclePose simSetPose",
+    given(read_pose, "pose"),
+    given(flag, "ignore_collision"),
+    SIM_VEHICLE,
+)
+def _set_pose(simulation: Simulation, pose: Pose, ignore_collision: bool, vehicle: Vehicle) -> None:
+    simulation.teleport(vehicle, pose, ignore_collision=ignore_collision)
+
+
+def _read_kinematics(value: Any, name: str) -> tuple[Pose, list[float], list[float]]:
+    pose = read_pose(value, name)
+    velocity, rates = (
+        messages.read_vector(value.get(part), f"{name}.{part}")
+        for part in ("linear_velocity", "angular_velocity")
+    )
+    return pose, velocity, rates
+
+
+@method(
+    "simSetKinematics",
+    given(_read_kinematics, "state"),
+    given(flag, "ignore_collision"),
+    SIM_VEHICLE,
+)
+def _set_kinematics(
+    simulation: Simulation, state: Any, ignore_collision: bool, vehicle: Vehicle
+) -> None:
+    vehicle.set_kinematics(*state)
     simulation.touch(vehicle)
 
 
@@ -49,9 +77,8 @@ _STRATOSPHERE = 11_000.0
 """Altitude in metres from which temperature and pressure count as constant."""
 
 
-@method("simGetGroundTruthEnvironment")
-def _environment(simulation: Simulation, args: Sequence[Any]) -> Map:
-    vehicle = sim_vehicle_at(simulation, args, 0)
+@_sim_vehicle_method("simGetGroundTruthEnvironment")
+def _environment(vehicle: Vehicle) -> Map:
     altitude = min(vehicle.geo_point()["altitude"], _STRATOSPHERE)
     kelvin = 288.15 - 0.0065 * altitude
     pressure = 101325.0 * (kelvin / 288.15) ** 5.25588
@@ -65,57 +92,20 @@ def _environment(simulation: Simulation, args: Sequence[Any]) -> Map:
     }
 
 
-@method("simGetCollisionInfo")
-def _collision(simulation: Simulation, args: Sequence[Any]) -> Map:
-    return sim_vehicle_at(simulation, args, 0).collision()
+def _read_place(value: Any, name: str) -> GeoPoint:
+    return GeoPoint(*read_map(value, name, ("latitude", "longitude", "altitude")))
 
 
-@method("getCollisionInfo")
-def _legacy_collision(simulation: Simulation, args: Sequence[Any]) -> Map:
-    return simulation.find("", is_sim_api=True).collision(is_legacy=True)
+_sim_vehicle_method("simTestLineOfSightToPoint", given(_read_place, "point"))(Vehicle.sees)
 
 
-@method("getRotorStates")
-def _rotors(simulation: Simulation, args: Sequence[Any]) -> Map:
-    return vehicle_at(simulation, args, 0).rotor_states()
+@method(
+    "simTestLineOfSightBetweenPoints", given(_read_place, "point1"), given(_read_place, "point2")
+)
+def _line_between(simulation: Simulation, place: GeoPoint, other: GeoPoint) -> bool:
+    return simulation.find("").sees(place, other)
 
 
-@method("simTestLineOfSightToPoint", least=1)
-def _line_of_sight(simulation: Simulation, args: Sequence[Any]) -> bool:
-    return sim_vehicle_at(simulation, args, 1).sees(_read_place(args[0]))
-
-
-@method("simTestLineOfSightBetweenPoints", least=2)
-def _line_between(simulation: Simulation, args: Sequence[Any]) -> bool:
-    return simulation.find("", is_sim_api=True).sees(_read_place(args[0]), _read_place(args[1]))
-
-
-def _read_place(value: Any) -> GeoPoint:
-    return GeoPoint(*read_map(value, "point", ("latitude", "longitude", "altitude")))
-
-
-@method("getHomeGeoPoint")
-def _home_point(simulation: Simulation, args: Sequence[Any]) -> Map:
-    vehicle_at(simulation, args, 0)
+@method("getHomeGeoPoint", VEHICLE)
+def _home_point(simulation: Simulation, vehicle: Vehicle) -> Map:
     return messages.geo_point(simulation.settings.home)
-
-
-def _legacy(compute: Callable[[Vehicle], Any]) -> Callable[[Simulation, Sequence[Any]], Any]:
-    return lambda simulation, args: compute(simulation.find(""))
-
-
-method("getPosition")(_legacy(lambda v: v.kinematics()["position"]))
-method("getVelocity")(_legacy(lambda v: v.kinematics()["linear_velocity"]))
-method("getOrientation")(_legacy(lambda v: v.kinematics()["orientation"]))
-method("getLandedState")(_legacy(lambda v: v.multirotor_state()["landed_state"]))
-method("getGpsLocation")(_legacy(lambda v: v.geo_point()))
-method("getRCData")(_legacy(lambda v: v.multirotor_state()["rc_data"]))
-
-
-def _sensor(kind: str) -> Callable[[Simulation, Sequence[Any]], Map]:
-    # the first argument is the sensor's name; each vehicle has one of a kind
-    return lambda simulation, args: vehicle_at(simulation, args, 1).sensor(kind)
-
-
-for _label in ("imu", "barometer", "magnetometer", "gps"):
-    method(f"get{_label.title()}Data")(_sensor(_label))

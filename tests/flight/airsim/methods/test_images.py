@@ -95,7 +95,7 @@ def test_several_cameras_and_types_in_one_call(start):
         (([request(kind=9)], ""), "image_type=9 is not supported"),
         (([request(kind="rgb")], ""), "image_type='rgb' is not a number"),
         (([7], ""), "an image request is not a map"),
-        (([{"camera_name": "0"}], ""), "no camera_name or image_type"),
+        (([{"camera_name": "0"}], ""), "image_type=None is not a number"),
         ((7, ""), "requests are not a list"),
         (([request()] * 65, ""), "requests are not a list of at most 64"),
         (([request()], "Drone9"), "Vehicle Sim-API for 'Drone9' is not available"),
