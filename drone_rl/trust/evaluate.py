@@ -139,8 +139,7 @@ def evaluate(
     policy = as_policy(policy, outputs, task=task, dynamics=dynamics, appearance=appearance)
     if settings.baselines and (judged := as_task(policy.task)).oracle is None:
         raise InputError(f"task={judged.name} has no oracle to compare with; give baselines=false")
-    where: dict[str, Any] = {"device": settings.device, "renderer": settings.renderer}
-    require_function(policy, seed=seed.value, **where)
+    require_function(policy, seed=seed.value, device=settings.device, renderer=settings.renderer)
     episodes, steps = settings.episodes, 3 if settings.baselines else 2
     with held_out_environments(policy, settings, seed) as (env, actor):
         state, flown = env.base_env.state_dict(), worlds_of(env).dynamics
