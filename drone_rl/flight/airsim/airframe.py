@@ -44,6 +44,8 @@ _EARTH = 1e6
 """Half the height of the box that is the ground, metres."""
 _STANDS = 0.01
 """Metres above the ground up to which a vehicle stands on it."""
+_FAST = 50.0
+"""Speed up to which no vehicle passes a cube within one step, metres per second."""
 _FASTEST = 668.0
 """Speed of a rotor at full thrust, radians per second."""
 
@@ -116,6 +118,8 @@ class Airframe(Pilot):
         self.has_api_control = self.choice.has_api_control
         self.collisions = CollisionRecord()
         self._before = self.body
+        self.came_from: torch.Tensor | None = None
+        """Where the last step began, if it was faster than `_FAST`. Shape: (3,)."""
         self._is_armed = self.choice.is_armed and not self.is_computer_vision
         self._hover()
         self._unseen: deque[tuple[FlightState, float]] = deque()
@@ -134,6 +138,9 @@ class Airframe(Pilot):
         was_flying = self._is_flying
         self._advance(ticks)
         row = self.body.numbers.numpy()[0]
+        vx, vy, vz = row[VELOCITY : VELOCITY + 3].tolist()
+        is_fast = vx * vx + vy * vy + vz * vz > _FAST * _FAST
+        self.came_from = self._before.position[0] if is_fast else None
         if row[THING] != NOTHING and row[TIME] > (row[TICKS] - ticks + 0.5) * self.settings.tick:
             self._note_contact(row.tolist())
         if self._is_flying and not was_flying:

