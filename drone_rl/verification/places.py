@@ -10,6 +10,7 @@ from typing import Any, Unpack
 
 import numpy as np
 import torch
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from drone_rl.config.commands import PlacesSettings
@@ -19,6 +20,7 @@ from drone_rl.explanations.report.places import rows, say_places
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.trust.plots import regions
+from drone_rl.trust.plots.saving import save_drawn
 from drone_rl.utils.display import Result, aligned, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
@@ -68,11 +70,10 @@ class Places(Result):
     def save(self, folder: Path) -> None:
         """Write `places.json`, `places.png` and the zoomable `places.svg`."""
         (folder / "places.json").write_text(json.dumps(self.numbers | provenance(), indent=2))
-        outlines = self.places.outlines()
-        regions.chart(self.numbers, outlines, SHOWN_MOVES).savefig(folder / "places.png", dpi=200)
-        svg = regions.svg(self.numbers, outlines, SHOWN_MOVES)
-        head = svg.replace("<svg ", '<svg xmlns="http://www.w3.org/2000/svg" ', 1)
-        (folder / "places.svg").write_text(head)
+        save_drawn(self._chart(), folder / "places")
+
+    def _chart(self) -> Figure:
+        return regions.chart(self.numbers, self.places.outlines(), SHOWN_MOVES)
 
     def __str__(self) -> str:
         about = say(say_places, {"places": self.numbers})
@@ -80,9 +81,8 @@ class Places(Result):
 
     def _repr_html_(self) -> str:
         head, *lines = rows(self.numbers, SHOWN_MOVES.names)
-        figure = regions.chart(self.numbers, self.places.outlines(), SHOWN_MOVES)
         about = say(say_places, {"places": self.numbers})
-        return table(head, lines, [about]) + picture(figure)
+        return table(head, lines, [about]) + picture(self._chart())
 
 
 def places(

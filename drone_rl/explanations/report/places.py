@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from typing import Any
 
-from markupsafe import Markup
-
 from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.sim.vocabulary import shown_actions
 from drone_rl.trust.plots import regions
@@ -93,18 +91,11 @@ def _exact_map(explanation: Explanation) -> tuple[Any, ...]:
     return explanation.numbers["places"], outlines, explanation.actions
 
 
-def _extras(explanation: Explanation) -> dict[str, Any]:
-    if not (drawn := _exact_map(explanation)):
-        return {}
-    table = rows(explanation.numbers["places"], explanation.actions.names)
-    return {"svg": Markup(regions.svg(*drawn)), "rows": table}
-
-
 PART = Part(
     title="Exact action map of one cube",
     label="Exact map",
     needs=("places",),
     text={"places": say_places},
     draw=lambda e: {"places": regions.chart(*drawn)} if (drawn := _exact_map(e)) else {},
-    extras=_extras,
+    extras=lambda e: {"rows": rows(e.numbers["places"], e.actions.names)} if _exact_map(e) else {},
 )
