@@ -31,7 +31,7 @@ notebook: $(STAMP)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(EXTRAS),notebook]'
 	@$(BIN)/jupyter lab docs/tutorials/notebook.ipynb
 
-test: check
+test: $(STAMP)
 	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
 
 check: $(STAMP)
