@@ -94,8 +94,9 @@ class Training(Result):
         judged = self.result.get("verdict")
         verdict = f", verdict: {judged['kind']}" if judged else ""
         return (
-            f"stopped ({self.reason}) after {self.result['frames']:,} frames: running reward "
-            f"{self.running_reward:.3f}{verdict}; {self.folder}"
+            f"stopped ({self.reason}) after {self.result['frames']:,} frames, "
+            f"{self.result['episodes']:,} episodes, {self.result['seconds']:.1f} s: "
+            f"running reward {self.running_reward:.3f}{verdict}; {self.folder}"
         )
 
     def _repr_html_(self) -> str:
