@@ -10,6 +10,7 @@ from typing import Any, Unpack
 
 import numpy as np
 import torch
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from drone_rl.config.commands import PlacesSettings
@@ -19,7 +20,7 @@ from drone_rl.explanations.report.places import rows, say_places
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.trust.plots import regions
-from drone_rl.utils.display import Result, aligned, picture, table
+from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
@@ -33,7 +34,7 @@ from drone_rl.verification.prover.policy_spec import make_policy_spec
 
 
 @dataclasses.dataclass(frozen=True)
-class Places(Result):
+class Places(TableResult):
     """The actions of a greedy policy over all positions of one cube: areas, not samples."""
 
     policy: Policy
@@ -68,21 +69,22 @@ class Places(Result):
     def save(self, folder: Path) -> None:
         """Write `places.json`, `places.png` and the zoomable `places.svg`."""
         (folder / "places.json").write_text(json.dumps(self.numbers | provenance(), indent=2))
-        outlines = self.places.outlines()
-        regions.chart(self.numbers, outlines, SHOWN_MOVES).savefig(folder / "places.png", dpi=200)
-        svg = regions.svg(self.numbers, outlines, SHOWN_MOVES)
+        self.figure().savefig(folder / "places.png", dpi=200)
+        svg = regions.svg(self.numbers, self.places.outlines(), SHOWN_MOVES)
         head = svg.replace("<svg ", '<svg xmlns="http://www.w3.org/2000/svg" ', 1)
         (folder / "places.svg").write_text(head)
 
-    def __str__(self) -> str:
-        about = say(say_places, {"places": self.numbers})
-        return f"{aligned(rows(self.numbers, SHOWN_MOVES.names))}\n{about}"
+    def rows(self) -> list[list[str]]:
+        """Return the fractions of the area as a table: a header, then a row for each side."""
+        return rows(self.numbers, SHOWN_MOVES.names)
 
-    def _repr_html_(self) -> str:
-        head, *lines = rows(self.numbers, SHOWN_MOVES.names)
-        figure = regions.chart(self.numbers, self.places.outlines(), SHOWN_MOVES)
-        about = say(say_places, {"places": self.numbers})
-        return table(head, lines, [about]) + picture(figure)
+    def notes(self) -> list[str]:
+        """Return the findings in words."""
+        return [say(say_places, {"places": self.numbers})]
+
+    def figure(self) -> Figure:
+        """Return the map."""
+        return regions.chart(self.numbers, self.places.outlines(), SHOWN_MOVES)
 
 
 def places(

@@ -16,7 +16,7 @@ from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.config.options import ProveOptions
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import fingerprint
-from drone_rl.utils.display import Result, aligned, table
+from drone_rl.utils.display import TableResult
 from drone_rl.utils.files import (
     as_path,
     folder_lock,
@@ -43,7 +43,7 @@ STATE_NAME, _CERTIFICATE_NAME = "state.pt", "certificate.json"
 
 
 @dataclasses.dataclass(frozen=True)
-class Proof(Result):
+class Proof(TableResult):
     """The exact outcome of every placement of the cubes, as far as it is decided."""
 
     certificate: dict[str, Any]
@@ -100,12 +100,9 @@ class Proof(Result):
         left = self.certificate["undecided"]
         return [*rows, ["undecided", "", f"{left['share']:.9g}", str(len(left["boxes"]))]]
 
-    def __str__(self) -> str:
-        return f"{aligned(self.rows())}\n{describe_proof(self.certificate)}"
-
-    def _repr_html_(self) -> str:
-        head, *rows = self.rows()
-        return table(head, rows, [describe_proof(self.certificate)])
+    def notes(self) -> list[str]:
+        """Return the statement about all placements."""
+        return [describe_proof(self.certificate)]
 
 
 def prove(
