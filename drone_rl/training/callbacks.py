@@ -14,7 +14,7 @@ from torchrl.record.loggers import Logger
 
 from drone_rl.config.training import DETERMINISTIC
 from drone_rl.utils.checkpoint import save_checkpoint
-from drone_rl.utils.files import make_folder, remove_leftovers, write_atomically
+from drone_rl.utils.files import make_folder, write_atomically
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import Instance, Several
@@ -94,9 +94,8 @@ class CheckpointCallback(Callback):
         self._saved_at = time.monotonic()
 
     def on_start(self, training: OngoingTraining) -> None:
-        """Create the folder, delete half-written checkpoints, and save if there is no last one."""
+        """Create the folder, and save if there is no last checkpoint."""
         make_folder(self.folder)
-        remove_leftovers(self.folder, self.last_path.name, self.best_path.name)
         if not self.last_path.exists():
             self._save(training)
 

@@ -39,7 +39,6 @@ from drone_rl.utils.files import (
     last_of,
     make_folder,
     new_run_folder,
-    remove_leftovers,
     write_atomically,
 )
 from drone_rl.utils.provenance import provenance
@@ -60,8 +59,6 @@ MAY_CHANGE = (
     "demonstrations",
 )
 """Settings that a resumed run may change: they don't enter into what is learned."""
-_WRITTEN = ("metrics.csv", "result.json", "run.yaml", "provable.json")
-"""Files in a run's folder that are replaced when they are complete."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -185,7 +182,6 @@ class RunFolder:
             found = read_demonstrations(folder, FlightConditions.of(settings))
         elif settings.cloning != CloningSettings():
             _log.warning("settings of cloning have no effect without demonstrations=FOLDER")
-        remove_leftovers(self.path, *_WRITTEN)
         return found
 
     def checkpoints(self, settings: TrainSettings) -> CheckpointCallback:

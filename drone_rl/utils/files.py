@@ -19,8 +19,6 @@ from drone_rl.utils.schema import shown
 
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP)
 """Errors of file systems without locks."""
-_PROCESS = re.compile(r"[1-9][0-9]{0,6}")
-"""Process id at the end of a temporary file's name."""
 
 
 def as_path(value: str | Path, where: str) -> Path:
@@ -188,27 +186,6 @@ def write_all_atomically(contents: Mapping[Path, str | bytes]) -> None:
 def temporary_of(path: Path) -> Path:
     """Return the temporary file in which this process writes the content of a file."""
     return path.with_name(f".{path.name}.{os.getpid()}")
-
-
-def remove_leftovers(folder: Path, *names: str) -> None:
-    """Delete the temporary files of killed processes for files with these names in a folder."""
-    for name in names:
-        for path in folder.glob(f".{name}.*"):
-            suffix = path.name.removeprefix(f".{name}.")
-            if _PROCESS.fullmatch(suffix) and not _is_alive(int(suffix)) and path.is_file():
-                with contextlib.suppress(OSError):
-                    path.unlink()
-
-
-def _is_alive(process: int) -> bool:
-    """Return whether another process has this id."""
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):  # a process of another user
-        return True
-    return process != os.getpid()
 
 
 @contextlib.contextmanager

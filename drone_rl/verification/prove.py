@@ -21,7 +21,6 @@ from drone_rl.utils.files import (
     as_path,
     folder_lock,
     make_folder,
-    remove_leftovers,
     write_atomically,
 )
 from drone_rl.utils.progress import Progress, as_progress
@@ -142,7 +141,6 @@ def prove(
             folder = as_path(folder, "folder")
             make_folder(folder)
             stack.enter_context(folder_lock(folder))
-            remove_leftovers(folder, STATE_NAME, _CERTIFICATE_NAME)
         return _prove(policy, spec, settings, folder, as_progress(progress))
 
 
