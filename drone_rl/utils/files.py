@@ -153,7 +153,7 @@ def to_file_name(name: str) -> str:
 
 
 def write_atomically(path: Path, content: str | bytes) -> None:
-    """Write a small file as `write_all_atomically` does: readers get old or new content."""
+    """Write a file as `write_all_atomically` does: readers get old or new content."""
     write_all_atomically({path: content})
 
 
@@ -169,11 +169,13 @@ def write_all_atomically(contents: Mapping[Path, str | bytes]) -> None:
         for now, content in contents.items():
             if now.is_dir():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-            temporary = temporary_of(now)
+            temporary = now.with_name(f".{now.name}.{os.getpid()}")
             temporary.unlink(missing_ok=True)
             with temporary.open("xb") as file:  # refuses an existing link
                 temporaries[temporary] = now
                 file.write(content.encode() if isinstance(content, str) else content)
+                file.flush()
+                os.fsync(file.fileno())
         for temporary, now in temporaries.items():
             os.replace(temporary, now)
     except OSError as error:
@@ -181,11 +183,6 @@ def write_all_atomically(contents: Mapping[Path, str | bytes]) -> None:
             with contextlib.suppress(OSError):
                 temporary.unlink(missing_ok=True)
         raise OSError(error.errno, error.strerror or str(error), str(now)) from error
-
-
-def temporary_of(path: Path) -> Path:
-    """Return the temporary file in which this process writes the content of a file."""
-    return path.with_name(f".{path.name}.{os.getpid()}")
 
 
 @contextlib.contextmanager
