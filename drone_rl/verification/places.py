@@ -69,10 +69,9 @@ class Places(TableResult):
     def save(self, folder: Path) -> None:
         """Write `places.json`, `places.png` and the zoomable `places.svg`."""
         (folder / "places.json").write_text(json.dumps(self.numbers | provenance(), indent=2))
-        self.figure().savefig(folder / "places.png", dpi=200)
-        svg = regions.svg(self.numbers, self.places.outlines(), SHOWN_MOVES)
-        head = svg.replace("<svg ", '<svg xmlns="http://www.w3.org/2000/svg" ', 1)
-        (folder / "places.svg").write_text(head)
+        figure = self.figure()
+        for kind in ("png", "svg"):
+            figure.savefig(folder / f"places.{kind}", dpi=200)
 
     def rows(self) -> list[list[str]]:
         """Return the fractions of the area as a table: a header, then a row for each side."""

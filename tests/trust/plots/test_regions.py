@@ -1,14 +1,11 @@
-"""Two regions, and one where nothing is seen, as a chart and as an element."""
-
-import re
-import xml.etree.ElementTree as ElementTree
+"""Two regions, and one where nothing is seen."""
 
 import numpy as np
 import pytest
 from matplotlib.patches import PathPatch
 
 from drone_rl.sim.vocabulary import SHOWN_MOVES
-from drone_rl.trust.plots.regions import _ticks, chart, svg
+from drone_rl.trust.plots.regions import chart
 
 NUMBERS = {
     "window": {"nearest": 2.0, "farthest": 4.0, "sideways": 3.0},
@@ -44,33 +41,3 @@ def test_chart_of_regions():
     assert texts[:4] == ["goes left", "goes forward", "goes right", "cube not seen"]
     near = NUMBERS["window"]["nearest"]
     assert [text.get_text() for text in axis.texts] == [f"not covered: closer than {near:g} m"]
-
-
-def corners(words):
-    """The corners of one closed way of a path."""
-    start, steps = re.fullmatch(r"M(\S+ \S+)l(.+)z", words).groups()
-    numbers = [float(n) for n in f"{start} {steps}".split()]
-    return np.cumsum(np.reshape(numbers, (-1, 2)), 0)
-
-
-def test_svg_of_regions():
-    root = ElementTree.fromstring(svg(NUMBERS, WAYS, SHOWN_MOVES))
-    paths = [p for p in root.iter("path") if p.get("fill-rule")]
-    assert [p.get("fill") for p in paths] == ["#cc79a7", "#e69f00", "url(#unseen)"]
-    assert corners(paths[0].get("d")).tolist() == [[3, -2], [3, -4], [-1, -4], [-1, -2]]
-    assert paths[0].find("title").text == "goes forward"
-    small = corners(paths[2].get("d"))
-    assert small[:2].tolist() == [[-2.5, -2], [-2.5, -2.0001]]  # to a tenth of a millimetre
-    x, y, width, height = map(float, root.get("viewBox").split())
-    assert x < -3 and x + width > 3 and y < -4 and y + height > 0
-    ring = root.find("circle")
-    assert (ring.get("cx"), ring.get("cy")) == ("-2", "-3")
-    texts = [text.text for text in root.iter("text")]
-    assert {"2 m", "4 m", "goes left", "goes forward", "goes right"} <= set(texts)
-
-
-@pytest.mark.parametrize(
-    ("most", "ticks"), [(20, [0, 5, 10, 15, 20]), (8, [0, 2, 4, 6, 8]), (3, [0, 1, 2, 3])]
-)
-def test_ticks(most, ticks):
-    assert _ticks(most) == ticks
