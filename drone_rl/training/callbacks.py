@@ -282,12 +282,13 @@ class ForwardProgress(Callback):
         """Forward the running mean and the frames."""
         done = training.progress
         text = f"running reward {done.running_reward:.2f}, {done.episodes} episodes"
-        self.progress(text, done.frames, training.total_frames)
+        total = max(training.total_frames, done.frames + 1)  # `on_end` reports the end
+        self.progress(text, done.frames, total)
 
     def on_end(self, training: OngoingTraining, reason: str) -> None:
-        """Forward the reason why it stopped."""
-        frames = training.progress.frames
-        self.progress(f"stopped: {reason}", frames, frames)
+        """Forward the reason why it stopped, unless it only cloned."""
+        if frames := training.progress.frames:
+            self.progress(f"stopped: {reason}", frames, frames)
 
     def on_failure(self, training: OngoingTraining) -> None:
         """Forward that it failed."""
