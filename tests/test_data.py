@@ -26,7 +26,7 @@ MUTABLE = {
     "sweeps.manifest:Sweep",
     "sweeps.rows:Row",
     "sweeps.summary:RunGroup",
-    "training.callbacks:Progress",
+    "training.callbacks:TrainingProgress",
     "training.learners:ActorCriticLearner",
     "training.learners:GradientLearner",
     "training.learners:ReinforceLearner",

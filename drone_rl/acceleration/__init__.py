@@ -1,4 +1,4 @@
-"""Faster implementations of collecting, learning and inference.
+"""Faster implementations of collecting and learning.
 
 `drone_rl.collectors.speedups` is the one module that imports it. Each `try_create` returns an
 implementation, or the reasons why there is none.
@@ -8,4 +8,3 @@ from drone_rl.acceleration.direct_collector import DirectCollector as DirectColl
 from drone_rl.acceleration.direct_collector import DirectStepper as DirectStepper
 from drone_rl.acceleration.fused_collector import FusedCollector as FusedCollector
 from drone_rl.acceleration.fused_network import FusedNetwork as FusedNetwork
-from drone_rl.acceleration.inference_kernel import BatchedInference as BatchedInference

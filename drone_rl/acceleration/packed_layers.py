@@ -299,7 +299,6 @@ class PackedNetwork:
         layers.logits_offset, layers.logits_stride = inputs, packed[-1].num_outs
         self.layers = layers
         """For kernels."""
-        self.num_actions = len(packed[-1].layer.weight)
 
     def update(self) -> None:
         """Pack the present weights."""

@@ -13,7 +13,7 @@ from drone_rl.cli.settings import CommandSettings
 from drone_rl.config.commands import ProvableSettings
 from drone_rl.config.training import Logger, Tensorboard, TrainSettings
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.progress import silent
+from drone_rl.utils.progress import bar_or_lines
 from drone_rl.utils.readers import read_result
 from drone_rl.utils.schema import Instance, Several, Whole
 from drone_rl.verification.text import describe_round
@@ -72,13 +72,13 @@ class TrainCommand(CommandSettings, TrainSettings):
                 folder=folder,
                 resume=self.resume is not None,
                 callbacks=_callbacks(self, folder),
-                progress=silent,
+                progress=bar_or_lines(),
             )
         except (KeyboardInterrupt, SystemExit) as stop:
             if "training" not in vars(stop):  # nothing was saved since the last checkpoint
                 raise
             training = vars(stop)["training"]
-        _log.info("run folder: %s", folder)
+        _log.info("%s", training)
         for row in training.result.get("rounds", ()):
             _log.info(describe_round(row))
         if not training.reason.startswith("SIG"):
@@ -97,7 +97,7 @@ def _callbacks(settings: TrainCommand, folder: Path) -> list["Callback"]:
     """Return the callbacks. A resumed run's files stay unchanged until its state is accepted."""
     from drone_rl.sweeps.pruning import PruneCallback
     from drone_rl.sweeps.search import study_folder
-    from drone_rl.training import Callback, LoggerCallback, ProgressCallback
+    from drone_rl.training import Callback, LoggerCallback
 
     class WriteSettings(Callback):
         def on_start(self, training: object) -> None:
@@ -109,6 +109,6 @@ def _callbacks(settings: TrainCommand, folder: Path) -> list["Callback"]:
     trial = settings.trial
     searching = [] if trial is None else [PruneCallback(study_folder(folder), trial)]
     if settings.resume is None:
-        return [LoggerCallback(make()), ProgressCallback(), *searching]
+        return [LoggerCallback(make()), *searching]
     resuming.check_folder(settings.resume, folder)
-    return [LoggerCallback(make), WriteSettings(), ProgressCallback(), *searching]
+    return [LoggerCallback(make), WriteSettings(), *searching]

@@ -3,22 +3,15 @@
 This is the only module that imports that package. TorchRL and PyTorch do what it does not support.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Literal
 
-import torch
 from tensordict.nn import TensorDictModuleBase
 from tensordict.utils import NestedKey
-from torch import Tensor, nn
+from torch import nn
 from torchrl.envs import EnvBase
 
-from drone_rl.acceleration import (
-    BatchedInference,
-    DirectCollector,
-    DirectStepper,
-    FusedCollector,
-    FusedNetwork,
-)
+from drone_rl.acceleration import DirectCollector, DirectStepper, FusedCollector, FusedNetwork
 from drone_rl.envs.direct_renderer import DirectRenderer, Reasons
 
 Acceleration = Literal["none", "direct", "fused"]
@@ -87,10 +80,3 @@ def accelerated_gradients(
     """
     found = FusedNetwork.try_create(network, num_threads, wrt=wrt)
     return network if isinstance(found, Reasons) else found
-
-
-def accelerated_inference(network: nn.Module) -> Callable[[Tensor], Tensor]:
-    """Return a function from pixels to logits without gradients, safe to call from any thread."""
-    plain = torch.no_grad()(network.forward)
-    found = BatchedInference.try_create(network)
-    return plain if isinstance(found, Reasons) else found

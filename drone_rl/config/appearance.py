@@ -154,7 +154,7 @@ def check_appearance(
                 "define object positions, so distractors can't be placed; give distractors=0"
             )
         return
-    (_, forward), (most_right, most_left), (lowest, _) = _sides(settings.camera_offset)
+    (_, forward), (most_right, most_left), (lowest, _) = low_and_high(settings.camera_offset)
     if region.altitude + lowest < _LEAST_HEIGHT:
         raise InputError(
             f"appearance.camera_offset={lowest:g} up puts the camera into the ground; give "
@@ -180,7 +180,7 @@ def _ends(value: Any) -> tuple[float, float]:
     return value if isinstance(value, tuple) else (value, value)
 
 
-def _sides(value: Any) -> list[tuple[float, float]]:
+def low_and_high(value: Any) -> list[tuple[float, float]]:
     """Return the lowest and the highest value of each of three numbers."""
     low, high = value if isinstance(value[0], tuple) else (value, value)
     return [*zip(low, high, strict=True)]

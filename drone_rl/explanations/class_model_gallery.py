@@ -33,7 +33,7 @@ from drone_rl.policies.policy import BasePolicy
 from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.sim.vocabulary import ShownActions, shown_actions
 from drone_rl.trust.plots import images
-from drone_rl.utils.display import Result, aligned, picture, table
+from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
@@ -70,7 +70,7 @@ _BATCH = 64
 
 
 @dataclasses.dataclass(frozen=True)
-class ClassModels(Result):
+class ClassModels(TableResult):
     """Observations optimized for each action of a policy, with one or several settings."""
 
     policy: BasePolicy
@@ -133,7 +133,7 @@ class ClassModels(Result):
         images_by_setting = {f"images_{i}": a.images for i, a in enumerate(self.tried.values())}
         np.savez_compressed(folder / "class_models.npz", **images_by_setting)  # pyright: ignore[reportArgumentType]
 
-    def _notes(self) -> list[str]:
+    def notes(self) -> list[str]:
         """Return a line for each setting that makes some action improbable, and the seed's."""
         lines = []
         for title, attempts in self.tried.items():
@@ -146,12 +146,9 @@ class ClassModels(Result):
                 )
         return [*lines, seed_line(self.seed.as_dict())]
 
-    def __str__(self) -> str:
-        return "\n".join([aligned(self.rows()), *self._notes()])
-
-    def _repr_html_(self) -> str:
-        head, *rows = self.rows()
-        return table(head, rows, self._notes()) + picture(self.image())
+    def figure(self) -> Image.Image:
+        """Return the gallery."""
+        return self.image()
 
 
 def class_models(

@@ -15,6 +15,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.utils import palette
 from drone_rl.utils.palette import Rgb
 
@@ -243,13 +244,13 @@ class Move(enum.IntEnum):
 
 
 MOVES = DiscreteActions(
-    names=tuple(move.name.lower() for move in Move),
+    names=SHOWN_MOVES.names,
     mirrored=(Move.FORWARD, Move.RIGHT, Move.LEFT),
     opposite=(Move.FORWARD, Move.RIGHT, Move.LEFT),
     left=Move.LEFT,
-    order=(Move.LEFT, Move.FORWARD, Move.RIGHT),
-    arrows=((0.0, 1.0), (-1.0, 0.0), (1.0, 0.0)),
-    colors=(palette.FORWARD, palette.LEFT, palette.RIGHT),
+    order=SHOWN_MOVES.order,
+    arrows=SHOWN_MOVES.arrows,
+    colors=SHOWN_MOVES.colors,
 )
 """The moves as a set of actions; nothing undoes a move forward."""
 DIRECTIONS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0))

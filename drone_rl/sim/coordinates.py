@@ -74,9 +74,8 @@ def to_simulator(roll: float, pitch: float, yaw: float) -> Angles:
     return roll, 0.0 - pitch, 0.0 - yaw  # not -0.0
 
 
-def to_pilot(roll: float, pitch: float, yaw: float) -> Angles:
-    """Convert the simulator's angles or rates about the drone's axes to a pilot's; units kept."""
-    return roll, 0.0 - pitch, 0.0 - yaw  # not -0.0
+to_pilot = to_simulator
+"""`to_simulator` is its own inverse."""
 
 
 def attitude_of(roll: float, pitch: float, yaw: float) -> Tensor:

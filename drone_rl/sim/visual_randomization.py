@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import AppearanceSettings, BaseTaskSettings, CameraSettings
-from drone_rl.config.appearance import NO_TEXTURE, Names, check_appearance
+from drone_rl.config.appearance import NO_TEXTURE, Names, check_appearance, low_and_high
 from drone_rl.config.task import ObjectRegion
 from drone_rl.sim.rendering import Appearance, Distractors, Mounting, Texture, textures
 from drone_rl.sim.rendering.appearance import product, turned, zoom_for_fov
@@ -99,7 +99,7 @@ def _color(
     if color_range is None:
         turn = number + number // len(PALETTE)  # otherwise each shape would have only two colors
         return torch.tensor(PALETTE[turn % len(PALETTE)], dtype=torch.float64)
-    return torch.stack([_uniform(pair, source, ()) for pair in _pairs(color_range)])
+    return torch.stack([_uniform(pair, source, ()) for pair in low_and_high(color_range)])
 
 
 _OBJECTS = (SemanticClass.TARGET, SemanticClass.OBSTACLE)
@@ -265,13 +265,8 @@ def _sample_numbers(
     numbers += [*color(s.object_color or (0.0, 0.0, 0.0)), number(s.exposure)]
     numbers += [texture(s.ground_texture), number(s.ground_tile)]
     numbers += [texture(s.object_texture), number(s.object_tile)]
-    camera = (*_pairs(s.camera_offset), *_pairs(s.camera_turn), s.camera_widening)
+    camera = (*low_and_high(s.camera_offset), *low_and_high(s.camera_turn), s.camera_widening)
     return [*numbers, *(float(_uniform(pair, source, ())) for pair in camera)]
-
-
-def _pairs(value: Any) -> list[Any]:
-    low, high = value if isinstance(value[0], tuple) else (value, value)
-    return [*zip(low, high, strict=True)]
 
 
 def _appearance_stream(random_state: np.random.RandomState) -> np.random.RandomState:

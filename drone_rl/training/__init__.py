@@ -5,8 +5,7 @@ from drone_rl.training.callbacks import Callback as Callback
 from drone_rl.training.callbacks import CheckpointCallback as CheckpointCallback
 from drone_rl.training.callbacks import CsvCallback as CsvCallback
 from drone_rl.training.callbacks import LoggerCallback as LoggerCallback
-from drone_rl.training.callbacks import Progress as Progress
-from drone_rl.training.callbacks import ProgressCallback as ProgressCallback
+from drone_rl.training.callbacks import TrainingProgress as TrainingProgress
 from drone_rl.training.learners import ActorCriticLearner as ActorCriticLearner
 from drone_rl.training.learners import Learner as Learner
 from drone_rl.training.learners import NotANumberError as NotANumberError

@@ -1,30 +1,27 @@
-"""Callbacks of the training loop: checkpoints, logs, a progress bar."""
+"""Callbacks of the training loop: checkpoints, logs, progress."""
 
 import copy
 import csv
 import dataclasses
 import io
 import logging
-import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
 from torchrl.record.loggers import Logger
-from tqdm import tqdm
 
 from drone_rl.config.training import DETERMINISTIC
 from drone_rl.utils.checkpoint import save_checkpoint
-from drone_rl.utils.files import make_folder, remove_leftovers, write_atomically
-from drone_rl.utils.progress import Progress as Report
-from drone_rl.utils.progress import as_progress, note_shown
+from drone_rl.utils.files import make_folder, write_atomically
+from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import Instance, Several
 
 
 @dataclasses.dataclass
-class Progress:
+class TrainingProgress:
     """Progress of a training run."""
 
     frames: int = 0
@@ -39,7 +36,7 @@ class Progress:
 class OngoingTraining(Protocol):
     """The part of `Trainer` that callbacks use."""
 
-    progress: Progress
+    progress: TrainingProgress
     total_frames: int
     """Frames after which it stops."""
     stop_request: str
@@ -97,9 +94,8 @@ class CheckpointCallback(Callback):
         self._saved_at = time.monotonic()
 
     def on_start(self, training: OngoingTraining) -> None:
-        """Create the folder, delete half-written checkpoints, and save if there is no last one."""
+        """Create the folder, and save if there is no last checkpoint."""
         make_folder(self.folder)
-        remove_leftovers(self.folder, self.last_path.name, self.best_path.name)
         if not self.last_path.exists():
             self._save(training)
 
@@ -262,59 +258,7 @@ class LoggerCallback(Callback):
                 logger.log_scalar(name, value, step=training.progress.frames)
 
 
-class ProgressCallback(Callback):
-    """A progress bar on a terminal, a line every few seconds elsewhere."""
-
-    def __init__(self, interval_s: float = 5.0) -> None:
-        self.interval_s = interval_s
-        self._bar: tqdm | None = None
-        self._said_at = 0.0
-
-    def on_clone(self, epoch: int, epochs: int, metrics: Mapping[str, float]) -> None:
-        """Log a line every few seconds, and the last pass."""
-        if epoch < epochs and time.monotonic() - self._said_at < self.interval_s:
-            return
-        self._said_at = time.monotonic()
-        values = ", ".join(f"{k.rpartition('/')[2]} {v:.3f}" for k, v in metrics.items())
-        _log.info("cloning: epoch %d of %d, %s", epoch, epochs, values.replace("_", " "))
-
-    def on_start(self, training: OngoingTraining) -> None:
-        """Open the bar at the frames already done."""
-        self._said_at = time.monotonic()
-        if sys.stderr.isatty():
-            total, done = training.total_frames, training.progress.frames
-            self._bar = tqdm(total=total, initial=done, unit="frame", unit_scale=True)
-
-    def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
-        """Move the bar."""
-        progress = training.progress
-        text = f"episodes {progress.episodes}, running reward {progress.running_reward:.2f}"
-        if self._bar is not None:
-            note_shown()
-            self._bar.set_postfix_str(text, refresh=False)
-            self._bar.update(progress.frames - self._bar.n)
-        elif time.monotonic() - self._said_at >= self.interval_s:
-            self._said_at = time.monotonic()
-            rate = metrics["time/frames_per_second"]
-            left = max(0, training.total_frames - progress.frames) / rate
-            shape = "frames %d, %s, %.0f frames/s, at most %.0f s left"
-            _log.info(shape, progress.frames, text, rate, left)
-
-    def on_end(self, training: OngoingTraining, reason: str) -> None:
-        """Close the bar and log the result."""
-        self.on_failure(training)
-        progress = training.progress
-        counters = (progress.frames, progress.episodes, progress.seconds, progress.running_reward)
-        shape = "stopped (%s) after %d frames, %d episodes, %.1f s: running reward %.3f"
-        _log.info(shape, reason, *counters)
-
-    def on_failure(self, training: OngoingTraining) -> None:
-        """Close the bar."""
-        if self._bar is not None:
-            self._bar.close()
-
-
-def with_progress(given: Sequence[Callback], progress: Report | None) -> list[Callback]:
+def with_progress(given: Sequence[Callback], progress: Progress | None) -> list[Callback]:
     """Return given callbacks and one that forwards the progress, by default to a bar.
 
     Raises:
@@ -327,7 +271,7 @@ def with_progress(given: Sequence[Callback], progress: Report | None) -> list[Ca
 class ForwardProgress(Callback):
     """Forward the progress of a training run to a `drone_rl.utils.progress.Progress`."""
 
-    def __init__(self, progress: Report) -> None:
+    def __init__(self, progress: Progress) -> None:
         self.progress = progress
 
     def on_clone(self, epoch: int, epochs: int, metrics: Mapping[str, float]) -> None:
@@ -338,9 +282,14 @@ class ForwardProgress(Callback):
         """Forward the running mean and the frames."""
         done = training.progress
         text = f"running reward {done.running_reward:.2f}, {done.episodes} episodes"
-        self.progress(text, done.frames, training.total_frames)
+        total = max(training.total_frames, done.frames + 1)  # `on_end` reports the end
+        self.progress(text, done.frames, total)
 
     def on_end(self, training: OngoingTraining, reason: str) -> None:
-        """Forward the reason why it stopped."""
-        frames = training.progress.frames
-        self.progress(f"stopped: {reason}", frames, frames)
+        """Forward the reason why it stopped, unless it only cloned."""
+        if frames := training.progress.frames:
+            self.progress(f"stopped: {reason}", frames, frames)
+
+    def on_failure(self, training: OngoingTraining) -> None:
+        """Forward that it failed."""
+        self.on_end(training, "failed")

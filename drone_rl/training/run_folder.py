@@ -39,7 +39,6 @@ from drone_rl.utils.files import (
     last_of,
     make_folder,
     new_run_folder,
-    remove_leftovers,
     write_atomically,
 )
 from drone_rl.utils.provenance import provenance
@@ -60,8 +59,6 @@ MAY_CHANGE = (
     "demonstrations",
 )
 """Settings that a resumed run may change: they don't enter into what is learned."""
-_WRITTEN = ("metrics.csv", "result.json", "run.yaml", "provable.json")
-"""Files in a run's folder that are replaced when they are complete."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,8 +91,9 @@ class Training(Result):
         judged = self.result.get("verdict")
         verdict = f", verdict: {judged['kind']}" if judged else ""
         return (
-            f"stopped ({self.reason}) after {self.result['frames']:,} frames: running reward "
-            f"{self.running_reward:.3f}{verdict}; {self.folder}"
+            f"stopped ({self.reason}) after {self.result['frames']:,} frames, "
+            f"{self.result['episodes']:,} episodes, {self.result['seconds']:.1f} s: "
+            f"running reward {self.running_reward:.3f}{verdict}; {self.folder}"
         )
 
     def _repr_html_(self) -> str:
@@ -164,7 +162,7 @@ class RunFolder:
     def prepare(
         self, settings: TrainSettings, state: Mapping[str, Any] | None
     ) -> list[Demonstration]:
-        """Delete half-written files; return the demonstrations that a new run clones, if any.
+        """Check the checkpoint's settings; return the demonstrations that a new run clones, if any.
 
         Raises:
             InputError: The checkpoint has other settings, a demonstration is unusable, or there are
@@ -184,7 +182,6 @@ class RunFolder:
             found = read_demonstrations(folder, FlightConditions.of(settings))
         elif settings.cloning != CloningSettings():
             _log.warning("settings of cloning have no effect without demonstrations=FOLDER")
-        remove_leftovers(self.path, *_WRITTEN)
         return found
 
     def checkpoints(self, settings: TrainSettings) -> CheckpointCallback:

@@ -15,7 +15,7 @@ from tensordict import TensorDictBase
 from torch import Tensor
 
 from drone_rl.objectives import ReturnEstimator
-from drone_rl.training.callbacks import Callback, Progress
+from drone_rl.training.callbacks import Callback, TrainingProgress
 from drone_rl.training.learners import Learner, NotANumberError, check_batch
 from drone_rl.training.restore import check_fits
 from drone_rl.utils.errors import InputError
@@ -123,7 +123,7 @@ class Trainer:
     """Weight of the old value in the running mean, per episode."""
     ends: Iterable[enum.IntEnum] = ()
     """Why an episode may end (`Task.ends`), for the metrics."""
-    progress: Progress = dataclasses.field(default_factory=Progress, init=False)
+    progress: TrainingProgress = dataclasses.field(default_factory=TrainingProgress, init=False)
     stop_signal: signal.Signals | None = dataclasses.field(default=None, init=False)
     stop_request: str = dataclasses.field(default="", init=False)
     """Why a callback wants training to stop after this update; empty to go on."""
@@ -323,7 +323,7 @@ class Trainer:
             states = {**state["generators"], "": state["torch_rng"]}
             for name, generator in streams.items():
                 generator.set_state(states[name])
-            self.progress = Progress(**state["progress"])
+            self.progress = TrainingProgress(**state["progress"])
         except (RuntimeError, ValueError, TypeError, LookupError, OverflowError) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise InputError(

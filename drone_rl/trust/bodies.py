@@ -19,7 +19,7 @@ from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.vocabulary import terms_of
 from drone_rl.trust.judge import Judgement, judge_one
-from drone_rl.utils.display import Result, aligned, picture, table
+from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.palette import BAD, EMPTY, FAINT, GOOD, INK, ONE_SIDED, css, light
 from drone_rl.utils.progress import Progress, as_progress, silent
@@ -46,7 +46,7 @@ _WIDTH, _HEIGHT = 1.35, 1.1
 
 
 @dataclasses.dataclass(frozen=True)
-class Bodies(Result):
+class Bodies(TableResult):
     """Verdicts by policy and dynamics."""
 
     settings: BodiesSettings
@@ -57,20 +57,20 @@ class Bodies(Result):
     def save(self, folder: Path) -> None:
         """Write `bodies.json`, `bodies.png` and `bodies.svg`."""
         (folder / "bodies.json").write_text(json.dumps({**self.numbers, **provenance()}, indent=2))
-        figure = chart(self.numbers)
+        figure = self.figure()
         for kind in ("png", "svg"):
             figure.savefig(folder / f"bodies.{kind}", dpi=130)
 
-    def __str__(self) -> str:
-        """Return the table, one row per policy, and notes."""
-        return "\n".join([aligned(rows(self.numbers)), *self._notes()])
+    def rows(self) -> list[list[str]]:
+        """Return the verdicts as a table: a header, then a row for each policy."""
+        return rows(self.numbers)
 
-    def _repr_html_(self) -> str:
-        head, *lines = rows(self.numbers)
-        return table(head, lines, self._notes()) + picture(chart(self.numbers))
+    def figure(self) -> Figure:
+        """Return the table with colors."""
+        return chart(self.numbers)
 
-    def _notes(self) -> list[str]:
-        """Reasons for missing episodes, and the seed."""
+    def notes(self) -> list[str]:
+        """Return the reasons for missing episodes, and the seed."""
         notes = [*left_out(self.numbers), say(BODIES, self.numbers), seed_line(self.numbers)]
         return [*filter(None, notes)]
 

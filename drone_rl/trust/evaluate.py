@@ -23,7 +23,7 @@ from drone_rl.trust.baselines import run_baselines
 from drone_rl.trust.metrics import summarise
 from drone_rl.trust.rounding_sensitivity import require_function
 from drone_rl.trust.verdict_text import unlike as unlike_text
-from drone_rl.utils.display import Result, aligned, table
+from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
@@ -32,7 +32,7 @@ from drone_rl.utils.text import fixed_seed, interval, percent, say, seed_line
 
 
 @dataclasses.dataclass(frozen=True)
-class Evaluation(Result):
+class Evaluation(TableResult):
     """Figures of a policy and of the baselines on the same initial states."""
 
     policy: BasePolicy
@@ -41,6 +41,7 @@ class Evaluation(Result):
     """Figures of "greedy", "sampled" and the baselines; see `drone_rl.trust.metrics.summarise`."""
     seed: RootSeed
     """Root of the environments' random streams."""
+    are_numbers = True
 
     @property
     def success(self) -> float:
@@ -89,15 +90,7 @@ class Evaluation(Result):
             "trained": origin["trained"] and origin["trained"]["progress"],
         }
 
-    def __str__(self) -> str:
-        """Return the table for a terminal, and notes."""
-        return "\n".join([aligned(self.rows(), are_numbers=True), *self._notes()])
-
-    def _repr_html_(self) -> str:
-        head, *rows = self.rows()
-        return table(head, rows, self._notes())
-
-    def _notes(self) -> list[str]:
+    def notes(self) -> list[str]:
         """Return notes on the seed and what differs from the training."""
         unlike, seed = self.policy.unlike, self.seed.as_dict()
         notes = [

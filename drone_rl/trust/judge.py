@@ -27,7 +27,7 @@ from drone_rl.trust.rule import Rule
 from drone_rl.trust.shifts_file import SavedShifts
 from drone_rl.trust.shifts_text import BRIEF, why_not
 from drone_rl.trust.verdict import FindClaim, Verdict, judge_policy
-from drone_rl.utils.display import Result, aligned, paragraph, table
+from drone_rl.utils.display import Result, TableResult, paragraph
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import NOT_COVERED, PROOF_MISSING
 from drone_rl.utils.progress import Progress, as_progress
@@ -100,7 +100,7 @@ class Judgement(Result):
         return "".join(map(paragraph, str(self).splitlines()))
 
 
-class Judgements(Result, tuple[Judgement, ...]):
+class Judgements(TableResult, tuple[Judgement, ...]):
     """Several judgements, in the order of the policies."""
 
     __slots__ = ()
@@ -112,14 +112,6 @@ class Judgements(Result, tuple[Judgement, ...]):
             success = rate(verdict.evidence["greedy"]["success"], label="")
             rows.append([name, verdict.kind.value, "yes" if verdict.certain else "no", success])
         return rows
-
-    def __str__(self) -> str:
-        """Return the table for a terminal."""
-        return aligned(self.rows())
-
-    def _repr_html_(self) -> str:
-        head, *rows = self.rows()
-        return table(head, rows)
 
 
 class JudgeArguments(JudgeOptions, total=False):

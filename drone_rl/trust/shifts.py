@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Unpack
 
 import yaml
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from drone_rl.config import MINIMAL, BaseTaskSettings
@@ -35,7 +36,7 @@ from drone_rl.trust.shifts_file import FORMAT, FORMAT_VERSION
 from drone_rl.trust.shifts_text import SHIFTS, is_tested, rows
 from drone_rl.trust.suite import Suite, make_strip, packed
 from drone_rl.trust.verdict_text import unlike as say_unlike
-from drone_rl.utils.display import Result, aligned, picture, table
+from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
@@ -44,7 +45,7 @@ from drone_rl.utils.text import say, seed_line
 
 
 @dataclasses.dataclass(frozen=True)
-class Shifts(Result):
+class Shifts(TableResult):
     """Success rates of a policy under perturbations, and its operating domain."""
 
     policy: BasePolicy
@@ -81,18 +82,19 @@ class Shifts(Result):
         (folder / "shifts.json").write_text(json.dumps(written, indent=2))
         if self.numbers["domain"] is not None:
             (folder / "domain.yaml").write_text(yaml.safe_dump(ranges_of(self.numbers)))
-        chart(self.numbers).savefig(folder / "shifts.png", dpi=110)
+        self.figure().savefig(folder / "shifts.png", dpi=110)
         strips(self.numbers, self.pictures).save(folder / "strips.png")
 
-    def __str__(self) -> str:
-        """Return the table and the sentences."""
-        return "\n".join([aligned(rows(self.numbers)), *self._notes()])
+    def rows(self) -> list[list[str]]:
+        """Return the success rates as a table: a header, then a row for each axis."""
+        return rows(self.numbers)
 
-    def _repr_html_(self) -> str:
-        head, *lines = rows(self.numbers)
-        return table(head, lines, self._notes()) + picture(chart(self.numbers))
+    def figure(self) -> Figure:
+        """Return the curves."""
+        return chart(self.numbers)
 
-    def _notes(self) -> tuple[str, str]:
+    def notes(self) -> tuple[str, str]:
+        """Return the operating domain, what differs from the training, and the seed."""
         unlike = self.policy.unlike
         other = f" {say_unlike({'unlike': unlike})}" if unlike else ""
         return f"{self.sentence}{other}", seed_line(self.numbers)

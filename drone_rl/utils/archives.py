@@ -3,7 +3,7 @@
 import contextlib
 import io
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +15,8 @@ from drone_rl.utils.files import read_bytes
 from drone_rl.utils.limits import ARRAYS_BYTES
 
 
-def read_arrays(
-    path: Path, *, most: int = ARRAYS_BYTES, wanted: Callable[[str], bool] = lambda _: True
-) -> dict[str, NDArray]:
+def read_arrays(path: Path, most: int = ARRAYS_BYTES) -> dict[str, NDArray]:
     """Return the arrays in an .npz file of at most `most` bytes, unpacked, too.
-
-    `wanted` says by name which arrays to read.
 
     Raises:
         InputError: The file is unusable, or an array holds objects.
@@ -30,7 +26,7 @@ def read_arrays(
         check_unpacked_size(content, str(path), most)
         file: Any = np.load(io.BytesIO(content), allow_pickle=False)
         with file:
-            return {name: file[name] for name in file.files if wanted(name)}
+            return {name: file[name] for name in file.files}
 
 
 def read_array(path: Path, most: int = ARRAYS_BYTES) -> NDArray:

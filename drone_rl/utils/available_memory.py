@@ -7,11 +7,8 @@ from pathlib import Path
 from drone_rl.utils.errors import InputError
 
 _GIB = 2**30
-_CGROUP = Path("/sys/fs/cgroup")
-_LIMITS = (  # of a container: version 2, version 1
-    (_CGROUP / "memory.max", _CGROUP / "memory.current"),
-    (_CGROUP / "memory/memory.limit_in_bytes", _CGROUP / "memory/memory.usage_in_bytes"),
-)
+_CONTAINER = Path("/sys/fs/cgroup")
+"""Limit and usage of a container's memory (cgroup version 2)."""
 _CACHE = re.compile(r"^(?:in)?active_file (\d+)$", re.MULTILINE)
 """Entries of memory.stat: files that the system drops when memory is needed."""
 RANDOM_STATE_BYTES = 2_000
@@ -41,7 +38,7 @@ def require_memory(needed: int, setting: str, remedy: str) -> None:
 def available_bytes() -> int | None:
     """Return the memory that this process may still allocate; None if the system does not say.
 
-    It is the least that the system, the container and `ulimit -v` allow.
+    It is the least that the system and the container allow.
     """
     return min(_available(), default=None)
 
@@ -50,18 +47,10 @@ def _available() -> Iterator[int]:
     for line in _read(Path("/proc/meminfo")).splitlines():
         if line.startswith("MemAvailable:"):
             yield int(line.split()[1]) * 1024
-    for most, used in _LIMITS:
-        limit, taken = _read(most).strip(), _read(used).strip()
-        if limit.isdigit() and taken.isdigit():
-            cache = sum(map(int, _CACHE.findall(_read(most.with_name("memory.stat")))))
-            yield max(0, int(limit) - max(0, int(taken) - cache))
-    try:
-        import resource  # not on Windows
-    except ImportError:
-        return
-    limit, size = resource.getrlimit(resource.RLIMIT_AS)[0], _read(Path("/proc/self/statm"))
-    if limit != resource.RLIM_INFINITY and size:
-        yield max(0, limit - int(size.split()[0]) * resource.getpagesize())
+    limit, taken = (_read(_CONTAINER / f"memory.{name}").strip() for name in ("max", "current"))
+    if limit.isdigit() and taken.isdigit():
+        cache = sum(map(int, _CACHE.findall(_read(_CONTAINER / "memory.stat"))))
+        yield max(0, int(limit) - max(0, int(taken) - cache))
 
 
 def _read(path: Path) -> str:

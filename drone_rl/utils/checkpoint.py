@@ -1,6 +1,5 @@
 """Checkpoints: tensors and plain values, written atomically, read without executing code."""
 
-import contextlib
 import io
 import os
 import re
@@ -13,7 +12,7 @@ from torch import Tensor
 
 from drone_rl.utils.archives import check_unpacked_size
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import read_bytes, temporary_of
+from drone_rl.utils.files import read_bytes, write_atomically
 from drone_rl.utils.limits import CHECKPOINT_BYTES
 from drone_rl.utils.schema import as_mapping, shown
 
@@ -43,33 +42,16 @@ def save_checkpoint(path: str | Path, state: Mapping[str, Any]) -> None:
         InputError: The folder can't be written or the disk is full.
     """
     path = Path(path)
-    temporary = temporary_of(path)
+    content = io.BytesIO()
+    torch.save({"format": FORMAT, "format_version": FORMAT_VERSION, **state}, content)
     try:
-        temporary.unlink(missing_ok=True)
-        with temporary.open("xb") as file:
-            torch.save({"format": FORMAT, "format_version": FORMAT_VERSION, **state}, file)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except (OSError, RuntimeError) as error:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
-        reason = _reason(error)
+        write_atomically(path, content.getvalue())
+    except OSError as error:
         before = "the previous checkpoint is intact" if path.is_file() else "there is none yet"
         raise InputError(
-            f"checkpoint {path} could not be written ({reason}); free some space or choose another "
-            f"folder (in Python folder=..., else hydra.run.dir=...); {before}"
+            f"checkpoint {path} could not be written ({error.strerror}); free some space or choose "
+            f"another folder (in Python folder=..., else hydra.run.dir=...); {before}"
         ) from error
-
-
-def _reason(error: BaseException) -> str:
-    """Return the system's reason, which PyTorch hides behind its own error."""
-    cause: BaseException | None = error
-    while cause is not None:
-        if isinstance(cause, OSError) and cause.strerror:
-            return cause.strerror
-        cause = cause.__cause__ or cause.__context__
-    return (str(error) or type(error).__name__).splitlines()[0]
 
 
 def load_checkpoint(path: str | Path) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import html
 import io
 import urllib.parse
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 if TYPE_CHECKING:
     import jinja2
@@ -36,6 +36,34 @@ class Result:
 
     def __repr__(self) -> str:
         return str(self)
+
+
+class TableResult(Result):
+    """A result that is shown as a table, with notes below it and perhaps a figure."""
+
+    __slots__ = ()
+    are_numbers: ClassVar[bool] = False
+    """Whether all columns but the first are aligned to the right."""
+
+    def rows(self) -> list[list[str]]:
+        """Return a table of texts: a header, then one row each."""
+        raise NotImplementedError
+
+    def notes(self) -> Sequence[str]:
+        """Return the lines below the table."""
+        return ()
+
+    def figure(self) -> "Figure | Image | None":
+        """Return what notebooks show below the notes, if anything."""
+
+    def __str__(self) -> str:
+        """Return the table for a terminal, and the notes."""
+        return "\n".join([aligned(self.rows(), are_numbers=self.are_numbers), *self.notes()])
+
+    def _repr_html_(self) -> str:
+        head, *rows = self.rows()
+        figure = self.figure()
+        return table(head, rows, self.notes()) + ("" if figure is None else picture(figure))
 
 
 def aligned(rows: Sequence[Sequence[str]], *, are_numbers: bool = False) -> str:

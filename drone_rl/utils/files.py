@@ -19,8 +19,6 @@ from drone_rl.utils.schema import shown
 
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP)
 """Errors of file systems without locks."""
-_PROCESS = re.compile(r"[1-9][0-9]{0,6}")
-"""Process id at the end of a temporary file's name."""
 
 
 def as_path(value: str | Path, where: str) -> Path:
@@ -155,7 +153,7 @@ def to_file_name(name: str) -> str:
 
 
 def write_atomically(path: Path, content: str | bytes) -> None:
-    """Write a small file as `write_all_atomically` does: readers get old or new content."""
+    """Write a file as `write_all_atomically` does: readers get old or new content."""
     write_all_atomically({path: content})
 
 
@@ -171,11 +169,13 @@ def write_all_atomically(contents: Mapping[Path, str | bytes]) -> None:
         for now, content in contents.items():
             if now.is_dir():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-            temporary = temporary_of(now)
+            temporary = now.with_name(f".{now.name}.{os.getpid()}")
             temporary.unlink(missing_ok=True)
             with temporary.open("xb") as file:  # refuses an existing link
                 temporaries[temporary] = now
                 file.write(content.encode() if isinstance(content, str) else content)
+                file.flush()
+                os.fsync(file.fileno())
         for temporary, now in temporaries.items():
             os.replace(temporary, now)
     except OSError as error:
@@ -183,32 +183,6 @@ def write_all_atomically(contents: Mapping[Path, str | bytes]) -> None:
             with contextlib.suppress(OSError):
                 temporary.unlink(missing_ok=True)
         raise OSError(error.errno, error.strerror or str(error), str(now)) from error
-
-
-def temporary_of(path: Path) -> Path:
-    """Return the temporary file in which this process writes the content of a file."""
-    return path.with_name(f".{path.name}.{os.getpid()}")
-
-
-def remove_leftovers(folder: Path, *names: str) -> None:
-    """Delete the temporary files of killed processes for files with these names in a folder."""
-    for name in names:
-        for path in folder.glob(f".{name}.*"):
-            suffix = path.name.removeprefix(f".{name}.")
-            if _PROCESS.fullmatch(suffix) and not _is_alive(int(suffix)) and path.is_file():
-                with contextlib.suppress(OSError):
-                    path.unlink()
-
-
-def _is_alive(process: int) -> bool:
-    """Return whether another process has this id."""
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):  # a process of another user
-        return True
-    return process != os.getpid()
 
 
 @contextlib.contextmanager

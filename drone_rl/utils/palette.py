@@ -30,7 +30,6 @@ EMPTY: Rgb = (217, 217, 222)
 BOX: Rgb = (236, 238, 242)
 PAPER: Rgb = (255, 255, 255)
 NEXT_CUBE: Rgb = (214, 39, 40)
-OTHER_CUBES: Rgb = (255, 152, 150)
 GROUND: Rgb = (140, 154, 123)
 SKY: Rgb = (158, 202, 233)
 """What a camera image contains."""

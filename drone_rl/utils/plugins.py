@@ -1,19 +1,16 @@
 """Errors of a user's own code, such as a registered part: one line with its file."""
 
 import contextlib
-import functools
-import inspect
 import os
 import sys
 import sysconfig
 import traceback
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from drone_rl.utils.errors import InputError
 
-T = TypeVar("T")
 IMPORTED: list[str] = []
 """Modules that `plugins=` named; other processes must import them, too."""
 _FOLDERS = (Path(__file__).parents[1], *map(sysconfig.get_path, ("stdlib", "purelib")))
@@ -56,33 +53,6 @@ def errors_of(what: str, place: str) -> Iterator[None]:
         raise
     except Exception as error:
         raise InputError(failure(what, error, place)) from error
-
-
-def with_methods_of(base: type, made: T) -> T:
-    """Return an object; raise an `InputError` if its methods take other arguments than the base's.
-
-    Only classes of the user's own are checked, once each.
-    """
-    _check_methods(type(made), base)
-    return made
-
-
-@functools.cache
-def _check_methods(own: type, base: type) -> None:
-    for name, method in vars(own).items():
-        theirs: Any = getattr(base, name, None)
-        both = inspect.isfunction(method) and inspect.isfunction(theirs)
-        if own.__module__.startswith("drone_rl.") or not both:
-            continue
-        parameters = inspect.signature(theirs).parameters.values()
-        taken = [p.name for p in parameters if p.kind <= p.POSITIONAL_OR_KEYWORD]
-        try:
-            inspect.signature(method).bind(*taken)
-        except TypeError:
-            raise InputError(
-                f"{place_of(method)} takes other arguments than {base.__name__}.{name}; write "
-                f"def {name}({', '.join(taken)})"
-            ) from None
 
 
 def described(value: Any) -> str:

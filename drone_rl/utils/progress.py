@@ -1,6 +1,7 @@
 """Progress of long work: a bar, lines in the log, or nothing; and a line in long silences."""
 
 import logging
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -75,6 +76,36 @@ class Bar:
         if self._bar is not None:
             self._bar.close()
         self._bar, self._began = None, time.time()
+
+
+class Lines:
+    """A line in the log every few seconds, and when the work is done."""
+
+    def __init__(self, interval_s: float = 5.0) -> None:
+        """Set the least time between two lines."""
+        self._interval_s = interval_s
+        self._said_at = time.monotonic()
+        self._first: tuple[int, float] | None = None
+        """Steps done at the first call of the present work, and its time."""
+
+    def __call__(self, text: str, done: int = 0, total: int = 0) -> None:
+        """See `Progress`."""
+        now = time.monotonic()
+        before, began = self._first or (done, now)
+        is_over = bool(total) and done >= total
+        self._first = None if is_over else (before, began)
+        if not is_over and now - self._said_at < self._interval_s:
+            return
+        self._said_at = now
+        if before < done < total:
+            left = (now - began) * (total - done) / (done - before)
+            text = f"{text}, at most {left:.0f} s left"
+        log(text, done, total)
+
+
+def bar_or_lines() -> Progress:
+    """Return a bar for a terminal, lines in the log for anything else."""
+    return Bar() if sys.stderr.isatty() else Lines()
 
 
 _shown_at = [time.monotonic()]

@@ -18,7 +18,7 @@ from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.config.options import ChanceOptions
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, CubesEnd
-from drone_rl.utils.display import Result, aligned, table
+from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
@@ -45,7 +45,7 @@ NODES_AT_A_TIME = 2**20  # lattice nodes of placements that are explored togethe
 
 
 @dataclasses.dataclass(frozen=True)
-class Chances(Result):
+class Chances(TableResult):
     """How episodes with sampled actions end: exact probabilities, not estimates."""
 
     policy: Policy
@@ -61,6 +61,7 @@ class Chances(Result):
     """Bounds on the success probability of each placement over its box."""
     seed: RootSeed | None = None
     """Root seed of held-out placements; None of given ones."""
+    are_numbers = True
 
     @property
     def success(self) -> float:
@@ -111,14 +112,7 @@ class Chances(Result):
         """Write `chances.json`."""
         path.write_text(json.dumps(self.as_dict(), indent=2))
 
-    def __str__(self) -> str:
-        return "\n".join([aligned(self.rows(), are_numbers=True), *self._notes()])
-
-    def _repr_html_(self) -> str:
-        head, *rows = self.rows()
-        return table(head, rows, self._notes())
-
-    def _notes(self) -> list[str]:
+    def notes(self) -> list[str]:
         """Return the lines below the table."""
         worst = ", ".join(f"{y:.6g}" for y in self.worst.tolist())
         about = (

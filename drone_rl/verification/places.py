@@ -21,7 +21,7 @@ from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.trust.plots import regions
 from drone_rl.trust.plots.saving import save_drawn
-from drone_rl.utils.display import Result, aligned, picture, table
+from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
@@ -35,7 +35,7 @@ from drone_rl.verification.prover.policy_spec import make_policy_spec
 
 
 @dataclasses.dataclass(frozen=True)
-class Places(Result):
+class Places(TableResult):
     """The actions of a greedy policy over all positions of one cube: areas, not samples."""
 
     policy: Policy
@@ -70,19 +70,19 @@ class Places(Result):
     def save(self, folder: Path) -> None:
         """Write `places.json`, `places.png` and the zoomable `places.svg`."""
         (folder / "places.json").write_text(json.dumps(self.numbers | provenance(), indent=2))
-        save_drawn(self._chart(), folder / "places")
+        save_drawn(self.figure(), folder / "places")
 
-    def _chart(self) -> Figure:
+    def rows(self) -> list[list[str]]:
+        """Return the fractions of the area as a table: a header, then a row for each side."""
+        return rows(self.numbers, SHOWN_MOVES.names)
+
+    def notes(self) -> list[str]:
+        """Return the findings in words."""
+        return [say(say_places, {"places": self.numbers})]
+
+    def figure(self) -> Figure:
+        """Return the map."""
         return regions.chart(self.numbers, self.places.outlines(), SHOWN_MOVES)
-
-    def __str__(self) -> str:
-        about = say(say_places, {"places": self.numbers})
-        return f"{aligned(rows(self.numbers, SHOWN_MOVES.names))}\n{about}"
-
-    def _repr_html_(self) -> str:
-        head, *lines = rows(self.numbers, SHOWN_MOVES.names)
-        about = say(say_places, {"places": self.numbers})
-        return table(head, lines, [about]) + picture(self._chart())
 
 
 def places(

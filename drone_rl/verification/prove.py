@@ -16,12 +16,11 @@ from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.config.options import ProveOptions
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import fingerprint
-from drone_rl.utils.display import Result, aligned, table
+from drone_rl.utils.display import TableResult
 from drone_rl.utils.files import (
     as_path,
     folder_lock,
     make_folder,
-    remove_leftovers,
     write_atomically,
 )
 from drone_rl.utils.progress import Progress, as_progress
@@ -43,7 +42,7 @@ STATE_NAME, _CERTIFICATE_NAME = "state.pt", "certificate.json"
 
 
 @dataclasses.dataclass(frozen=True)
-class Proof(Result):
+class Proof(TableResult):
     """The exact outcome of every placement of the cubes, as far as it is decided."""
 
     certificate: dict[str, Any]
@@ -100,12 +99,9 @@ class Proof(Result):
         left = self.certificate["undecided"]
         return [*rows, ["undecided", "", f"{left['share']:.9g}", str(len(left["boxes"]))]]
 
-    def __str__(self) -> str:
-        return f"{aligned(self.rows())}\n{describe_proof(self.certificate)}"
-
-    def _repr_html_(self) -> str:
-        head, *rows = self.rows()
-        return table(head, rows, [describe_proof(self.certificate)])
+    def notes(self) -> list[str]:
+        """Return the statement about all placements."""
+        return [describe_proof(self.certificate)]
 
 
 def prove(
@@ -145,7 +141,6 @@ def prove(
             folder = as_path(folder, "folder")
             make_folder(folder)
             stack.enter_context(folder_lock(folder))
-            remove_leftovers(folder, STATE_NAME, _CERTIFICATE_NAME)
         return _prove(policy, spec, settings, folder, as_progress(progress))
 
 

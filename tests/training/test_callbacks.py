@@ -10,7 +10,7 @@ from drone_rl.training import (
     LoggerCallback,
     callbacks,
 )
-from drone_rl.training.callbacks import CollapseCheck, Progress
+from drone_rl.training.callbacks import CollapseCheck, TrainingProgress
 from drone_rl.utils.checkpoint import load_checkpoint, save_checkpoint
 from drone_rl.utils.errors import InputError
 from tests.training_loop import run
@@ -104,7 +104,7 @@ def test_passes_over_demonstrations_have_rows_of_their_own(tmp_path):
 
 def collapse(updates, episodes=10, target=3.0):
     """A check after updates of (entropy, running reward), with so many episodes each."""
-    check, progress = CollapseCheck(target), Progress()
+    check, progress = CollapseCheck(target), TrainingProgress()
     training = types.SimpleNamespace(progress=progress)
     check.on_start(training)
     for entropy, reward in updates:

@@ -32,8 +32,8 @@ def npy(shape, dtype="<f4", data=b""):
 )
 @pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
 def test_arrays_round_trip(tmp_path, value, save):
-    save(tmp_path / "a.npz", a=value, b=np.zeros(3))
-    arrays = read_arrays(tmp_path / "a.npz", wanted=lambda name: name == "a")
+    save(tmp_path / "a.npz", a=value)
+    arrays = read_arrays(tmp_path / "a.npz")
     assert list(arrays) == ["a"]
     assert arrays["a"].dtype == value.dtype
     assert arrays["a"].flags.writeable

@@ -2,7 +2,6 @@ import errno
 import math
 import multiprocessing
 import os
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -19,7 +18,6 @@ from drone_rl.utils.files import (
     read_json,
     read_tail,
     refuse_links,
-    remove_leftovers,
     to_file_name,
     trained_policies,
     write_all_atomically,
@@ -180,18 +178,6 @@ def test_an_error_of_writing_names_the_file_that_was_to_be_written(tmp_path, mon
         write_atomically(tmp_path / "a.json", "x")
     assert error.value.filename == str(tmp_path / "a.json")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_leftovers_of_dead_processes_are_deleted_and_nothing_else(tmp_path):
-    dead = subprocess.Popen(["true"])
-    dead.wait()
-    kept = {".last.pt.1", ".other.pt.99", ".last.pt.notes.txt", "last.pt", ".last.pt.0x"}
-    gone = {f".last.pt.{dead.pid}", f".last.pt.{os.getpid()}"}
-    for name in kept | gone:
-        (tmp_path / name).touch()
-    remove_leftovers(tmp_path, "last.pt", "best.pt")
-    assert {path.name for path in tmp_path.iterdir()} == kept
-    remove_leftovers(tmp_path / "none", "last.pt")
 
 
 def test_the_end_of_a_log(tmp_path):

@@ -7,13 +7,7 @@ import pytest
 
 import drone_rl
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.plugins import (
-    described,
-    errors_of,
-    failure,
-    line_of,
-    with_methods_of,
-)
+from drone_rl.utils.plugins import described, errors_of, failure, line_of
 
 
 def raise_it(error):
@@ -59,26 +53,3 @@ def test_errors_become_one_line_and_known_ones_stay():
 )
 def test_described(value, text):
     assert described(value) == text
-
-
-class Base:
-    def step(self, state, body):
-        """Take two arguments."""
-
-
-class Same(Base):
-    def step(self, before, place, more=1):
-        """Take one more."""
-
-
-class Fewer(Base):
-    def step(self, state):
-        """Take one fewer."""
-
-
-def test_methods_take_the_arguments_of_their_base():
-    same = Same()
-    assert with_methods_of(Base, same) is same
-    message = r"^Fewer\.step of .*takes other .* than Base\.step; write def step\(self, state, b"
-    with pytest.raises(InputError, match=message):
-        with_methods_of(Base, Fewer())

@@ -4,7 +4,7 @@ import time
 import pytest
 
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.progress import Bar, Heartbeat, as_progress, log, silent
+from drone_rl.utils.progress import Bar, Heartbeat, Lines, as_progress, bar_or_lines, log, silent
 
 
 def test_a_bar_ends_when_all_is_done(capsys):
@@ -35,6 +35,27 @@ def test_a_line_in_the_log(caplog):
         log("section")
     assert caplog.messages == ["[1/3] flying", "section"]
     silent("nothing")
+
+
+def test_lines_every_few_seconds(caplog, monkeypatch):
+    calls = {0.0: None, 1.0: 100, 4.0: 200, 6.0: 300, 9.0: 400, 9.5: 500, 15.0: 10}
+    times = iter(calls)
+    monkeypatch.setattr("time.monotonic", lambda: next(times))
+    lines = Lines(interval_s=5.0)
+    with caplog.at_level(logging.INFO):
+        for done in filter(None, calls.values()):
+            lines("flying", done, 500)
+    assert caplog.messages == [
+        "[300/500] flying, at most 5 s left",  # 200 steps in 5 s
+        "[500/500] flying",
+        "[10/500] flying",
+    ]
+
+
+def test_lines_where_there_is_no_terminal(monkeypatch):
+    assert isinstance(bar_or_lines(), Lines)
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    assert isinstance(bar_or_lines(), Bar)
 
 
 def test_progress_is_a_function_and_a_bar_by_default():

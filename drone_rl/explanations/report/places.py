@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from drone_rl.explanations.report.explanation import Explanation, Part
+from drone_rl.explanations.report.explanation import Explanation, Figures, Part
 from drone_rl.sim.vocabulary import shown_actions
 from drone_rl.trust.plots import regions
 from drone_rl.utils.text import Claims, Evidence, exact_percent, listed
@@ -83,12 +83,18 @@ def _say_closeness(places: Evidence) -> Claims:
     return claims
 
 
-def _exact_map(explanation: Explanation) -> tuple[Any, ...]:
-    """Return numbers, outlines and actions of the exact map; nothing if there is none."""
-    if "refused" in explanation.numbers["places"]:
-        return ()
+def draw_places(explanation: Explanation) -> Figures:
+    """Draw the exact map, if there is one."""
+    places = explanation.numbers["places"]
+    if "refused" in places:
+        return {}
     outlines = {n: explanation.arrays[f"places_{n}"] for n in ("points", "ends", "labels")}
-    return explanation.numbers["places"], outlines, explanation.actions
+    return {"places": regions.chart(places, outlines, explanation.actions)}
+
+
+def _extras(explanation: Explanation) -> dict[str, Any]:
+    places = explanation.numbers["places"]
+    return {} if "refused" in places else {"rows": rows(places, explanation.actions.names)}
 
 
 PART = Part(
@@ -96,6 +102,6 @@ PART = Part(
     label="Exact map",
     needs=("places",),
     text={"places": say_places},
-    draw=lambda e: {"places": regions.chart(*drawn)} if (drawn := _exact_map(e)) else {},
-    extras=lambda e: {"rows": rows(e.numbers["places"], e.actions.names)} if _exact_map(e) else {},
+    draw=draw_places,
+    extras=_extras,
 )

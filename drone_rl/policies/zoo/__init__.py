@@ -3,7 +3,6 @@
 from drone_rl.policies.zoo.description import PolicyDescription as PolicyDescription
 from drone_rl.policies.zoo.description import describe as describe
 from drone_rl.policies.zoo.description import parse as parse
-from drone_rl.policies.zoo.files import card_path as card_path
 from drone_rl.policies.zoo.files import certificate_path as certificate_path
 from drone_rl.policies.zoo.files import find_policy as find_policy
 from drone_rl.policies.zoo.files import fingerprint as fingerprint

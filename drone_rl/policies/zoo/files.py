@@ -83,11 +83,6 @@ def find_policy(which: str | Path, outputs: str | Path = "outputs") -> Path:
     return last_of(path) if path.is_dir() else path
 
 
-def card_path(name: str) -> Path:
-    """Return the model card of a policy in the package."""
-    return _FOLDER / f"{name}.md"
-
-
 def certificate_path(policy: Path) -> Path:
     """Return the path of a policy's certificate, see `_companion`."""
     return _companion(policy, "certificate.json")

@@ -22,7 +22,6 @@ from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.plugins import with_methods_of
 from drone_rl.utils.schema import shown
 from drone_rl.utils.settings import prefixed_errors
 
@@ -395,4 +394,4 @@ def as_task(task: BaseTaskSettings | Task[Any] | str | None) -> Task[Any]:
             f"{type(task).__name__} is the settings of no task; call drone_rl.sim.tasks."
             "register_task with what makes it"
         )
-    return with_methods_of(Task, MAKERS[type(task)](task))
+    return MAKERS[type(task)](task)

@@ -21,7 +21,7 @@ def chart(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: Show
     """
     window = numbers["window"]
     side, near, far = window["sideways"], window["nearest"], window["farthest"]
-    width = 9.0
+    width = 6.0  # inches, legible on a phone
     figure = Figure(figsize=(width, 1.6 + 0.88 * width * far / (2 * side)), layout="constrained")
     axis = figure.subplots()
     for label, outlines in _by_label(arrays).items():
@@ -40,7 +40,7 @@ def chart(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: Show
     axis.set_ylabel("metres ahead of the camera")
     axis.axhline(near, color=css(INK), lw=0.5)
     note = f"not covered: closer than {near:g} m"
-    axis.text(0.97 * side, 0.5 * near, note, va="center", color=css(FAINT))
+    axis.text(0.97 * side, 0.5 * near, note, va="center", color=css(FAINT), backgroundcolor="white")
     axis.set_title("Action for one cube at each position")
     handles = [Patch(color=names.css(a), label=f"goes {names.names[a]}") for a in names.order]
     if numbers["unseen"]:
@@ -48,7 +48,7 @@ def chart(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: Show
         handles.append(Patch(**style, label="cube not seen"))
     handles += axis.get_legend_handles_labels()[0]
     axis.legend(
-        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.07), ncols=3, frameon=False
+        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.07), ncols=2, frameon=False
     )
     return figure
 
