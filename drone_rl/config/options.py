@@ -171,6 +171,32 @@ class DynamicsOptions(VehicleOptions, total=False):
     mode: str
 
 
+class TaskOptions(TypedDict, total=False):
+    """Fields of `TaskSettings` and `PillarsSettings`; a task of one's own may have others."""
+
+    num_cubes: int
+    num_rows: int
+    first_distance: float
+    spacing: float
+    lateral_bound: float
+    vertical_bound: float
+    cube_size: float
+    cube_color: Sequence[float]
+    drone_size: float
+    altitude: float
+    step_length: float
+    step_limit: int
+    front_margin: float
+    side_margin: float
+    density: float
+    width: float
+    spread: float
+    height: float
+    pillar_color: Sequence[float]
+    finish_margin: float
+    collision_penalty: float
+
+
 class UnseededTrainOptions(TypedDict, total=False):
     """Fields of `TrainSettings` except the seed."""
 

@@ -127,7 +127,7 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         film = self.batch.film()
         return None if film is None else tuple(film)
 
-    def close_extras(self, **kwargs: Any) -> None:
+    def close_extras(self) -> None:
         """Close the renderer."""
         self.batch.worlds.close()
 

@@ -72,8 +72,8 @@ def _projection(fov: float, width: int, height: int) -> list[list[float]]:
     ]
 
 
-def change_camera(vehicle: Vehicle, camera: str, **changes: Any) -> None:
-    """Change a camera of a vehicle."""
+def change_camera(vehicle: Vehicle, camera: str, changes: Map) -> None:
+    """Change fields of the state of a vehicle's camera."""
     vehicle.cameras[camera] = dataclasses.replace(vehicle.cameras[camera], **changes)
 
 
@@ -82,16 +82,17 @@ def _set_camera_pose(vehicle: Vehicle, camera: str, pose: Pose) -> None:
     state = vehicle.cameras[camera]
     whole = pose.merged(Pose.of(torch.tensor(state.position, dtype=torch.float64), state.attitude))
     attitude = attitude_to_world(whole.attitude)
-    change_camera(vehicle, camera, position=to_world(whole.position), attitude=attitude)
+    place = to_world(whole.position)
+    change_camera(vehicle, camera, {"position": place, "attitude": attitude})
 
 
 @camera_method(
     "simSetCameraOrientation setCameraOrientation", CAMERA, given(read_attitude, "orientation")
 )
 def _set_camera_orientation(vehicle: Vehicle, camera: str, attitude: list[float]) -> None:
-    change_camera(vehicle, camera, attitude=attitude_to_world(attitude))
+    change_camera(vehicle, camera, {"attitude": attitude_to_world(attitude)})
 
 
 @camera_method("simSetCameraFov", CAMERA, given(number, "fov_degrees", 1.0, 170.0))
 def _set_camera_fov(vehicle: Vehicle, camera: str, fov: float) -> None:
-    change_camera(vehicle, camera, fov=fov)
+    change_camera(vehicle, camera, {"fov": fov})

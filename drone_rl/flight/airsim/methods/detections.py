@@ -29,17 +29,17 @@ def _add_pattern(vehicle: Vehicle, camera: str, kind: int, pattern: str) -> None
         raise InputError(
             f"a camera can have {MAX_PATTERNS} mesh names; call simClearDetectionMeshNames"
         )
-    change_camera(vehicle, camera, detected=(*known, pattern))
+    change_camera(vehicle, camera, {"detected": (*known, pattern)})
 
 
 @camera_method("simSetDetectionFilterRadius", *_OF_TYPE, given(number, "radius_cm", 0.0, 1e9))
 def _set_radius(vehicle: Vehicle, camera: str, kind: int, radius: float) -> None:
-    change_camera(vehicle, camera, detection_radius=radius / 100.0)
+    change_camera(vehicle, camera, {"detection_radius": radius / 100.0})
 
 
 @camera_method("simClearDetectionMeshNames", *_OF_TYPE)
 def _clear_patterns(vehicle: Vehicle, camera: str, kind: int) -> None:
-    change_camera(vehicle, camera, detected=())
+    change_camera(vehicle, camera, {"detected": ()})
 
 
 @method("simGetDetections", *_OF_TYPE, SIM_VEHICLE)

@@ -23,11 +23,9 @@ class Argument:
     """What counts as sent where a client sends fewer arguments."""
 
 
-def given(
-    read: Callable[..., Any], name: str, *limits: Any, default: Any = _REQUIRED, **more: Any
-) -> Argument:
+def given(read: Callable[..., Any], name: str, *limits: Any, default: Any = _REQUIRED) -> Argument:
     """Return an argument that a reader of `messages` reads, such as `number` or `read_pose`."""
-    return Argument(lambda simulation, value: read(value, name, *limits, **more), default)
+    return Argument(lambda simulation, value: read(value, name, *limits), default)
 
 
 def _find(simulation: Simulation, value: Any, *, is_sim_api: bool = False) -> Any:
