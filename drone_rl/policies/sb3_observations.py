@@ -59,7 +59,6 @@ _NEUTRAL = {
 }
 """Classes of these libraries that change neither observations nor actions."""
 _REPEATING = {
-    "AtariPreprocessing",
     "MaxAndSkipEnv",
     "MaxAndSkipObservation",
     "RepeatAction",
