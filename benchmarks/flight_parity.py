@@ -16,7 +16,7 @@ from benchmarks.benchmark import Setup
 from benchmarks.forces_kernel import forces
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.dynamics import GRAVITY
-from drone_rl.sim.dynamics import FlightState, Goals, Mode, Quadrotor
+from drone_rl.sim.dynamics import FlightGoals, FlightState, Mode, Quadrotor
 from drone_rl.sim.dynamics import state as fs
 
 SECONDS = 10.0
@@ -36,7 +36,7 @@ class Manoeuvre:
 
     name: str
     settings: DynamicsSettings
-    goals: tuple[Goals, ...]
+    goals: tuple[FlightGoals, ...]
     """Goals of all drones, one entry for each second."""
 
 
@@ -140,7 +140,9 @@ class _MuJoCo:
             data.qpos[:] = row[fs.POSITION : fs.VELOCITY]
             data.qvel[:] = row[fs.VELOCITY : fs.ROTORS]
 
-    def fly(self, quadrotor: Quadrotor, body: FlightState, goals: Goals, ticks: int) -> FlightState:
+    def fly(
+        self, quadrotor: Quadrotor, body: FlightState, goals: FlightGoals, ticks: int
+    ) -> FlightState:
         """Apply the forces of every tick and integrate with MuJoCo."""
         for tick in range(ticks):
             body, wrenches = forces(quadrotor.frame, body, goals, tick)
@@ -153,7 +155,7 @@ class _MuJoCo:
         return body
 
 
-def _random_goals(source: np.random.Generator, modes: tuple[Mode, ...], count: int) -> Goals:
+def _random_goals(source: np.random.Generator, modes: tuple[Mode, ...], count: int) -> FlightGoals:
     """Sample a goal for each drone."""
     values = np.zeros((count, 4))
     if not modes:
@@ -172,8 +174,8 @@ def _random_goals(source: np.random.Generator, modes: tuple[Mode, ...], count: i
     return _goals(modes, values)
 
 
-def _goals(modes: tuple[Mode, ...], values: NDArray) -> Goals:
-    return Goals(modes, torch.from_numpy(values))  # pyright: ignore[reportArgumentType] (four)
+def _goals(modes: tuple[Mode, ...], values: NDArray) -> FlightGoals:
+    return FlightGoals(modes, torch.from_numpy(values))  # pyright: ignore[reportArgumentType] (four)
 
 
 def _angle(one: Tensor, other: Tensor) -> Tensor:

@@ -6,7 +6,7 @@ from torch import Tensor
 
 from drone_rl.sim.dynamics import flight_kernel as kernel
 from drone_rl.sim.dynamics import state as fs
-from drone_rl.sim.dynamics.control import Goals
+from drone_rl.sim.dynamics.control import FlightGoals
 from drone_rl.sim.dynamics.rigid_body_kernel import AirframeNumbers, axes_of, torque_of
 from drone_rl.sim.dynamics.state import FlightState
 from drone_rl.sim.rendering.devices import start_warp
@@ -48,7 +48,7 @@ def push(
 
 
 def forces(
-    frame: AirframeNumbers, body: FlightState, goals: Goals, tick: int
+    frame: AirframeNumbers, body: FlightState, goals: FlightGoals, tick: int
 ) -> tuple[FlightState, Tensor]:
     """Compute controllers, rotors and air in tick number `tick` of a command, on the CPU.
 

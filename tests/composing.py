@@ -57,7 +57,7 @@ def _keep_overrides(patch: pytest.MonkeyPatch) -> None:
 def _keep_schemas(patch: pytest.MonkeyPatch) -> None:
     register, kept = composition.register_schemas, {}
 
-    def register_once(**commands):
+    def register_once(commands):
         parts = [*composition.PARTS.values(), *composition.SEVERAL.values()]
         variants = [v for part in parts for v in part.variants()]
         known = [*TASKS.values(), *composition.GROUPS.values(), *variants]
@@ -66,7 +66,7 @@ def _keep_schemas(patch: pytest.MonkeyPatch) -> None:
             kept.clear()
         done = kept.setdefault(state, {})
         if not commands.items() <= done.items():
-            register(**commands)
+            register(commands)
             done.update(commands)
 
     patch.setattr(composition, "register_schemas", register_once)

@@ -7,7 +7,7 @@ import torch
 import warp as wp
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.sim.dynamics import FlightState, Goals, Mode, Quadrotor
+from drone_rl.sim.dynamics import FlightGoals, FlightState, Mode, Quadrotor
 from drone_rl.sim.dynamics.rigid_body_kernel import make_airframe
 
 POSITIONS = (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.POSITION)
@@ -43,7 +43,7 @@ def hovering(drone, *, height=100.0, count=1, seeds=None):
 
 def make_goals(modes, *values, count=1, drift=None):
     goals = doubles(values).repeat(count, 1)
-    return Goals(modes, goals, None if drift is None else doubles(drift).repeat(count, 1))
+    return FlightGoals(modes, goals, None if drift is None else doubles(drift).repeat(count, 1))
 
 
 def falling(height=100.0, velocity=(0.0, 0.0, 0.0), rates=(0.0, 0.0, 0.0)):

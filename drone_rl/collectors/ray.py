@@ -28,7 +28,7 @@ WorkerComponents = tuple[EpisodeCollector, nn.Module, torch.Generator]
 _log = logging.getLogger(__name__)
 
 
-class RemoteEpisodes(BaseCollector):
+class _RemoteEpisodes(BaseCollector):
     """Run an `EpisodeCollector` in a worker, with the parameters and state of each request."""
 
     def __init__(
@@ -121,7 +121,7 @@ class RayEpisodeCollector:
 
     @property
     def workers(self) -> list[Any]:
-        """Handles of the remote `RemoteEpisodes`."""
+        """Handles of the remote `_RemoteEpisodes`."""
         return self._pool.remote_collectors
 
     def __iter__(self) -> Iterator[TensorDictBase]:
@@ -215,7 +215,7 @@ def _start_workers(
             warnings.simplefilter("ignore", UserWarning)  # about a policy, which need not be sent
             return RayCollector(
                 list(makers),
-                collector_class=RemoteEpisodes,  # pyright: ignore[reportArgumentType]
+                collector_class=_RemoteEpisodes,  # pyright: ignore[reportArgumentType]
                 frames_per_batch=len(makers),
                 sync=True,
                 weight_sync_schemes={},

@@ -10,7 +10,7 @@ import typing
 from collections.abc import Callable, Iterable, Mapping
 from importlib import metadata
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Self, TypedDict, TypeVar, Unpack
 
 from drone_rl.config import (
     TASKS,
@@ -37,6 +37,13 @@ ENTRY_POINTS = "drone_rl.policies"
 S = TypeVar("S", bound=Settings)
 
 
+class NetworkOptions(TypedDict, total=False):
+    """What is given by name where a part is built."""
+
+    generator: Any
+    """The `torch.Generator` of a network's first weights; None for torch's global one."""
+
+
 class Variant(Settings):
     """Settings of one variant of a part of a training.
 
@@ -57,10 +64,10 @@ class Variant(Settings):
             cls.target = target
         super().__init_subclass__(**kwargs)
 
-    def make(self, *args: Any, **kwargs: Any) -> Any:
+    def make(self, *parts: Any, **options: Unpack[NetworkOptions]) -> Any:
         """Build the part from objects, such as parameters, and the settings; see `locate`."""
         factory = type(self).factory or locate(self.target)
-        return factory(*args, **self.arguments(), **kwargs)
+        return factory(*parts, **self.arguments(), **options)
 
     def arguments(self) -> dict[str, Any]:
         """Return the settings that are passed to the factory."""

@@ -90,19 +90,15 @@ class Collector(Variant):
         return {}
 
 
-class CompleteEpisodes(Collector):
-    """Batches of complete episodes."""
+class Episodes(Collector, target="episodes"):
+    """Batches of complete episodes from threads of this process."""
 
     compiled: bool = True
     """Run whole episodes in one fused kernel if it supports task, camera and network, which is much
     faster on a CPU. It samples actions in a different order, so results for a seed depend on it."""
 
 
-class Episodes(CompleteEpisodes, target="episodes"):
-    """Batches of complete episodes from threads of this process."""
-
-
-class Ray(CompleteEpisodes, target="ray"):
+class Ray(Episodes, target="ray"):
     """Batches of complete episodes from workers on a Ray cluster."""
 
     num_threads: Annotated[int, Whole(1, unit="workers")] = 2

@@ -6,6 +6,8 @@ Functions such as `drone_rl.train(**changes)` take them; `from_arguments` checks
 from collections.abc import Mapping, Sequence
 from typing import Any, TypedDict
 
+from typing_extensions import TypedDict as OpenTypedDict
+
 from drone_rl.config.appearance import AppearanceSettings
 from drone_rl.config.camera import CameraSettings
 from drone_rl.config.dynamics import ActionSettings, DynamicsSettings
@@ -169,6 +171,32 @@ class DynamicsOptions(VehicleOptions, total=False):
     """Fields of `DynamicsSettings`."""
 
     mode: str
+
+
+class TaskOptions(OpenTypedDict, total=False, extra_items=Any):
+    """Fields of `TaskSettings` and `PillarsSettings`; a task of one's own may have others."""
+
+    num_cubes: int
+    num_rows: int
+    first_distance: float
+    spacing: float
+    lateral_bound: float
+    vertical_bound: float
+    cube_size: float
+    cube_color: Sequence[float]
+    drone_size: float
+    altitude: float
+    step_length: float
+    step_limit: int
+    front_margin: float
+    side_margin: float
+    density: float
+    width: float
+    spread: float
+    height: float
+    pillar_color: Sequence[float]
+    finish_margin: float
+    collision_penalty: float
 
 
 class UnseededTrainOptions(TypedDict, total=False):

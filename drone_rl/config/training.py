@@ -1,6 +1,6 @@
 """Settings of a training."""
 
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Self, Unpack
 
 from drone_rl.config import (
     ActionSettings,
@@ -12,7 +12,7 @@ from drone_rl.config import (
     TaskSettings,
 )
 from drone_rl.config.appearance import check_appearance
-from drone_rl.config.configuration import Variant
+from drone_rl.config.configuration import NetworkOptions, Variant
 from drone_rl.config.learning import (
     Adam,
     Collector,
@@ -167,10 +167,10 @@ class TrainSettings(Settings):
 class Logger(Variant):
     """Settings of a TorchRL logger."""
 
-    def make(self, *args: Any, **kwargs: Any) -> Any:
+    def make(self, *parts: Any, **options: Unpack[NetworkOptions]) -> Any:
         """Make the logger; raise an `InputError` if that fails."""
         try:
-            return super().make(*args, **kwargs)
+            return super().make(*parts, **options)
         except Exception as error:  # a missing package, a wrong argument, or a server out of reach
             text = " ".join(f"{error}".split()) or type(error).__name__
             raise InputError(

@@ -18,7 +18,6 @@ from drone_rl.explanations.settings import ClassModelSettings
 from drone_rl.policies import ImageNetwork
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import plain_generator
-from drone_rl.utils.threads import pool_like_caller
 
 OBJECTIVES: tuple[Objective, ...] = ("probability", "logit")
 NO_GRADIENTS = (
@@ -33,13 +32,9 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     if not context.network.is_differentiable:
         raise LeftOutError(NO_GRADIENTS)
     statistics = ImageStatistics.of(context.dataset.tensor("observations"))
-
-    def optimize(objective: Objective) -> ClassModel:
-        network = copy.deepcopy(context.network)  # it accumulates gradients
-        return search(network, statistics, objective, seed=context.seed.value)
-
-    with pool_like_caller(len(OBJECTIVES)) as pool:  # a small batch uses one core
-        models = dict(zip(OBJECTIVES, pool.map(optimize, OBJECTIVES), strict=True))
+    network = copy.deepcopy(context.network)  # it accumulates gradients
+    seed = context.seed.value
+    models = {each: search(network, statistics, each, seed=seed) for each in OBJECTIVES}
     numbers = {
         "statistics": dataclasses.asdict(statistics),
         "channels": context.scenes.channels,

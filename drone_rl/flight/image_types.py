@@ -7,7 +7,6 @@ import io
 import math
 import random
 from collections.abc import Sequence
-from typing import Any
 
 import torch
 from PIL import Image
@@ -143,10 +142,13 @@ def images(
     return found
 
 
-def encode(image: Image.Image, kind: str, **options: Any) -> bytes:
-    """Return the content of an image file of a format of PIL, such as "png" or "jpeg"."""
+def encode(image: Image.Image, kind: str, *, quality: int = -1, compress_level: int = -1) -> bytes:
+    """Return the content of an image file: "jpeg" of a quality, or "png" of a compression.
+
+    Both are PIL's, -1 for its default.
+    """
     buffer = io.BytesIO()
-    image.save(buffer, kind, **options)
+    image.save(buffer, kind, quality=quality, compress_level=compress_level)
     return buffer.getvalue()
 
 

@@ -23,7 +23,7 @@ from drone_rl.config import (
     settings_of,
 )
 from drone_rl.config.configuration import Changes, as_changes
-from drone_rl.config.options import DynamicsOptions
+from drone_rl.config.options import DynamicsOptions, TaskOptions
 from drone_rl.config.transforms import Frame, Gray, Rgb, Standardize, Transform, as_transforms
 from drone_rl.policies import ExternalNetwork
 from drone_rl.policies.environment import EnvOptions, make_env
@@ -71,7 +71,7 @@ class ExternalPolicy(BasePolicy):
         """The policy's name; its training is unknown."""
         return {"policy": self.name, "trained": None}
 
-    def in_task(self, **changes: Any) -> "ExternalPolicy":
+    def in_task(self, **changes: Unpack[TaskOptions]) -> "ExternalPolicy":
         """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`."""
         if not isinstance(self.task, Settings):
             if changes:

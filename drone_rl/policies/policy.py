@@ -22,7 +22,7 @@ from drone_rl.config import (
     DynamicsSettings,
 )
 from drone_rl.config.configuration import Changes
-from drone_rl.config.options import DynamicsOptions
+from drone_rl.config.options import DynamicsOptions, TaskOptions
 from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transforms
 from drone_rl.policies import ImageNetwork, RecurrentNetwork, make_actor
 from drone_rl.policies.environment import EnvOptions
@@ -103,7 +103,7 @@ class BasePolicy(abc.ABC):
         """Plain values: "policy", its file or name, and how it was "trained"; None if unknown."""
 
     @abc.abstractmethod
-    def in_task(self, **changes: Any) -> Self:
+    def in_task(self, **changes: Unpack[TaskOptions]) -> Self:
         """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`.
 
         Raises:
@@ -237,7 +237,7 @@ class Policy(BasePolicy):
         trained = {**{key: self.state[key] for key in keys}, "command": self.state.get("command")}
         return {"policy": str(self.path), "trained": trained}
 
-    def in_task(self, **changes: Any) -> "Policy":
+    def in_task(self, **changes: Unpack[TaskOptions]) -> "Policy":
         """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`."""
         changed = Changes(type(self.task)).read(changes, "task")
         described = self.description.as_dict()

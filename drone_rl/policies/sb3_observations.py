@@ -28,6 +28,7 @@ from stable_baselines3.common.vec_env.stacked_observations import StackedObserva
 from torch import Tensor
 
 from drone_rl.config import CameraSettings
+from drone_rl.config.registry import implements
 from drone_rl.config.transforms import Frame, Rgb, Stack, Transform
 from drone_rl.envs.gymnasium.environments import DroneWorld, DroneWorlds
 from drone_rl.envs.sb3.worlds import Sb3Worlds
@@ -58,7 +59,6 @@ _NEUTRAL = {
 }
 """Classes of these libraries that change neither observations nor actions."""
 _REPEATING = {
-    "AtariPreprocessing",
     "MaxAndSkipEnv",
     "MaxAndSkipObservation",
     "RepeatAction",
@@ -195,11 +195,8 @@ class Wrapped(Transform):
         """Return None: only a call shows the shape."""
         return None
 
-    def make(self, *args: Any, **kwargs: Any) -> PixelTransform:
-        """Return the transform."""
-        return _WrappedPixels(self.functions)
 
-
+@implements(Wrapped)
 class _WrappedPixels(PixelTransform):
     def __init__(self, functions: Functions) -> None:
         super().__init__()

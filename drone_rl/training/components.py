@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import torch
 from torchrl.envs import TransformedEnv
 
-from drone_rl.config.learning import CompleteEpisodes, Ray
+from drone_rl.config.learning import Episodes, Ray
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.zoo import describe
@@ -55,7 +55,7 @@ def group_sizes(settings: TrainSettings) -> list[int]:
 def episode_options(settings: TrainSettings, num_threads: int) -> dict[str, Any]:
     """Return the arguments of `EpisodeCollector`; a fused kernel uses `num_threads`."""
     chosen = settings.collector
-    fused = isinstance(chosen, CompleteEpisodes) and chosen.compiled
+    fused = isinstance(chosen, Episodes) and chosen.compiled
     return {"acceleration": "fused" if fused else "none", "num_threads": num_threads}
 
 

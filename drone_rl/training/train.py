@@ -201,8 +201,10 @@ def make_groups(
 
 
 @implements(Reinforce)
-def reinforce_learner(settings: TrainSettings, parts: Components, **own: Any) -> ReinforceLearner:
-    """Make the learner without a critic; `own` are the settings of its loss."""
+def reinforce_learner(
+    settings: TrainSettings, parts: Components, *, entropy_coeff: float, reduction: str
+) -> ReinforceLearner:
+    """Make the learner without a critic; its loss has the last two settings."""
     limits, network, actor = settings.trainer, parts.network, parts.collector.actor
     may_fuse = limits.compiled and not network.is_recurrent
     learning = accelerated_gradients(network, limits.num_threads) if may_fuse else network
@@ -212,7 +214,9 @@ def reinforce_learner(settings: TrainSettings, parts: Components, **own: Any) ->
     optimizer = settings.optimizer.make(network.parameters())
     return ReinforceLearner(
         network=network,
-        loss=ReinforceLoss(actor, **own).to(settings.device),
+        loss=ReinforceLoss(actor, entropy_coeff=entropy_coeff, reduction=reduction).to(
+            settings.device
+        ),
         optimizer=optimizer,
         scheduler=settings.scheduler.make(optimizer),
         max_grad_norm=limits.max_grad_norm,

@@ -31,7 +31,7 @@ def rollout_collector(
 ) -> Components:
     """Make `collector=rollouts`: a fixed number of steps of each environment, in threads.
 
-    The learner's `estimate` is the collector's `postproc`, see `actor_critic_learner`.
+    The learner's `estimate` is the collector's `postproc`, see `_actor_critic_learner`.
     """
     objective = settings.objective
     assert isinstance(objective, WithCritic)
@@ -42,7 +42,7 @@ def rollout_collector(
 
 
 @implements(A2c, Ppo)
-def actor_critic_learner(
+def _actor_critic_learner(
     settings: TrainSettings, components: Components, **own: Any
 ) -> ActorCriticLearner:
     """Make the learner with a critic, on the policy's features or with its own network.

@@ -123,16 +123,17 @@ _FIGURES = {
     "difference": Record(
         {"mean": _SIGNED, "lower95": _SIGNED, "upper95": _SIGNED, "count": _COUNT}
     ),
-    "paired": Record({"lost": _COUNT, "gained": _COUNT, "p": _PART}),
+    "paired": _FREE,  # of earlier versions
     "shares": _Each(_MEAN),
     "ends": _Each(_COUNT),
     "unchanged": Flag(),
 }
+_EARLIER = frozenset({"paired"})
 _FLOWN = {
     "refused": Maybe(Text()),
     "oracle": Maybe(_SHARE),
     "impossible": Maybe(Flag()),
-    "modes": _Each(Record(_FIGURES), MODES),
+    "modes": _Each(Record(_FIGURES, _EARLIER), MODES),
 }
 _LEVEL = Record({"number": Whole(1, 5), "value": _ANY, "position": _ANY, **_FLOWN})
 _AXIS = Record(
@@ -183,7 +184,7 @@ _WHOLE = Record(
         "seed": Whole(0),
         "seed_is_fixed": Flag(),
         "terms": Plain(),
-        "plain": Record({"oracle": Maybe(_SHARE), **_FIGURES}),
+        "plain": Record({"oracle": Maybe(_SHARE), **_FIGURES}, _EARLIER),
         "axes": _Each(_AXIS, tuple(AXES)),
         "together": Record(_FLOWN),
         "domain": Maybe(_DOMAIN),

@@ -118,7 +118,6 @@ class Suite:
         return {
             "success": proportion(int(episodes.success.sum()), len(episodes)),
             "difference": mean_bounds(episodes.success - plain.success, -1.0, 1.0),
-            "paired": mcnemar(plain.success, episodes.success),
             "shares": shares,
             "ends": {end.name.lower(): ends[end] for end in task.ends if end != 0},
             "unchanged": bool(torch.equal(result.trace, self.plain.trace))
@@ -165,19 +164,6 @@ def make_strip(evaluator: PairedEvaluator, axis: Axis) -> list[NDArray | None]:
 def finite(value: float) -> float | None:
     """Return a finite value unchanged and None for infinity, such as visibility without fog."""
     return value if math.isfinite(value) else None
-
-
-def mcnemar(before: Tensor, after: Tensor) -> dict[str, Any]:
-    """Return McNemar's exact test of paired successes, 1 or 0. Shapes: (n,).
-
-    Returns:
-        "lost": pairs with success only before, "gained": only after; "p": the p-value.
-    """
-    from scipy.special import bdtr  # slow to import
-
-    lost, gained = int((before > after).sum()), int((after > before).sum())
-    tail = float(bdtr(min(lost, gained), lost + gained, 0.5)) if lost + gained else 0.5
-    return {"lost": lost, "gained": gained, "p": min(1.0, 2 * tail)}
 
 
 def area(positions: Sequence[float], shares: Sequence[float]) -> float:

@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import Any, Unpack
 
 import numpy as np
-import torch
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from drone_rl.config.commands import PlacesSettings
 from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.config.options import PlacesOptions
+from drone_rl.envs.transforms import on_pixels
 from drone_rl.explanations.report.places import rows, say_places
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.vocabulary import SHOWN_MOVES
@@ -28,9 +27,7 @@ from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.utils.text import say
 from drone_rl.utils.threads import torch_threads
-from drone_rl.verification.prover.action_map import ActionMap, map_actions
-from drone_rl.verification.prover.arrangement import Window
-from drone_rl.verification.prover.bounds import masks_of
+from drone_rl.verification.prover.action_map import ActionMap, map_policy
 from drone_rl.verification.prover.policy_spec import make_policy_spec
 
 
@@ -116,26 +113,14 @@ def places(
     begin = time.perf_counter()
     network, gap = policy.make_network(), settings.logit_gap
     spec = make_policy_spec(policy.description, network, gap, settings.renderer)
-
-    def render(faces: NDArray[np.uint8]) -> torch.Tensor:
-        whole, masks = (slice(None), slice(None)), masks_of(torch.from_numpy(faces))
-        images, _ = spec.compositor.paint([(whole, masks, torch.arange(len(faces)))], len(faces))
-        return spec.compositor.see(images)
-
+    transform = on_pixels(policy.description.make_transforms())
     with torch_threads(1), closing(spec):
         progress("comparing the renderer's images")
         compared = spec.images.check(
             settings.compared, np.random.RandomState(legacy_seed(fresh_seed()))
         )
         progress("deciding the cells")
-        found = map_actions(
-            spec.camera,
-            Window(settings.nearest, settings.farthest, settings.sideways),
-            render,
-            network.eval(),
-            touch_distance=spec.lattice.task.touch_distance,
-            most_cells=settings.most_cells,
-        )
+        found = map_policy(spec.images, transform, network, settings)
     progress("mapped", 1, 1)
     numbers = {
         "policy": policy.name,

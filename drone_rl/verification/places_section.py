@@ -1,11 +1,10 @@
 """Section "places" of explanations: the exact map of the action over one cube's place."""
 
+import dataclasses
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import PlacesSettings
@@ -14,9 +13,8 @@ from drone_rl.sim.actions import MOVES
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import legacy_seed
-from drone_rl.verification.prover.action_map import ActionMap, map_actions
-from drone_rl.verification.prover.arrangement import Window
-from drone_rl.verification.prover.cube_images import NOTHING, CameraModel, CubeImages
+from drone_rl.verification.prover.action_map import ActionMap, map_policy
+from drone_rl.verification.prover.cube_images import CameraModel, CubeImages
 from drone_rl.verification.prover.lattice import Lattice
 from drone_rl.verification.prover.policy_spec import check_task
 
@@ -58,18 +56,7 @@ def _exact_map(context: Context, settings: PlacesSettings) -> ActionMap:
     camera = CameraModel.of(task, scenes.worlds.camera)
     images = CubeImages(scenes.worlds, Lattice(task), camera)
     images.check(_COMPARED, np.random.RandomState(legacy_seed(context.seed.value)))
-
-    def render(faces: NDArray[np.uint8]) -> Tensor:
-        """Return observations from the cube's face at each pixel."""
-        shown = torch.from_numpy(faces).long()
-        is_open = (shown == NOTHING)[..., None]
-        return scenes.transform(torch.where(is_open, images.background, images.colors[shown]))
-
-    return map_actions(
-        camera,
-        Window(max(settings.nearest, task.cube_size), settings.farthest, settings.sideways),
-        render,
-        network.eval(),
-        touch_distance=task.touch_distance,
-        most_cells=settings.most_cells,
+    nearest = max(settings.nearest, task.cube_size)
+    return map_policy(
+        images, scenes.transform, network, dataclasses.replace(settings, nearest=nearest)
     )

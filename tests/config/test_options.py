@@ -4,7 +4,13 @@ import dataclasses
 
 import pytest
 
-from drone_rl.config import DynamicsSettings, commands, options
+from drone_rl.config import (
+    DynamicsSettings,
+    PillarsSettings,
+    TaskSettings,
+    commands,
+    options,
+)
 from drone_rl.config.training import TrainSettings
 from drone_rl.explanations import settings as explaining
 from drone_rl.explanations.chapter_figures import FigureOptions, FigureSettings
@@ -36,3 +42,9 @@ LEFT_OUT = {"BodiesSettings": {"policies"}, "FigureSettings": {"figure"}}
 def test_keywords_are_the_fields_of_settings(settings, keywords):
     fields = {field.name for field in dataclasses.fields(settings)}
     assert keywords.__optional_keys__ == fields - LEFT_OUT.get(settings.__name__, set())
+
+
+def test_keywords_of_tasks_are_the_fields_of_all_built_in_tasks():
+    tasks = (TaskSettings, PillarsSettings)
+    fields = {field.name for task in tasks for field in dataclasses.fields(task)}
+    assert options.TaskOptions.__optional_keys__ == fields

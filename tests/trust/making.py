@@ -4,15 +4,13 @@ import base64
 import dataclasses
 import zlib
 
-import torch
-
 from drone_rl.config.commands import ShiftSettings
 from drone_rl.policies.zoo import fingerprint
 from drone_rl.sim.tasks import as_task
 from drone_rl.trust.axes import AXES
 from drone_rl.trust.domain import walk
 from drone_rl.trust.perturbations import PerturbationMode
-from drone_rl.trust.suite import finite, mcnemar, success_area
+from drone_rl.trust.suite import finite, success_area
 from drone_rl.utils.intervals import mean_bounds, proportion
 
 EPISODES = 200
@@ -26,11 +24,9 @@ def figures(successes=EPISODES):
     """Of a policy that always succeeds where nothing is different."""
     lost = EPISODES - successes
     values = [1.0] * successes + [0.0] * lost
-    before = torch.ones(EPISODES)
     return {
         "success": share(successes),
         "difference": mean_bounds([value - 1.0 for value in values], -1.0, 1.0),
-        "paired": mcnemar(before, torch.tensor(values)),
         "shares": {name: mean_bounds(values) for name in ("all", "left", "ahead", "right")},
         "ends": {"all_cubes": successes, "front_boundary": lost},
         "unchanged": False,

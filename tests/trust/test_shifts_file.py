@@ -36,6 +36,11 @@ def test_valid_file_is_read(read, good):
     assert "pictures" not in found.evidence
 
 
+def test_file_of_an_earlier_version_with_tests_of_pairs_is_read(read):
+    paired = {"lost": 3, "gained": 0, "p": 0.25}
+    assert read({"axes.blur.levels.0.modes.constant.paired": paired}).refused is None
+
+
 def test_file_without_ranges(read):
     assert not read({"domain": None}).has_ranges
 

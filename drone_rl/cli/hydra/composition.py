@@ -9,7 +9,7 @@ import re
 import sys
 import types
 import typing
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -87,7 +87,7 @@ _PLUGINS = (("plugins", list[str], dataclasses.field(default_factory=list)),)
 """Modules that register parts; `import_plugins` imports them before Hydra composes."""
 
 
-def register_schemas(**commands: type[Settings]) -> None:
+def register_schemas(commands: Mapping[str, type[Settings]]) -> None:
     """Register the schemas of commands, by the names of their files, before Hydra composes.
 
     Parts and tasks of plugins, which have no file in conf/, become choices of their groups.
@@ -232,7 +232,7 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
     words = spare_run(command.prepare([*map(whole_numbers, words)]))
     words.sort(key=lambda word: word not in OPTIONS)  # Hydra needs options before settings
     import_plugins(words)
-    register_schemas(**{name: command})
+    register_schemas({name: command})
     check_words(name, conf_dir(), words)
     if is_help:
         with _explained(name, words):

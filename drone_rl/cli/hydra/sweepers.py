@@ -79,18 +79,28 @@ class SearchSweeper(CombiningSweeper):
     """Maximize the final running mean of rewards, see conf/hydra/sweeper/optuna.yaml."""
 
     def __init__(
-        self, *, num_trials: int, batch: int, seed: int, params: dict[str, str], **shared: Any
+        self,
+        *,
+        num_trials: int,
+        batch: int,
+        seed: int,
+        prune: bool,
+        startup_trials: int,
+        report_frames: int,
+        params: dict[str, str],
     ) -> None:
         super().__init__(params)
         import_optuna()
-        frames = shared["report_frames"]
-        if num_trials < 1 or batch < 1 or frames < 1:
-            raise InputError(
-                f"hydra.sweeper.num_trials={num_trials}, batch={batch} and report_frames={frames} "
-                "must be 1 or more"
-            )
-        seed = Whole(0, 2**31).read(seed, "hydra.sweeper.seed")
-        self.num_trials, self.batch, self.seed, self.shared = num_trials, batch, seed, shared
+        numbers = {"num_trials": num_trials, "batch": batch, "report_frames": report_frames}
+        for name, number in numbers.items():
+            Whole(1).read(number, f"hydra.sweeper.{name}")
+        self.num_trials, self.batch = num_trials, batch
+        self.seed = Whole(0, 2**31).read(seed, "hydra.sweeper.seed")
+        self.shared = {
+            "prune": prune,
+            "startup_trials": startup_trials,
+            "report_frames": report_frames,
+        }
 
     def sweep(self, arguments: list[str]) -> None:
         """Sample settings, run them and report the results until all trials are done."""

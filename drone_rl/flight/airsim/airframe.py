@@ -13,7 +13,12 @@ from drone_rl.config import DynamicsSettings
 from drone_rl.config.sensors import SensorSettings
 from drone_rl.flight.airsim import messages
 from drone_rl.flight.airsim.cameras import CameraState
-from drone_rl.flight.airsim.collisions import Collision, CollisionRecord, Solids, collision_info
+from drone_rl.flight.airsim.collisions import (
+    CollisionRecord,
+    Solids,
+    VehicleCollision,
+    collision_info,
+)
 from drone_rl.flight.airsim.messages import Map, Pose, nanoseconds, to_world
 from drone_rl.flight.airsim.sensors import SENSORS
 from drone_rl.flight.airsim.settings_file import POSING, Offset, VehicleChoice
@@ -152,7 +157,7 @@ class Airframe(Pilot):
         name = "Ground" if thing == GROUND else self.names[thing]
         normal, point = row[NORMAL : NORMAL + 3], row[POINT : POINT + 3]
         place = [p + self.settings.radius * n for p, n in zip(point, normal, strict=True)]
-        self.collisions.add(Collision(name, place, point, normal, row[DEPTH], row[TIME]))
+        self.collisions.add(VehicleCollision(name, place, point, normal, row[DEPTH], row[TIME]))
 
     def _hover(self) -> None:
         """Let an armed vehicle that was put into the air fly: it holds its place there."""
@@ -368,7 +373,7 @@ class Airframe(Pilot):
     def collide(self, name: str, position: torch.Tensor, point: torch.Tensor) -> None:
         """Note a collision, at a position, with the nearest point of an object. Shapes: (3,)."""
         radius = self.settings.radius
-        self.collisions.add(Collision.event(name, position, point, radius, self.time))
+        self.collisions.add(VehicleCollision.event(name, position, point, radius, self.time))
 
     def bump(self, other: "Airframe") -> None:
         """Let it and another vehicle of the same mass, which overlap, bounce off each other."""
@@ -381,7 +386,7 @@ class Airframe(Pilot):
         depth = 2.0 * self.settings.radius - distance
         for one, met, way in ((self, other, normal), (other, self, -normal)):
             contact = (one.body.position[0].tolist(), point.tolist(), way.tolist())
-            one.collisions.add(Collision(met.choice.name, *contact, depth, one.time))
+            one.collisions.add(VehicleCollision(met.choice.name, *contact, depth, one.time))
             one.body.position[0] += 0.5 * depth * way
             one.body.velocity[0] += push * way
 

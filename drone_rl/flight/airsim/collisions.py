@@ -18,7 +18,7 @@ _PARTS, _ROUNDS = 64, 6
 """Parts of a straight move that are tested at a time, and times that the search is narrowed."""
 
 
-class Collision(NamedTuple):
+class VehicleCollision(NamedTuple):
     """A contact of a vehicle. World frame, metres."""
 
     name: str
@@ -47,7 +47,7 @@ class Collision(NamedTuple):
 
 
 def collision_info(
-    found: Collision | None,
+    found: VehicleCollision | None,
     *,
     has_collided: bool,
     home: Sequence[float],
@@ -56,7 +56,7 @@ def collision_info(
 ) -> Map:
     """Return a CollisionInfo, relative to the start position `home`, of an object's number."""
     if found is None:
-        found = Collision("", home, home, (0.0, 0.0, 0.0), 0.0, 0.0)
+        found = VehicleCollision("", home, home, (0.0, 0.0, 0.0), 0.0, 0.0)
     point, place = (
         messages.vector(to_world([a - b for a, b in zip(value, home, strict=True)]))
         for value in (found.point, found.position)
@@ -82,9 +82,9 @@ class CollisionRecord:
 
     def __init__(self) -> None:
         """Create an empty record."""
-        self._contacts: dict[str, Collision] = {}
+        self._contacts: dict[str, VehicleCollision] = {}
         """Last contact with each object."""
-        self._unread: dict[str, Collision] = {}
+        self._unread: dict[str, VehicleCollision] = {}
         self.forget()
 
     def forget(self) -> None:
@@ -92,7 +92,7 @@ class CollisionRecord:
 
         A contact that lasts does not become new by that.
         """
-        self._last: Collision | None = None
+        self._last: VehicleCollision | None = None
         self._unread = {name: one for name, one in self._unread.items() if one.is_event}
 
     def move(self, touched: Collection[str], now: float) -> None:
@@ -106,7 +106,7 @@ class CollisionRecord:
             if name in touched and now - one.time <= GAP
         }
 
-    def add(self, found: Collision) -> None:
+    def add(self, found: VehicleCollision) -> None:
         """Note a contact."""
         earlier = self._contacts.get(found.name)
         self._contacts[found.name] = found
@@ -114,7 +114,7 @@ class CollisionRecord:
         if found.is_event or not lasts:
             self._last = self._unread[found.name] = found
 
-    def read(self, *, clear: bool = True) -> tuple[Collision | None, bool]:
+    def read(self, *, clear: bool = True) -> tuple[VehicleCollision | None, bool]:
         """Return an unread collision, else the last one, and whether it was unread.
 
         With `clear` it is then read.
@@ -124,7 +124,7 @@ class CollisionRecord:
             self._unread.pop(found.name, None)
         return found, is_unread
 
-    def read_current(self, now: float) -> tuple[Collision | None, bool]:
+    def read_current(self, now: float) -> tuple[VehicleCollision | None, bool]:
         """Return an unread event, else a contact that lasts at the vehicle's time `now`, seconds.
 
         See `read`; this is what clients of AirSim 1.1 expect.

@@ -176,9 +176,9 @@ def read_map(
     value: Any,
     name: str,
     keys: Sequence[str],
+    most: float = _LARGEST,
     *,
     can_be_nan: bool = False,
-    most: float = _LARGEST,
 ) -> list[float]:
     """Return the numbers of a map, in the order of `keys`; other keys are ignored.
 
@@ -196,10 +196,10 @@ def read_map(
 
 
 def read_vector(
-    value: Any, name: str, *, can_be_nan: bool = False, most: float = _LARGEST
+    value: Any, name: str, most: float = _LARGEST, *, can_be_nan: bool = False
 ) -> list[float]:
     """Return the numbers of a Vector3r; errors as of `read_map`."""
-    return read_map(value, name, ("x_val", "y_val", "z_val"), can_be_nan=can_be_nan, most=most)
+    return read_map(value, name, ("x_val", "y_val", "z_val"), most, can_be_nan=can_be_nan)
 
 
 def read_attitude(value: Any, name: str, *, can_be_nan: bool = False) -> list[float]:

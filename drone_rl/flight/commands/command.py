@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.sim.dynamics import FlightState, Goals, Mode
+from drone_rl.sim.dynamics import FlightGoals, FlightState, Mode
 from drone_rl.sim.dynamics.control import Modes, rotor_goals
 from drone_rl.utils.errors import InputError
 
@@ -42,7 +42,7 @@ class Command(abc.ABC):
     """Whether running until the limit is success, as for a movement of given duration."""
 
     @abc.abstractmethod
-    def goals(self, body: FlightState) -> Goals:
+    def goals(self, body: FlightState) -> FlightGoals:
         """Return the goals for the next control period."""
 
     def is_complete(self, body: FlightState) -> Tensor:
@@ -68,7 +68,7 @@ def goals_of(
     y: float | Tensor,
     heading: float | Tensor,
     z: float | Tensor,
-) -> Goals:
+) -> FlightGoals:
     """Build goals from scalars (for all drones) or tensors of shape (num_envs,).
 
     A value is what its mode says: a position, velocity, angle or rate.
@@ -76,17 +76,17 @@ def goals_of(
     given, count = (x, y, heading, z), len(body)
     if count == 1 and body.numbers.device.type == "cpu":
         row = np.array([[float(value) for value in given]])
-        return Goals(modes, torch.from_numpy(row))  # in each control period; a tenth of the time
+        return FlightGoals(modes, torch.from_numpy(row))  # a tenth of the time, in each period
     values = (torch.as_tensor(value, dtype=torch.float64) for value in given)
-    return Goals(modes, torch.stack([value.expand(count) for value in values], -1))
+    return FlightGoals(modes, torch.stack([value.expand(count) for value in values], -1))
 
 
-def hold(reference: Tensor) -> Goals:
+def hold(reference: Tensor) -> FlightGoals:
     """Return goals that hold a pose. Shape: (num_envs, 4), as in `FlightState.reference`."""
-    return Goals(HOLD, reference)
+    return FlightGoals(HOLD, reference)
 
 
-def all_rotors(thrust: float) -> Goals:
+def all_rotors(thrust: float) -> FlightGoals:
     """Return goals for one drone whose rotors all have this fraction of full thrust."""
     return rotor_goals(torch.full((1, 4), thrust, dtype=torch.float64))
 
@@ -96,11 +96,11 @@ class TimedCommand(Command):
 
     succeeds_at_limit = True
 
-    def __init__(self, goals: Callable[[FlightState], Goals], duration: float) -> None:
+    def __init__(self, goals: Callable[[FlightState], FlightGoals], duration: float) -> None:
         """Take the goals of each control period, and the duration in seconds."""
         self._goals, self.limit = goals, duration
 
-    def goals(self, body: FlightState) -> Goals:
+    def goals(self, body: FlightState) -> FlightGoals:
         """See `Command`."""
         return self._goals(body)
 
@@ -114,7 +114,7 @@ class Hover(Command):
         """Take the state at the start and the duration in seconds."""
         self.reference, self.limit = body.reference.clone(), duration
 
-    def goals(self, body: FlightState) -> Goals:
+    def goals(self, body: FlightState) -> FlightGoals:
         """See `Command`."""
         del body
         return hold(self.reference)
@@ -156,7 +156,7 @@ class RotateByCommand(Hover):
         super().__init__(body, duration)
         self.rate = rate
 
-    def goals(self, body: FlightState) -> Goals:
+    def goals(self, body: FlightState) -> FlightGoals:
         """See `Command`."""
         x, y, _, z = self.reference.unbind(-1)
         modes = (Mode.POSITION, Mode.POSITION, Mode.RATE, Mode.POSITION)
@@ -177,7 +177,7 @@ class Land(Command):
         self.limit, self.reference = limit, body.reference.clone()
         self._stopped = torch.zeros(len(body), dtype=torch.int64)
 
-    def goals(self, body: FlightState) -> Goals:
+    def goals(self, body: FlightState) -> FlightGoals:
         """See `Command`."""
         x, y, heading, _ = self.reference.unbind(-1)
         modes = (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.VELOCITY)

@@ -26,7 +26,7 @@ from drone_rl.flight.commands.path_following import GoHomeCommand
 from drone_rl.flight.commands.state import LandedState, PilotState, Sensors, Trajectory
 from drone_rl.flight.image_types import ImageRequest, images
 from drone_rl.sim.coordinates import attitude_of
-from drone_rl.sim.dynamics import FlightState, Goals, Obstacles, Quadrotor
+from drone_rl.sim.dynamics import FlightGoals, FlightState, Obstacles, Quadrotor
 from drone_rl.sim.dynamics import state as fs
 from drone_rl.sim.dynamics.state import twist_about_z
 from drone_rl.sim.entities import FRONT_CENTER, find_camera
@@ -130,7 +130,7 @@ class Drone:
         self.trajectory.append(self.time, self.body)
         self._sensors = None if sensors is None else Sensors(self.body, sensors, self._seed)
         self._is_armed, self._landed = False, LandedState.LANDED
-        self._goals: Goals | None = None
+        self._goals: FlightGoals | None = None
         """Goals of the current control period."""
         self._left = 0
         """Remaining ticks of the period."""
@@ -318,7 +318,7 @@ class Drone:
                 if self._left == 0:
                     self._check(self.running)
 
-    def _next_goals(self) -> Goals | None:
+    def _next_goals(self) -> FlightGoals | None:
         """Return the goals of the next control period; None for idle rotors."""
         if self.running is not None:
             return self.running.command.goals(self.body)
@@ -331,7 +331,7 @@ class Drone:
             self._place = self.body.settled().reference.clone()
         return hold(self._place)
 
-    def _fly(self, goals: Goals | None, ticks: int) -> None:
+    def _fly(self, goals: FlightGoals | None, ticks: int) -> None:
         if self.is_computer_vision:
             self.body.numbers[:, fs.TICKS] += ticks
             self._record(ticks)

@@ -16,7 +16,7 @@ from drone_rl.config.dynamics import GRAVITY
 from drone_rl.flight.commands.checks import degrees
 from drone_rl.flight.commands.command import ACCURACY, PERIOD, Command, Land
 from drone_rl.sim.coordinates import to_simulator
-from drone_rl.sim.dynamics import FlightState, Goals, Mode
+from drone_rl.sim.dynamics import FlightGoals, FlightState, Mode
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Flag, OneOf
 
@@ -65,7 +65,7 @@ class YawMode:
 
 
 class YawControl:
-    """Computes the heading goal, the third of the four `Goals.values`, in each control period."""
+    """Computes the third of the four `FlightGoals.values`, the heading, in each control period."""
 
     def __init__(
         self,
@@ -144,7 +144,7 @@ class PathCommand(Command):
         level = last[:, :2].norm(dim=-1)
         self.braking = level * braking + (1.0 - level) * _VERTICAL_BRAKING
 
-    def goals(self, body: FlightState) -> Goals:
+    def goals(self, body: FlightState) -> FlightGoals:
         """See `Command`."""
         position, paths = body.position, self.paths
         self.along = nearest(paths, position, self.along, self.along + self._ahead)
@@ -159,7 +159,7 @@ class PathCommand(Command):
         climb = self._pace(paths.lengths - self.along)
         drift[:, 3] = climb * direction_at(paths, self.along)[:, 2]
         modes = (Mode.VELOCITY, Mode.VELOCITY, self.yaw_control.mode, Mode.POSITION)
-        return Goals(modes, values, drift)
+        return FlightGoals(modes, values, drift)
 
     def is_complete(self, body: FlightState) -> Tensor:
         """Return which drones are near the last point, with the end of the path in lookahead."""
@@ -207,7 +207,7 @@ class GoHomeCommand(Command):
         self._path = path
         self._landing: Land | None = None
 
-    def goals(self, body: FlightState) -> Goals:
+    def goals(self, body: FlightState) -> FlightGoals:
         """See `Command`."""
         return (self._landing or self._path).goals(body)
 

@@ -33,7 +33,7 @@ from drone_rl.flight.commands.path_following import (
     braking_time,
 )
 from drone_rl.sim.coordinates import to_simulator
-from drone_rl.sim.dynamics import FlightState, Goals, Mode
+from drone_rl.sim.dynamics import FlightGoals, FlightState, Mode
 from drone_rl.sim.dynamics.control import Modes, rotor_goals
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance, OneOf, Real
@@ -236,7 +236,7 @@ class Pilot(SceneDrone):
         modes: Modes = (sideways, sideways, control.mode, up_mode)
         travel = torch.tensor([[x, y, 0.0]], dtype=torch.float64)
 
-        def goals(body: FlightState) -> Goals:
+        def goals(body: FlightState) -> FlightGoals:
             return goals_of(body, modes, x, y, control.goal(travel), height)
 
         command = TimedCommand(goals, checks.DURATION.read(duration, "duration"))
@@ -336,7 +336,7 @@ class Pilot(SceneDrone):
         modes: Modes = (Mode.VELOCITY, Mode.VELOCITY, control.mode, Mode.POSITION)
         cos, sin = self.body.heading.cos(), self.body.heading.sin()
 
-        def goals(body: FlightState) -> Goals:
+        def goals(body: FlightState) -> FlightGoals:
             sticks = Instance(Sticks).read(self.sticks, "sticks")
             forward, left = sticks.pitch * fastest[0], -sticks.roll * fastest[1]
             x, y = cos * forward - sin * left, sin * forward + cos * left
@@ -348,7 +348,9 @@ class Pilot(SceneDrone):
         command = TimedCommand(goals, checks.DURATION.read(duration, "duration"))
         return self._run("move_by_manual", command, wait)
 
-    def _hold(self, name: str, goals: Goals, duration: float, wait: bool) -> bool | FlightFuture:
+    def _hold(
+        self, name: str, goals: FlightGoals, duration: float, wait: bool
+    ) -> bool | FlightFuture:
         """Keep the same goals for some seconds."""
         return self._run(
             name, TimedCommand(lambda body: goals, checks.DURATION.read(duration, "duration")), wait

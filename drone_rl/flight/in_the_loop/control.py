@@ -11,7 +11,7 @@ import numpy as np
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.flight.in_the_loop.instruments import Readings, Vector, first_row
-from drone_rl.sim.dynamics import Goals, Mode
+from drone_rl.sim.dynamics import FlightGoals, Mode
 from drone_rl.sim.dynamics.control import HEADING, Y, Z
 from drone_rl.utils.errors import InputError
 
@@ -121,7 +121,7 @@ def sticks_for(
 
 
 def setpoint_of(
-    goals: Goals, since: float, readings: Readings, settings: DynamicsSettings
+    goals: FlightGoals, since: float, readings: Readings, settings: DynamicsSettings
 ) -> Setpoint:
     """Convert the first drone's goals to a setpoint, as the cascade of internal controllers does.
 

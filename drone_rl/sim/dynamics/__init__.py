@@ -1,6 +1,6 @@
 """Vehicle dynamics: states of drones, and the next state after an action."""
 
-from drone_rl.sim.dynamics.control import Goals as Goals
+from drone_rl.sim.dynamics.control import FlightGoals as FlightGoals
 from drone_rl.sim.dynamics.control import Mode as Mode
 from drone_rl.sim.dynamics.dynamics import ComputerVision as ComputerVision
 from drone_rl.sim.dynamics.dynamics import Dynamics as Dynamics

@@ -12,7 +12,7 @@ from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.dynamics.state import FlightState
 
 X, Y, HEADING, Z = range(4)
-"""Axes of `Goals`; the first two are roll and pitch if their mode is an angle or a rate."""
+"""Axes of `FlightGoals`; the first two are roll and pitch if their mode is an angle or a rate."""
 
 
 class Mode(enum.IntEnum):
@@ -38,7 +38,7 @@ Modes = tuple[Mode, Mode, Mode, Mode]
 
 
 @dataclasses.dataclass(frozen=True)
-class Goals:
+class FlightGoals:
     """Goals of drones' controllers, all in the same modes."""
 
     modes: Modes
@@ -61,9 +61,9 @@ class Goals:
         return torch.where(torch.tensor(has_target), target, body.settled().reference)
 
 
-def rotor_goals(rotors: Tensor) -> Goals:
+def rotor_goals(rotors: Tensor) -> FlightGoals:
     """Return goals that set rotors directly. Shape: (num_envs, 4)."""
-    return Goals((Mode.ROTOR, Mode.ROTOR, Mode.ROTOR, Mode.ROTOR), rotors)
+    return FlightGoals((Mode.ROTOR, Mode.ROTOR, Mode.ROTOR, Mode.ROTOR), rotors)
 
 
 class Moves:
@@ -82,12 +82,12 @@ class Moves:
         self.drifts *= settings.move_speed
         """Speed of the target for each move, metres a second. Shape: (moves, 4)."""
 
-    def goals(self, body: FlightState, action: Tensor) -> Goals:
+    def goals(self, body: FlightState, action: Tensor) -> FlightGoals:
         """Return the goals until the next action. `action`: (num_envs,)."""
         place = body.position[:, :2]
         wanted = body.reference.clone()
         wanted[:, :2] = place + (wanted[:, :2] - place).clamp(-self.lead, self.lead)
-        return Goals(self.MODES, wanted, self.drifts.to(action.device)[action])
+        return FlightGoals(self.MODES, wanted, self.drifts.to(action.device)[action])
 
 
 class Velocities:
@@ -98,7 +98,7 @@ class Velocities:
     def __init__(self, settings: ActionSettings) -> None:
         self.actions = ContinuousActions.of(settings)
 
-    def goals(self, body: FlightState, action: Tensor) -> Goals:
+    def goals(self, body: FlightState, action: Tensor) -> FlightGoals:
         """Return the goals until the next action. `action`: (num_envs, 3)."""
         height = body.reference[:, 3:]
-        return Goals(self.MODES, torch.cat([self.actions.to_rates(action), height], -1))
+        return FlightGoals(self.MODES, torch.cat([self.actions.to_rates(action), height], -1))

@@ -102,7 +102,7 @@ def mix(throttle: float, torque: wp.vec3) -> wp.vec4:
 
 @wp.struct
 class Goal:
-    """Goal of one drone, see `Goals`; positions count from where the command began."""
+    """Goal of one drone, see `FlightGoals`; positions count from where the command began."""
 
     modes: wp.vec4i
     values: wp.vec4

@@ -8,7 +8,7 @@ import warp as wp
 
 from drone_rl.sim.dynamics import rigid_body_kernel as rigid
 from drone_rl.sim.dynamics import state as fs
-from drone_rl.sim.dynamics.control import Goals, Mode
+from drone_rl.sim.dynamics.control import FlightGoals, Mode
 from drone_rl.sim.dynamics.control_kernel import Goal, climb_memory, climb_missing, rotors_wanted
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -34,7 +34,7 @@ class FlightCommand:
 
 def make_command(
     frame: rigid.AirframeNumbers,
-    goals: Goals,
+    goals: FlightGoals,
     ticks: int = 1,
     obstacles: fs.Obstacles | None = None,
 ) -> FlightCommand:
@@ -290,7 +290,7 @@ def _write_touch(
 
 @wp.func
 def _write_reference(command: FlightCommand, after: wp.array2d[wp.float64], world: int) -> None:
-    """Write the reference after a command, see `Goals.reference_after`."""
+    """Write the reference after a command, see `FlightGoals.reference_after`."""
     seconds = wp.float64(command.frame.tick) * wp.float64(command.ticks)
     for axis in range(4):
         reference = command.goals[world, axis] + seconds * command.drifts[world, axis]

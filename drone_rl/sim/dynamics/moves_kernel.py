@@ -5,7 +5,7 @@ import warp as wp
 from torch import Tensor
 
 from drone_rl.sim.dynamics import state as fs
-from drone_rl.sim.dynamics.control import Goals, Moves
+from drone_rl.sim.dynamics.control import FlightGoals, Moves
 from drone_rl.sim.dynamics.flight_kernel import FlightCommand, four, make_command, run
 from drone_rl.sim.dynamics.quadrotor import Quadrotor
 
@@ -73,7 +73,7 @@ def make_fleet(quadrotor: Quadrotor | None, numbers: Tensor) -> Fleet:
         steering = quadrotor.steering
         assert isinstance(steering, Moves)
         zeros = torch.zeros(2, len(numbers), 4, dtype=torch.float64)
-        goals = Goals(steering.MODES, *zeros)
+        goals = FlightGoals(steering.MODES, *zeros)
         fleet.command = make_command(quadrotor.frame, goals, quadrotor.settings.control_ticks)
         fleet.lead = steering.lead
         fleet.is_gimballed = int(quadrotor.mount == "gimbal")

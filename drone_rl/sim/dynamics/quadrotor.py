@@ -10,7 +10,7 @@ from torch import Tensor
 from drone_rl.config import ActionSettings, DynamicsSettings
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import flight_kernel
-from drone_rl.sim.dynamics.control import Goals, Moves, Velocities, rotor_goals
+from drone_rl.sim.dynamics.control import FlightGoals, Moves, Velocities, rotor_goals
 from drone_rl.sim.dynamics.rigid_body_kernel import make_airframe
 from drone_rl.sim.dynamics.state import CLIMB_INTEGRAL, BodyState, FlightState, Obstacles
 from drone_rl.sim.rendering.devices import WorkerPool, on_torch_stream, start_warp
@@ -60,7 +60,7 @@ class Quadrotor:
         return self.fly(body, rotor_goals(rotors), ticks)
 
     def fly(
-        self, body: FlightState, goals: Goals, ticks: int, obstacles: Obstacles | None = None
+        self, body: FlightState, goals: FlightGoals, ticks: int, obstacles: Obstacles | None = None
     ) -> FlightState:
         """Return the drones after ticks under their controllers; `body` stays as it is."""
         device, count = body.numbers.device, len(body)

@@ -7,7 +7,7 @@ import warp as wp
 
 from drone_rl.config import ActionSettings, DynamicsSettings
 from drone_rl.sim.dynamics import flight_kernel
-from drone_rl.sim.dynamics.control import Goals
+from drone_rl.sim.dynamics.control import FlightGoals
 from drone_rl.sim.dynamics.quadrotor import Quadrotor, load_kernels
 from drone_rl.sim.dynamics.state import NUMBERS, FlightState, Obstacles
 
@@ -32,7 +32,7 @@ class SingleQuadrotor(Quadrotor):
         self._launch: Any = None
 
     def fly(
-        self, body: FlightState, goals: Goals, ticks: int, obstacles: Obstacles | None = None
+        self, body: FlightState, goals: FlightGoals, ticks: int, obstacles: Obstacles | None = None
     ) -> FlightState:
         """See `Quadrotor`."""
         if len(body) != 1 or body.numbers.device.type != "cpu":
@@ -50,13 +50,13 @@ class SingleQuadrotor(Quadrotor):
         self._launch.launch()
         return FlightState(self._after.clone())
 
-    def _prepare(self, goals: Goals, ticks: int, obstacles: Obstacles | None) -> None:
+    def _prepare(self, goals: FlightGoals, ticks: int, obstacles: Obstacles | None) -> None:
         load_kernels("cpu")
         around = None
         if obstacles is not None:
             self._centers = torch.empty_like(obstacles.centers)
             around = Obstacles(self._centers, obstacles.half_sizes)
-        held = Goals(goals.modes, self._values, self._drifts)
+        held = FlightGoals(goals.modes, self._values, self._drifts)
         command = flight_kernel.make_command(self.frame, held, ticks, around)
         arrays = [wp.from_torch(numbers) for numbers in (self._before, self._after)]
         self._launch = wp.launch(

@@ -20,13 +20,14 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from drone_rl.config.commands import PlacesSettings
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.tasks.common import SIDES
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.action_table import workers
 from drone_rl.verification.prover.arrangement import SAME, Arrangement, Pieces, Window, arrange
 from drone_rl.verification.prover.boxes import unite
-from drone_rl.verification.prover.cube_images import NOTHING, UNIT, CameraModel
+from drone_rl.verification.prover.cube_images import NOTHING, UNIT, CameraModel, CubeImages
 
 RenderFaces = Callable[[NDArray[np.uint8]], Tensor]  # faces to the network's input (N, C, H, W)
 
@@ -105,6 +106,27 @@ class ActionMap:
             "ends": np.cumsum([len(polygon) for _, polygon in outlines]),
             "labels": np.array([label for label, _ in outlines]),
         }
+
+
+def map_policy(
+    images: CubeImages,
+    transform: Callable[[Tensor], Tensor],
+    network: nn.Module,
+    settings: PlacesSettings,
+) -> ActionMap:
+    """Compute the map of a policy, whose `transform` makes observations of RGB images.
+
+    Raises:
+        InputError: See `map_actions`.
+    """
+    return map_actions(
+        images.camera,
+        Window(settings.nearest, settings.farthest, settings.sideways),
+        lambda faces: transform(images.paint(faces)),
+        network.eval(),
+        touch_distance=images.lattice.task.touch_distance,
+        most_cells=settings.most_cells,
+    )
 
 
 def map_actions(

@@ -139,7 +139,7 @@ class CubeImages:
 
     def __init__(self, worlds: Worlds, lattice: Lattice, camera: CameraModel) -> None:
         """Read the colors of the faces; raise InputError if one is not visible."""
-        self._worlds, self._lattice, self._camera = worlds, lattice, camera
+        self._worlds, self.lattice, self.camera = worlds, lattice, camera
         task = lattice.task
         self.num_cubes = task.num_cubes
         nowhere = np.zeros((1, task.num_cubes))
@@ -153,7 +153,7 @@ class CubeImages:
             np.array([[steps, 0]] * 3),
             np.arange(task.num_cubes) != 0,
         )
-        ahead = self._lattice.cubes[0] - steps * task.step_length - camera_ahead()
+        ahead = self.lattice.cubes[0] - steps * task.step_length - camera_ahead()
         faces = camera.faces(ahead, left)
         for face in (FRONT, LEFT_SIDE, RIGHT_SIDE):
             shown = images[torch.from_numpy(faces == face)]
@@ -188,9 +188,9 @@ class CubeImages:
         steps ahead and to the left (N, 2). Hidden cubes are left out, by default those that the
         drone has touched or passed.
         """
-        task = self._lattice.task
+        task = self.lattice.task
         hidden = self._gone(cubes, places) if hidden is None else hidden
-        x = np.broadcast_to(self._lattice.cubes, cubes.shape)
+        x = np.broadcast_to(self.lattice.cubes, cubes.shape)
         where = np.stack([x, cubes, np.full(cubes.shape, task.altitude)], -1)
         state = cast(WorldState, self._worlds.start(torch.from_numpy(where)))
         state.body.position[:, :2] = torch.from_numpy(places[:, :2] * task.step_length)
@@ -206,23 +206,26 @@ class CubeImages:
         is_clear = np.ones(count, bool)
         gone = self._gone(cubes, places)
         for k in reversed(range(cubes.shape[1])):
-            ahead = self._lattice.cubes[k] - places[:, 0] * self._lattice.task.step_length
-            left = cubes[:, k] - places[:, 1] * self._lattice.task.step_length
+            ahead = self.lattice.cubes[k] - places[:, 0] * self.lattice.task.step_length
+            left = cubes[:, k] - places[:, 1] * self.lattice.task.step_length
             for distance in np.unique(ahead):
                 those = np.flatnonzero((ahead == distance) & ~gone[:, k])
                 if not len(those):
                     continue
                 seen = distance - camera_ahead()
-                faces = self._camera.faces(seen, left[those])
+                faces = self.camera.faces(seen, left[those])
                 shown[those] = np.where(faces == NOTHING, shown[those], faces)
-                borders, errors = self._camera.borders(seen)
+                borders, errors = self.camera.borders(seen)
                 if len(borders):
                     near = np.abs(left[those, None] - borders) <= errors
                     is_clear[those] &= ~near.any(-1)
-                is_clear[those] &= not self._camera.grazed(seen).any()
-        colored = self.colors.numpy()[shown]
-        images = np.where((shown == NOTHING)[..., None], self.background.numpy(), colored)
-        return torch.from_numpy(images), is_clear
+                is_clear[those] &= not self.camera.grazed(seen).any()
+        return self.paint(shown), is_clear
+
+    def paint(self, faces: NDArray[np.uint8]) -> Tensor:
+        """Return RGB images (N, height, width, 3), uint8, of the face that each pixel shows."""
+        shown = torch.from_numpy(faces).long()
+        return torch.where((shown == NOTHING)[..., None], self.background, self.colors[shown])
 
     def check(self, count: int, random_state: np.random.RandomState) -> int:
         """Compare random images with the closed form; return how many were on no border.
@@ -230,7 +233,7 @@ class CubeImages:
         Raises:
             InputError: They differ.
         """
-        task, compared = self._lattice.task, 0
+        task, compared = self.lattice.task, 0
         farthest = int(task.front_bound / task.step_length)
         widest = int((task.lateral_bound + 2 * task.touch_distance) / task.step_length)
         for begin in range(0, count, 2000):
@@ -255,8 +258,8 @@ class CubeImages:
 
     def _gone(self, cubes: NDArray[np.float64], places: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Return which cubes the drone has touched or passed. Shape: (N, num_cubes)."""
-        task = self._lattice.task
-        ahead = self._lattice.cubes - places[:, :1] * task.step_length
+        task = self.lattice.task
+        ahead = self.lattice.cubes - places[:, :1] * task.step_length
         left = cubes - places[:, 1:] * task.step_length
         return (ahead < 0) | (np.maximum(np.abs(ahead), np.abs(left)) <= task.touch_distance)
 

@@ -20,7 +20,7 @@ def commands():
 @pytest.fixture(scope="session")
 def registered():
     """Schemas of all commands."""
-    register_schemas(**commands())
+    register_schemas(commands())
 
 
 @pytest.fixture(scope="session")

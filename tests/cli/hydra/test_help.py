@@ -60,7 +60,7 @@ def test_help_of_a_group_or_setting_shows_only_that(config, capsys):
 @pytest.mark.parametrize("name", TABLE)
 def test_examples_are_command_lines_of_the_command(name):
     command, lines = name.replace("-", "_"), [line for line, _ in TABLE[name]["examples"]]
-    register_schemas(**{command: find_command(name)})
+    register_schemas({command: find_command(name)})
     for line in lines:
         first, second, *words = line.split()
         assert (first, second) == ("drone-rl", name)
@@ -89,7 +89,7 @@ def test_next_commands_exist_with_these_settings(name, tmp_path):
     for line in lines:
         if line.startswith("  drone-rl"):
             command, *words = line.split()[1:]
-            register_schemas(**{command: find_command(command)})
+            register_schemas({command: find_command(command)})
             composed(command, CONF, words)
 
 

@@ -5,14 +5,14 @@ import math
 import pytest
 import torch
 
-from drone_rl.flight.airsim.collisions import GAP, Collision, CollisionRecord, Solids
+from drone_rl.flight.airsim.collisions import GAP, CollisionRecord, Solids, VehicleCollision
 
 ORIGIN, UP = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 PERIOD = 0.021
 
 
 def contact(name, time, *, is_event=False):
-    return Collision(name, ORIGIN, ORIGIN, UP, 0.0, time, is_event)
+    return VehicleCollision(name, ORIGIN, ORIGIN, UP, 0.0, time, is_event)
 
 
 def names(read):

@@ -9,7 +9,7 @@ import torch
 from drone_rl.config import ActionSettings, DynamicsSettings
 from drone_rl.flight.in_the_loop.control import setpoint_of
 from drone_rl.flight.in_the_loop.instruments import Readings
-from drone_rl.sim.dynamics import FlightState, Goals, Mode, Quadrotor
+from drone_rl.sim.dynamics import FlightGoals, FlightState, Mode, Quadrotor
 from drone_rl.utils.errors import InputError
 
 SETTINGS = DynamicsSettings(mode="simple_flight")
@@ -50,14 +50,14 @@ def test_speeds_go_with_the_heading():
 
 def test_velocities_of_the_world():
     modes = (Mode.VELOCITY, Mode.VELOCITY, Mode.ANGLE, Mode.VELOCITY)
-    told = Goals(modes, torch.tensor([[1.0, 2.0, 0.3, 9.0]], dtype=torch.float64))
+    told = FlightGoals(modes, torch.tensor([[1.0, 2.0, 0.3, 9.0]], dtype=torch.float64))
     setpoint = setpoint_of(told, 1.0, readings(heading=1.0), SETTINGS)
     assert (*setpoint.velocity, setpoint.heading) == pytest.approx((1.0, 2.0, 4.0, 0.3))
 
 
 def test_angles_are_no_setpoint():
     modes = (Mode.ANGLE, Mode.ANGLE, Mode.RATE, Mode.THROTTLE)
-    told = Goals(modes, torch.zeros(1, 4, dtype=torch.float64))
+    told = FlightGoals(modes, torch.zeros(1, 4, dtype=torch.float64))
     with pytest.raises(InputError, match="angle, angle, rate, throttle are no setpoint"):
         setpoint_of(told, 0.0, readings(), SETTINGS)
 

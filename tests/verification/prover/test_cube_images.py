@@ -109,7 +109,7 @@ def test_cube_view(images):
     left = np.array([-1.0, 0.0, 30.0], np.float32)
     rendered = one.render(left)
     faces = one.read(rendered)
-    assert (faces == images._camera.faces(3.6, left.astype(float))).all()
+    assert (faces == images.camera.faces(3.6, left.astype(float))).all()
     assert faces[1, 12, 32] == FRONT and (faces[2] == NOTHING).all()
 
 

@@ -1,7 +1,6 @@
 """Methods that report, or set, where cameras are and what they see."""
 
 import dataclasses
-import functools
 import math
 from typing import Any
 
@@ -18,7 +17,7 @@ from drone_rl.flight.airsim.messages import (
     text,
     to_world,
 )
-from drone_rl.flight.airsim.methods.registry import SIM_VEHICLE, given, vehicle_method
+from drone_rl.flight.airsim.methods.registry import given, sim_vehicle_method
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.flight.image_types import ImageType
 from drone_rl.sim.entities import find_camera
@@ -34,8 +33,6 @@ def read_camera(value: Any, name: str = "camera_name") -> str:
 
 
 CAMERA = given(read_camera, "camera_name")
-camera_method = functools.partial(vehicle_method, vehicle=SIM_VEHICLE)
-"""Like `vehicle_method`; errors name the vehicle's Sim-API."""
 
 
 def camera_in_world(vehicle: Vehicle, camera: str) -> Pose:
@@ -45,13 +42,13 @@ def camera_in_world(vehicle: Vehicle, camera: str) -> Pose:
     return Pose.of(vehicle.place_of(state) - vehicle.home, turn)
 
 
-@camera_method("getCameraInfo", CAMERA)
+@sim_vehicle_method("getCameraInfo", CAMERA)
 def _camera_pose(vehicle: Vehicle, camera: str) -> Map:
     fov = vehicle.cameras[camera].capture(ImageType.SCENE).fov
     return {"pose": messages.pose(camera_in_world(vehicle, camera)), "fov": fov}
 
 
-@camera_method("simGetCameraInfo", CAMERA)
+@sim_vehicle_method("simGetCameraInfo", CAMERA)
 def _camera_info(vehicle: Vehicle, camera: str) -> Map:
     capture = vehicle.cameras[camera].capture(ImageType.SCENE)
     matrix = _projection(capture.fov, capture.width, capture.height)
@@ -72,26 +69,27 @@ def _projection(fov: float, width: int, height: int) -> list[list[float]]:
     ]
 
 
-def change_camera(vehicle: Vehicle, camera: str, **changes: Any) -> None:
-    """Change a camera of a vehicle."""
+def change_camera(vehicle: Vehicle, camera: str, changes: Map) -> None:
+    """Change fields of the state of a vehicle's camera."""
     vehicle.cameras[camera] = dataclasses.replace(vehicle.cameras[camera], **changes)
 
 
-@camera_method("simSetCameraPose", CAMERA, given(read_pose, "pose"))
+@sim_vehicle_method("simSetCameraPose", CAMERA, given(read_pose, "pose"))
 def _set_camera_pose(vehicle: Vehicle, camera: str, pose: Pose) -> None:
     state = vehicle.cameras[camera]
     whole = pose.merged(Pose.of(torch.tensor(state.position, dtype=torch.float64), state.attitude))
     attitude = attitude_to_world(whole.attitude)
-    change_camera(vehicle, camera, position=to_world(whole.position), attitude=attitude)
+    place = to_world(whole.position)
+    change_camera(vehicle, camera, {"position": place, "attitude": attitude})
 
 
-@camera_method(
+@sim_vehicle_method(
     "simSetCameraOrientation setCameraOrientation", CAMERA, given(read_attitude, "orientation")
 )
 def _set_camera_orientation(vehicle: Vehicle, camera: str, attitude: list[float]) -> None:
-    change_camera(vehicle, camera, attitude=attitude_to_world(attitude))
+    change_camera(vehicle, camera, {"attitude": attitude_to_world(attitude)})
 
 
-@camera_method("simSetCameraFov", CAMERA, given(number, "fov_degrees", 1.0, 170.0))
+@sim_vehicle_method("simSetCameraFov", CAMERA, given(number, "fov_degrees", 1.0, 170.0))
 def _set_camera_fov(vehicle: Vehicle, camera: str, fov: float) -> None:
-    change_camera(vehicle, camera, fov=fov)
+    change_camera(vehicle, camera, {"fov": fov})

@@ -7,8 +7,8 @@ import torch
 
 from drone_rl.flight.airsim import messages
 from drone_rl.flight.airsim.messages import MAX_NAME, Map, Pose, number, text, to_world, whole
-from drone_rl.flight.airsim.methods.cameras import CAMERA, camera_method, change_camera
-from drone_rl.flight.airsim.methods.registry import SIM_VEHICLE, given, method
+from drone_rl.flight.airsim.methods.cameras import CAMERA, change_camera
+from drone_rl.flight.airsim.methods.registry import SIM_VEHICLE, given, method, sim_vehicle_method
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.flight.image_types import ImageType
@@ -22,24 +22,24 @@ _OF_TYPE = (CAMERA, given(whole, "image_type", 0, 10))
 """A camera, and an image type, which does not matter."""
 
 
-@camera_method("simAddDetectionFilterMeshName", *_OF_TYPE, given(text, "mesh_name", MAX_NAME))
+@sim_vehicle_method("simAddDetectionFilterMeshName", *_OF_TYPE, given(text, "mesh_name", MAX_NAME))
 def _add_pattern(vehicle: Vehicle, camera: str, kind: int, pattern: str) -> None:
     known = vehicle.cameras[camera].detected
     if len(known) >= MAX_PATTERNS:
         raise InputError(
             f"a camera can have {MAX_PATTERNS} mesh names; call simClearDetectionMeshNames"
         )
-    change_camera(vehicle, camera, detected=(*known, pattern))
+    change_camera(vehicle, camera, {"detected": (*known, pattern)})
 
 
-@camera_method("simSetDetectionFilterRadius", *_OF_TYPE, given(number, "radius_cm", 0.0, 1e9))
+@sim_vehicle_method("simSetDetectionFilterRadius", *_OF_TYPE, given(number, "radius_cm", 0.0, 1e9))
 def _set_radius(vehicle: Vehicle, camera: str, kind: int, radius: float) -> None:
-    change_camera(vehicle, camera, detection_radius=radius / 100.0)
+    change_camera(vehicle, camera, {"detection_radius": radius / 100.0})
 
 
-@camera_method("simClearDetectionMeshNames", *_OF_TYPE)
+@sim_vehicle_method("simClearDetectionMeshNames", *_OF_TYPE)
 def _clear_patterns(vehicle: Vehicle, camera: str, kind: int) -> None:
-    change_camera(vehicle, camera, detected=())
+    change_camera(vehicle, camera, {"detected": ()})
 
 
 @method("simGetDetections", *_OF_TYPE, SIM_VEHICLE)

@@ -133,6 +133,6 @@ def _wait_on_last(simulation: Simulation) -> Any:
     return simulation.find("").running or True
 
 
-@vehicle_method("moveByRC setRCData", given(read_map, "rcdata", _STICKS, most=1.0))
+@vehicle_method("moveByRC setRCData", given(read_map, "rcdata", _STICKS, 1.0))
 def _by_rc(vehicle: Vehicle, values: list[float]) -> None:
     vehicle.sticks = Sticks(*values)

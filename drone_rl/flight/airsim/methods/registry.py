@@ -1,8 +1,9 @@
 """The registry of RPC methods: their names, arguments and functions."""
 
 import dataclasses
+import functools
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from drone_rl.flight.airsim.messages import text
 from drone_rl.flight.airsim.methods.support import UNSUPPORTED
@@ -23,11 +24,9 @@ class Argument:
     """What counts as sent where a client sends fewer arguments."""
 
 
-def given(
-    read: Callable[..., Any], name: str, *limits: Any, default: Any = _REQUIRED, **more: Any
-) -> Argument:
+def given(read: Callable[..., Any], name: str, *limits: Any, default: Any = _REQUIRED) -> Argument:
     """Return an argument that a reader of `messages` reads, such as `number` or `read_pose`."""
-    return Argument(lambda simulation, value: read(value, name, *limits, **more), default)
+    return Argument(lambda simulation, value: read(value, name, *limits), default)
 
 
 def _find(simulation: Simulation, value: Any, *, is_sim_api: bool = False) -> Any:
@@ -40,15 +39,13 @@ SIM_VEHICLE = Argument(lambda simulation, value: _find(simulation, value, is_sim
 """The same; errors name its Sim-API."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Method:
+class Method(NamedTuple):
     """How a method is called and computed."""
 
     compute: Callable[..., Any]
-    """Takes the simulation, or else the vehicle that the last argument names, and the others."""
+    """Takes the simulation and the arguments."""
     arguments: Sequence[Argument]
     """Surplus ones are ignored."""
-    is_of_vehicle: bool = False
 
 
 class UnknownMethodError(Exception):
@@ -57,26 +54,31 @@ class UnknownMethodError(Exception):
 
 METHODS: dict[str, Method] = {}
 """All methods, by their names."""
+_Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
-def method(names: str, *arguments: Argument) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def method(names: str, *arguments: Argument) -> _Decorator:
     """Register a function of a simulation and arguments under names, which spaces separate."""
-    return _register(names, arguments, is_of_vehicle=False)
 
-
-def vehicle_method(
-    names: str, *arguments: Argument, vehicle: Argument = VEHICLE
-) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Register a function of a vehicle and arguments; clients send the vehicle's name last."""
-    return _register(names, (*arguments, vehicle), is_of_vehicle=True)
-
-
-def _register(names: str, arguments: Sequence[Argument], *, is_of_vehicle: bool) -> Any:
     def register(compute: Callable[..., Any]) -> Callable[..., Any]:
-        METHODS.update(dict.fromkeys(names.split(), Method(compute, arguments, is_of_vehicle)))
+        METHODS.update(dict.fromkeys(names.split(), Method(compute, arguments)))
         return compute
 
     return register
+
+
+def vehicle_method(names: str, *arguments: Argument, vehicle: Argument = VEHICLE) -> _Decorator:
+    """Register a function of a vehicle and arguments; clients send the vehicle's name last."""
+
+    def register(compute: Callable[..., Any]) -> Callable[..., Any]:
+        method(names, *arguments, vehicle)(lambda _, *values: compute(values[-1], *values[:-1]))
+        return compute
+
+    return register
+
+
+sim_vehicle_method = functools.partial(vehicle_method, vehicle=SIM_VEHICLE)
+"""Like `vehicle_method`; errors name the vehicle's Sim-API."""
 
 
 def call(simulation: Simulation, name: str, args: Sequence[Any]) -> Any:
@@ -96,8 +98,7 @@ def call(simulation: Simulation, name: str, args: Sequence[Any]) -> Any:
         least = sum(argument.default is _REQUIRED for argument in found.arguments)
         raise InputError(f"{name} was called with {len(args)} arguments; give {least} or more")
     values = [a.read(simulation, v) for a, v in zip(found.arguments, sent, strict=False)]
-    first = values.pop() if found.is_of_vehicle else simulation
-    result = found.compute(first, *values)
+    result = found.compute(simulation, *values)
     simulation.settle()  # it may have ended other calls, as cancelLastTask and simPause do
     if isinstance(result, FlightFuture):
         return Wait(lambda: result.done, result.result)

@@ -98,7 +98,7 @@ def _set_id(simulation: Simulation, name: str, found: float, is_pattern: bool) -
     return simulation.stage.set_id(name, int(found), is_pattern=is_pattern)
 
 
-@method("simSetWind", given(read_vector, "wind", most=50.0))
+@method("simSetWind", given(read_vector, "wind", 50.0))
 def _set_wind(simulation: Simulation, wind: list[float]) -> None:
     simulation.set_wind(to_world(wind))
 

@@ -1,6 +1,5 @@
 """Methods that report, or set, the state of a vehicle."""
 
-import functools
 from typing import Any
 
 from drone_rl.flight.airsim import messages
@@ -10,6 +9,7 @@ from drone_rl.flight.airsim.methods.registry import (
     VEHICLE,
     given,
     method,
+    sim_vehicle_method,
     vehicle_method,
 )
 from drone_rl.flight.airsim.sensors import SENSORS
@@ -17,13 +17,11 @@ from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.sim.coordinates import GeoPoint
 
-_sim_vehicle_method = functools.partial(vehicle_method, vehicle=SIM_VEHICLE)
-
 vehicle_method("getMultirotorState")(Vehicle.multirotor_state)
 vehicle_method("getRotorStates")(Vehicle.rotor_states)
-_sim_vehicle_method("simGetVehiclePose simGetPose")(lambda vehicle: messages.pose(vehicle.pose))
-_sim_vehicle_method("simGetGroundTruthKinematics")(Vehicle.kinematics)
-_sim_vehicle_method("simGetCollisionInfo")(Vehicle.collision)
+sim_vehicle_method("simGetVehiclePose simGetPose")(lambda vehicle: messages.pose(vehicle.pose))
+sim_vehicle_method("simGetGroundTruthKinematics")(Vehicle.kinematics)
+sim_vehicle_method("simGetCollisionInfo")(Vehicle.collision)
 
 # of version 1.1
 vehicle_method("getCollisionInfo")(lambda vehicle: vehicle.collision(is_legacy=True))
@@ -77,7 +75,7 @@ _STRATOSPHERE = 11_000.0
 """Altitude in metres from which temperature and pressure count as constant."""
 
 
-@_sim_vehicle_method("simGetGroundTruthEnvironment")
+@sim_vehicle_method("simGetGroundTruthEnvironment")
 def _environment(vehicle: Vehicle) -> Map:
     altitude = min(vehicle.geo_point()["altitude"], _STRATOSPHERE)
     kelvin = 288.15 - 0.0065 * altitude
@@ -96,7 +94,7 @@ def _read_place(value: Any, name: str) -> GeoPoint:
     return GeoPoint(*read_map(value, name, ("latitude", "longitude", "altitude")))
 
 
-_sim_vehicle_method("simTestLineOfSightToPoint", given(_read_place, "point"))(Vehicle.sees)
+sim_vehicle_method("simTestLineOfSightToPoint", given(_read_place, "point"))(Vehicle.sees)
 
 
 @method(
