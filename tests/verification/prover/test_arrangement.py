@@ -24,7 +24,7 @@ EVERYWHERE = (-np.inf, np.inf)
 
 def test_a_cross_of_lines_through_one_point():
     found = cut((0, 0, *EVERYWHERE), (1, -2, *EVERYWHERE), (-1, 2, *EVERYWHERE))
-    assert found.num_cells == 6
+    assert len(found.cells) == 6
     assert sorted(found.areas()) == [2, 2, 2, 2, 4, 4]
 
 
@@ -77,7 +77,7 @@ def test_area_of_a_small_cell():
 def test_nearly_equal_points_are_merged():
     third = 1 / 3
     lines = [(s, -s * third - 1, *EVERYWHERE) for s in (-3, -1, 0.7, 2)]  # all through one point
-    assert cut(*lines).num_cells == 8
+    assert len(cut(*lines).cells) == 8
 
 
 def test_outlines_skip_straight_corners():
@@ -98,7 +98,8 @@ def test_too_many_cells_are_refused():
         cut(*lines, most=20)
 
 
-def test_unconnected_segments_are_an_error():
+def test_a_loop_is_a_cell_with_another_around_it():
     loop = [(0, -1, 1, 3), (0, 1, 1, 3)]
-    with pytest.raises(ArithmeticError, match="do not fill"):
-        cut(*loop, upright=[(1, -1, 1), (3, -1, 1)])
+    found = cut(*loop, upright=[(1, -1, 1), (3, -1, 1)])
+    assert sorted(found.areas()) == [4, 12]
+    assert len(found.outlines(found.areas().argsort())) == 3  # two of the cell around
