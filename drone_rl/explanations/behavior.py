@@ -149,13 +149,11 @@ def summarise_pairs(pairs: list[Pair], dataset: RolloutDataset) -> dict[str, Any
     }
 
 
-def find_loops(
-    flights: RolloutDataset, actions: Actions, min_reversals: int = 2
-) -> list[dict[str, int]]:
+def find_loops(flights: RolloutDataset, actions: Actions) -> list[dict[str, int]]:
     """Find stretches of an episode in which the drone moves back and forth.
 
-    Each is a run of reversible moves, of which at least `min_reversals` undo the one before: with
-    two, the drone is back where it was, and away again. No move undoes forward.
+    Each is a run of reversible moves, of which at least two undo the one before: the drone is
+    back where it was, and away again. No move undoes forward.
     """
     moves, episode = flights.tensor("actions"), flights.episode
     kept = {name: flights.tensor(name) for name in actions.fields()}
@@ -166,7 +164,7 @@ def find_loops(
     loops = []
     for start, end in zip(starts, [*starts[1:], len(moves)], strict=True):
         reversals = int(turns[start : end - 1].sum())
-        if reversals >= min_reversals and reversible[start]:
+        if reversals >= 2 and reversible[start]:
             loop = {"first": int(start), "length": int(end - start), "reversals": reversals}
             loops.append(loop)
     return loops

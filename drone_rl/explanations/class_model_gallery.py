@@ -19,7 +19,6 @@ from drone_rl.explanations.class_models import (
     values_of,
     visualise,
 )
-from drone_rl.explanations.hooks import actions_of
 from drone_rl.explanations.rollouts import collect
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.explanations.settings import (
@@ -190,7 +189,7 @@ def class_models(
         subject,
         {t: visualise(network, statistics, one, seed=seed.value) for t, one in tried.items()},
         statistics,
-        shown_actions({"actions": actions_of(network).as_dict()}),
+        shown_actions({"actions": network.actions.as_dict()}),
         channels,
         seed,
     )

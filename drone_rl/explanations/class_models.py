@@ -7,13 +7,12 @@ from typing import Any
 
 import torch
 from numpy.typing import NDArray
-from torch import Tensor, nn
+from torch import Tensor
 from torch.nn import functional
 
 from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.heat_maps import Objective
-from drone_rl.explanations.hooks import actions_of
 from drone_rl.explanations.settings import ClassModelSettings
 from drone_rl.policies import ImageNetwork
 from drone_rl.utils.errors import InputError
@@ -139,7 +138,7 @@ def visualise(
 ) -> Attempts:
     """Optimize observations for each action from random starts; the network is not changed."""
     generator, shape = plain_generator(seed), network.in_shape
-    num_actions = len(actions_of(network).names)
+    num_actions = len(network.actions.names)
     start = torch.rand(settings.starts, *shape, generator=generator)
     start = statistics.low + (statistics.high - statistics.low) * start
     if settings.initial == "constant":
@@ -153,7 +152,7 @@ def visualise(
     if not bool(reached.isfinite().all()):
         raise InputError(f"with lr={settings.lr:g} the images diverge; give less, or clamp=true")
     with torch.no_grad():
-        each = actions_of(network).probabilities(network(reached)).gather(1, action[:, None])[:, 0]
+        each = network.actions.probabilities(network(reached)).gather(1, action[:, None])[:, 0]
     by_action = (num_actions, settings.starts)
     return Attempts(
         images=reached.view(*by_action, *shape),
@@ -182,7 +181,7 @@ def search(
 class _Ascent:
     """Gradient ascent on images, one for each entry of `action`."""
 
-    network: nn.Module
+    network: ImageNetwork
     action: Tensor
     statistics: ImageStatistics
     settings: ClassModelSettings
@@ -190,7 +189,7 @@ class _Ascent:
 
     def value(self, images: Tensor) -> Tensor:
         """Return the quantity to maximize, on images shifted at random. Shape: (N,)."""
-        actions, outputs = actions_of(self.network), self.network(self.jitter(images))
+        actions, outputs = self.network.actions, self.network(self.jitter(images))
         if self.settings.maximize == "probability":
             scores = actions.probabilities(outputs)
         else:

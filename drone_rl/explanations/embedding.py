@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import openTSNE
 from numpy.typing import NDArray
+from sklearn.decomposition import PCA
 
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.settings import check_perplexity
@@ -68,7 +69,8 @@ def embed(
     if not np.isfinite(flat).all():
         raise InputError("features hold a value that is not finite; the policy's weights are bad")
     centred = flat - flat.mean(0)
-    reduced = np.ascontiguousarray(centred @ _principal_components(centred).T)
+    pca = PCA(min(COMPONENTS, *flat.shape), svd_solver="full")  # not a random one
+    reduced = pca.fit_transform(flat)
     few = len(flat) <= FEW
     model = openTSNE.TSNE(
         perplexity=perplexity,  # pyright: ignore[reportArgumentType] (takes fractions, too)
@@ -112,21 +114,6 @@ def faithfulness(originals: NDArray, points: NDArray, k: int = NEIGHBOURS) -> di
         "neighbours_kept": float((rank <= k).mean()),
         "neighbours_chance": float(as_near.mean() / (count - 1)),
     }
-
-
-def _principal_components(centred: NDArray) -> NDArray:
-    """Return principal axes as rows, with signs that don't depend on the library."""
-    if centred.shape[1] <= COMPONENTS:
-        return np.eye(centred.shape[1])
-    if len(centred) < centred.shape[1]:  # the smaller of the two equivalent problems
-        _, left = np.linalg.eigh(centred @ centred.T)
-        components = left[:, ::-1][:, :COMPONENTS].T @ centred
-        components /= np.maximum(np.linalg.norm(components, axis=1, keepdims=True), 1e-12)
-    else:
-        _, vectors = np.linalg.eigh(centred.T @ centred)
-        components = vectors[:, ::-1][:, :COMPONENTS].T
-    largest = np.abs(components).argmax(1)
-    return components * np.sign(components[np.arange(len(components)), largest])[:, None]
 
 
 def _distinct(points: NDArray, seed: int) -> NDArray:

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from drone_rl.collectors.speedups import accelerated_gradients
-from drone_rl.explanations.hooks import actions_of, find_layer, probabilities, spatial_layers
+from drone_rl.explanations.hooks import find_layer, probabilities, spatial_layers
 from drone_rl.explanations.patches import replaced
 from drone_rl.policies import ImageNetwork
 from drone_rl.utils.errors import InputError
@@ -111,7 +111,7 @@ class Explainer:
     def _forward(
         self, objective: Objective, network: nn.Module | None = None
     ) -> Callable[[Tensor], Tensor]:
-        actions = actions_of(self.network)
+        actions = self.network.actions
         evaluated = self.network if network is None else network
         make = actions.scores if objective == "logit" else actions.probabilities
         return lambda x: make(evaluated(x))

@@ -8,7 +8,6 @@ from captum.attr import LayerActivation
 from torch import Tensor, nn
 
 from drone_rl.policies import ImageNetwork
-from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.utils.errors import InputError
 
 BATCH = 512  # observations in one forward pass, which bounds memory
@@ -85,9 +84,4 @@ def outputs(network: ImageNetwork, observations: Tensor) -> Tensor:
 @torch.no_grad()
 def probabilities(network: ImageNetwork, observations: Tensor) -> Tensor:
     """Return action probabilities (Eq. 9). (T, C, h, w) to (T, parts), see `Actions`."""
-    return actions_of(network).probabilities(outputs(network, observations))
-
-
-def actions_of(network: nn.Module) -> Actions:
-    """Return the actions that a network's outputs stand for; the three moves if unknown."""
-    return network.actions if isinstance(network, ImageNetwork) else MOVES
+    return network.actions.probabilities(outputs(network, observations))

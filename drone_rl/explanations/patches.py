@@ -17,7 +17,7 @@ from scipy.stats import rankdata
 from torch import Tensor
 from torch.nn import functional
 
-from drone_rl.explanations.hooks import BATCH, actions_of, probabilities
+from drone_rl.explanations.hooks import BATCH, probabilities
 from drone_rl.policies import ImageNetwork
 from drone_rl.utils.intervals import episode_means, mean_bounds
 from drone_rl.utils.seeding import plain_generator
@@ -95,7 +95,7 @@ def replaced(
     for batch in (pixels @ masks.flatten(1).float().T > 0).nonzero().split(BATCH):
         frames, parts = batch.unbind(1)
         changed = torch.where(masks[parts, None], other[frames], observations[frames])
-        yield frames, parts, actions_of(network).probabilities(network(changed))
+        yield frames, parts, network.actions.probabilities(network(changed))
 
 
 def patch_effects(
@@ -107,7 +107,7 @@ def patch_effects(
     """
     base = probabilities(network, observations)
     masks, effects = grid.masks(observations.shape[-2:]), []
-    distance = actions_of(network).distance
+    distance = network.actions.distance
     for other in others:
         effect = base.new_zeros(len(base), grid.count)
         for frames, patches, after in replaced(network, observations, other, masks):

@@ -40,12 +40,12 @@ def summarise(episodes: CompleteEpisodes) -> dict[str, Any]:
     }
 
 
-def failure_table(episodes: CompleteEpisodes, confidence: float = 0.95) -> dict[str, Any]:
+def failure_table(episodes: CompleteEpisodes) -> dict[str, Any]:
     """Count first failures by class of goal and by how the episode ended.
 
     An episode fails once: at the first goal that it misses, or by its end if it reached all goals
     and did not succeed. So each row is a binomial count, and
-    its interval is exact. With this confidence the intervals of all rows hold at once (Bonferroni).
+    its interval is exact. With 95% confidence the intervals of all rows hold at once (Bonferroni).
 
     Returns:
         "rows": each with "by", "value", "episodes" (that offered such a goal at or before their
@@ -69,7 +69,7 @@ def failure_table(episodes: CompleteEpisodes, confidence: float = 0.95) -> dict[
         if reason not in (0, task.success_end):
             ended = int((failed & (episodes.end_reason == reason)).sum())
             counts.append(("end", reason.name.lower(), len(episodes), ended))
-    each = 1.0 - (1.0 - confidence) / len(counts)
+    each = 1.0 - 0.05 / len(counts)
     rows = [_row(*count, confidence=each) for count in counts]
     expected = next((e.name.lower() for e in task.ends if e == task.expected_end), None)
     hit = [row for row in rows if row["failed"]]
@@ -79,7 +79,7 @@ def failure_table(episodes: CompleteEpisodes, confidence: float = 0.95) -> dict[
         "rows": rows,
         "largest": largest,
         "expected_end": expected,
-        "bound": proportion(int(failed.sum()), len(episodes), confidence),
+        "bound": proportion(int(failed.sum()), len(episodes)),
     }
 
 

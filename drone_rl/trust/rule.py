@@ -42,12 +42,6 @@ class VerdictKind(enum.StrEnum):
         return codes.get(self, ONE_SIDED)
 
     @property
-    def mirrored(self) -> "VerdictKind":
-        """The kind with left and right exchanged."""
-        left, right = VerdictKind.ONE_SIDED_LEFT, VerdictKind.ONE_SIDED_RIGHT
-        return {left: right, right: left}.get(self, self)
-
-    @property
     def family(self) -> str:
         """One of `KINDS`."""
         return "one-sided" if self.exit_code == ONE_SIDED else self.value
@@ -219,12 +213,5 @@ def kinds_within(
     least = [
         (min(low for low, _ in half), min(high for _, high in half)) for half in halves if half
     ]
-    offered, shares = [*box[1 : 1 + num_strata]], [*box[1 + num_strata : 1 + 2 * num_strata]]
-    if num_strata > 3:  # between the ends `decide` uses only whether all are good where offered
-        inner = slice(1, -1)
-        pairs = [*zip(offered[inner], shares[inner], strict=True)]
-        may_fail = any(there[1] and share[0] < 2 for there, share in pairs)
-        may_hold = all(not there[0] or share[1] == 2 for there, share in pairs)
-        offered[inner], shares[inner] = [(1, 1)], [(0 if may_fail else 2, 2 if may_hold else 0)]
-    pieces = [range(low, high + 1) for low, high in (box[0], *offered, *shares, *least)]
-    return frozenset(decide(cell, len(offered)) for cell in itertools.product(*pieces))
+    pieces = [range(low, high + 1) for low, high in (*box[: 1 + 2 * num_strata], *least)]
+    return frozenset(decide(cell, num_strata) for cell in itertools.product(*pieces))

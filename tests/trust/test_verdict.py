@@ -26,6 +26,7 @@ from drone_rl.utils.seeding import Stream
 from tests.fake_flight import floating
 from tests.second_task import Posts
 from tests.training.test_train import TINY
+from tests.trust.test_rule import mirrored as mirrored_kind
 
 LEFT, AHEAD, RIGHT = Side
 SHARED = HealthCheck.function_scoped_fixture
@@ -218,7 +219,7 @@ def test_mirrored_episodes_get_the_mirrored_kind(make_episodes, make_baselines, 
     theirs = {name: mirrored(flown) for name, flown in baselines.items()}
     theirs["left"], theirs["right"] = theirs["right"], theirs["left"]
     verdict, reflected = apply_rule(ours, baselines), apply_rule(mirrored(ours), theirs)
-    assert reflected.kind is verdict.kind.mirrored
+    assert reflected.kind is mirrored_kind(verdict.kind)
     assert reflected.certain == verdict.certain
 
 
