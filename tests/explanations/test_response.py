@@ -30,6 +30,8 @@ IDLE, LEFT = [1.0, 0.0, 0.0], [0.1, 0.9, 0.0]
 
 
 class Forward(nn.Module):
+    actions = MOVES
+
     def forward(self, pictures):
         return torch.tensor([9.0, 0.0, 0.0]).expand(len(pictures), 3)
 
