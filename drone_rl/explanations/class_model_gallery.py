@@ -7,16 +7,13 @@ from pathlib import Path
 from typing import Any, Unpack
 
 import numpy as np
-import torch
 from PIL import Image
-from torch import Tensor
 
 from drone_rl.config.configuration import from_arguments
 from drone_rl.explanations.class_models import (
     NO_GRADIENTS,
     Attempts,
     ImageStatistics,
-    values_of,
     visualise,
 )
 from drone_rl.explanations.rollouts import collect
@@ -82,18 +79,12 @@ class ClassModels(TableResult):
     """What the channels of an observation are, see `images.shown_picture`."""
     seed: RootSeed
 
-    def _best(self, attempts: Attempts) -> tuple[Tensor, list[float]]:
-        """Return the best image of each action, (A, C, h, w), and the probabilities."""
-        best = attempts.best()
-        pixels = torch.stack([attempts.images[a, i] for a, i in enumerate(best)])
-        return pixels, values_of(attempts, best)["probabilities"]
-
     def rows(self) -> list[list[str]]:
         """Return a table of texts: a header, then each setting's probability of each action."""
         order, names = self.actions.order, self.actions.names
         rows = [["settings", *(names[action] for action in order)]]
         for title, attempts in self.tried.items():
-            _, reached = self._best(attempts)
+            reached = attempts.best_values()["probabilities"]
             rows.append([title, *(f"{reached[action]:.3f}" for action in order)])
         return rows
 
@@ -104,7 +95,7 @@ class ClassModels(TableResult):
         """
         tiles, order = [], self.actions.order
         for title, attempts in self.tried.items():
-            pixels, reached = self._best(attempts)
+            pixels, reached = attempts.best_images(), attempts.best_values()["probabilities"]
             low, high = self.statistics.low, self.statistics.high
             if not attempts.settings.clamp:
                 low, high = float(pixels.min()), float(pixels.max())
@@ -123,7 +114,7 @@ class ClassModels(TableResult):
             **self.seed.as_dict(),
             "statistics": dataclasses.asdict(self.statistics),
             "settings": {
-                title: {**attempts.settings.values(), **values_of(attempts, attempts.best())}
+                title: {**attempts.settings.values(), **attempts.best_values()}
                 for title, attempts in self.tried.items()
             },
             **provenance(),
@@ -136,7 +127,7 @@ class ClassModels(TableResult):
         """Return a line for each setting that makes some action improbable, and the seed's."""
         lines = []
         for title, attempts in self.tried.items():
-            _, reached = self._best(attempts)
+            reached = attempts.best_values()["probabilities"]
             failed = [self.actions.names[a] for a in self.actions.order if reached[a] <= 0.5]
             if failed:
                 lines.append(

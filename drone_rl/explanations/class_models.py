@@ -58,6 +58,17 @@ class Attempts:
         less_probable = self.probabilities < highest - AS_PROBABLE
         return self.roughness.masked_fill(less_probable, float("inf")).argmin(1).tolist()
 
+    def best_images(self) -> Tensor:
+        """Return the observations of `best`. Shape: (num_actions, C, H, W)."""
+        return torch.stack([self.images[a, i] for a, i in enumerate(self.best())])
+
+    def best_values(self) -> dict[str, list[float]]:
+        """Return probability and roughness of `best`."""
+        return {
+            name: [float(getattr(self, name)[a, i]) for a, i in enumerate(self.best())]
+            for name in ("probabilities", "roughness")
+        }
+
 
 @dataclasses.dataclass
 class ClassModel:
@@ -75,8 +86,7 @@ class ClassModel:
     @property
     def images(self) -> Tensor:
         """The best observation of each action. Shape: (num_actions, C, H, W)."""
-        every = self.every
-        return torch.stack([every.images[a, i] for a, i in enumerate(every.best())])
+        return self.every.best_images()
 
     def summary(self) -> dict[str, Any]:
         """Return plain values; lists are by action, "highest" is that of all attempts."""
@@ -85,26 +95,18 @@ class ClassModel:
         rows = [
             {
                 **dataclasses.asdict(attempts.settings),
-                **values_of(attempts, attempts.best()),
+                **attempts.best_values(),
                 "chosen": [a for a, i in enumerate(best) if i // starts == setting],
             }
             for setting, attempts in enumerate(self.tried)
         ]
         return {
-            **values_of(every, best),
+            **every.best_values(),
             "starts": starts,
             "num_settings": len(self.tried),
             "highest": every.probabilities.amax(1).tolist(),
             "tried": rows,
         }
-
-
-def values_of(attempts: Attempts, best: list[int]) -> dict[str, list[float]]:
-    """Return probability and roughness of each action's attempt."""
-    return {
-        name: [float(getattr(attempts, name)[a, i]) for a, i in enumerate(best)]
-        for name in ("probabilities", "roughness")
-    }
 
 
 @dataclasses.dataclass(frozen=True)
@@ -145,7 +147,7 @@ def visualise(
         start = torch.full_like(start, statistics.mean)
     images = start.repeat(num_actions, 1, 1, 1)
     action = torch.arange(num_actions).repeat_interleave(settings.starts)
-    quick = accelerated_gradients(network, wrt="pixels") or network
+    quick = accelerated_gradients(network, wrt="pixels")
     ascent = _Ascent(quick, action, statistics, settings, generator)
     optimize = ascent.pixels if settings.parameterisation == "pixel" else ascent.fourier
     reached = optimize(images)

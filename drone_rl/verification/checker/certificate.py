@@ -1,6 +1,7 @@
 """Read certificates: untrusted data of bounded size, parsed strictly."""
 
 import dataclasses
+import functools
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -60,7 +61,7 @@ class Certificate:
     undecided: NDArray[np.float64]  # boxes without a statement. Shape: (boxes, cubes, 2)
     finished: bool  # whether the proof was completed
 
-    @property
+    @functools.cached_property
     def task(self) -> TaskSettings:
         """The task of the certificate."""
         return require_cubes(self.description, "certificates")
