@@ -14,6 +14,7 @@ from drone_rl.policies.baselines import constant_policy, oracle_policy, random_p
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.trust.metrics import summarise
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream
 
 
@@ -33,6 +34,12 @@ def test_random_policy_matches_the_original_study():
     summary = summarise(run_episodes(env, policy, 500))
     assert 0.7 < summary["mean_goals"] < 1.0  # 0.84 there
     assert 125 < summary["mean_length"] < 142  # 133 there
+
+
+def test_more_episodes_than_fit_into_memory_are_refused():
+    env, policy = DroneEnv(1, pixels=False), constant_policy(Move.FORWARD)
+    with pytest.raises(InputError, match=r"episodes=1000000000000 .*give fewer episodes"):
+        run_episodes(env, policy, 10**12)
 
 
 def test_episodes_do_not_depend_on_the_batch_size():

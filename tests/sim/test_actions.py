@@ -46,6 +46,7 @@ def test_distance_is_the_total_variation(kind):
     other = kind([[0.25, 0.5, 0.25, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 1.0]])
     assert FIVE.distance(probs, other).tolist() == [0.25, 1.0]
     assert FIVE.distance(probs, probs).tolist() == [0.0, 0.0]
+    assert FIVE.distance(probs[None], other[None]).tolist() == [[0.25, 1.0]]
 
 
 @pytest.mark.parametrize(

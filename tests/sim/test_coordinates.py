@@ -11,6 +11,7 @@ from drone_rl.sim.coordinates import (
     EQUATOR_RADIUS,
     FLATTENING,
     HOME,
+    Attitude,
     geo_from_world,
     world_from_geo,
 )
@@ -152,3 +153,10 @@ def test_vectors_in_the_frame_of_a_rotated_body():
     north = torch.tensor([[1.0, 0.0, 0.0]], dtype=torch.float64)
     right = torch.tensor([[0.0, -1.0, 0.0]], dtype=torch.float64)
     torch.testing.assert_close(coordinates.body_from_world(left, north), right)
+
+
+def test_attitude_of_a_drone_that_is_nearly_upside_down():
+    """Turned by 150 degrees about its forward axis: the right side goes down first."""
+    half = math.radians(150.0) / 2
+    attitude = Attitude.of((math.cos(half), math.sin(half), 0.0, 0.0))
+    assert attitude == pytest.approx((150.0, 0.0, 0.0))

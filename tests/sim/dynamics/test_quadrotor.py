@@ -1,5 +1,6 @@
 """The quadrotor: moves, presets; the single drone and the fused moves, bit for bit."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -110,6 +111,7 @@ def test_states_are_those_of_a_quadrotor():
     plain, single = Quadrotor(WINDY), SingleQuadrotor(WINDY)
     one = plain.start(doubles((0.0, 0.0, 1.0)), torch.tensor([5]))
     other = FlightState(one.numbers.clone())
+    hold = make_goals(POSITIONS, 0.0, 1.0, 0.0, 3.0)
     script = [
         (make_goals(POSITIONS, 1.0, 2.0, 0.5, 3.0), 7, None),
         (make_goals(POSITIONS, -1.0, 2.0, 0.5, 3.0), 7, None),
@@ -117,6 +119,8 @@ def test_states_are_those_of_a_quadrotor():
         (make_goals(VELOCITIES, 3.0, 0.0, 0.1, 0.0), 7, "here"),
         (make_goals(VELOCITIES, 3.0, 0.0, 0.1, 0.0), 3, "here"),
         (make_goals(VELOCITIES, 0.0, 1.0, 0.0, 0.0), 7, None),
+        (dataclasses.replace(hold, drift=doubles((1.0, 0.0, 0.0, 0.0))), 7, None),
+        (dataclasses.replace(hold, drift=doubles((-2.0, 0.0, 0.5, 0.0))), 7, None),
     ]
     touched = False
     for goals, ticks, place in script:

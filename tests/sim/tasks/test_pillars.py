@@ -180,9 +180,9 @@ TASK = Pillars()
 def test_next_target_is_the_nearest_pillar_of_the_next_row(field):
     assert TASK.next_target(field((5.0, -2.0), FAR)) == 1
     assert TASK.next_target(field((5.0, -2.0), FAR, y=4.0)) == 0
-    state = field((5.0, -2.0), (7.0, 1.0))
+    state = field((5.0, -2.0), (1.0, 7.0))
     state.passed[:, 0] = True
-    assert TASK.next_target(state) == 3
+    assert TASK.next_target(state) == 2
     assert TASK.next_offset(state)[0].tolist() == [16.0, 1.0, 0.0]
     state.passed[:] = True
     assert TASK.next_target(state) == 4 and TASK.next_offset(state).isnan().all()

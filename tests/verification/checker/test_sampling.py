@@ -98,6 +98,13 @@ def test_sample_placements(parsed):
     assert np.abs(near - border).max() < 2e-4
 
 
+def test_outcomes_share_the_placements_inside_boxes(parsed):
+    placements = sample_placements(parsed, 40, np.random.default_rng(0))
+    inside = placements.outcome[placements.why == INSIDE]
+    assert len(placements.points) == 40
+    assert np.bincount(inside).tolist() == [10, 10]  # half of all
+
+
 def test_sample_placements_by_seed(parsed):
     one, other, third = (sample_placements(parsed, 50, np.random.default_rng(s)) for s in (1, 1, 2))
     assert (one.points == other.points).all() and not (one.points == third.points).all()
