@@ -1,5 +1,6 @@
 """NED, ENU and FRD frames, latitude and longitude."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -159,4 +160,4 @@ def test_attitude_of_a_drone_that_is_nearly_upside_down():
     """Turned by 150 degrees about its forward axis: the right side goes down first."""
     half = math.radians(150.0) / 2
     attitude = Attitude.of((math.cos(half), math.sin(half), 0.0, 0.0))
-    assert attitude == pytest.approx((150.0, 0.0, 0.0))
+    assert dataclasses.astuple(attitude) == pytest.approx((150.0, 0.0, 0.0))
