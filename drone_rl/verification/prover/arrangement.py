@@ -106,12 +106,12 @@ class Arrangement:
         goes_right = np.flatnonzero((end[:, 0] - origin[:, 0] > 0) & (self.cell >= 0))
         (x, y), (far_x, far_y) = origin[goes_right].T, end[goes_right].T
         slope = (far_y - y) / (far_x - x)
-        found = np.empty(len(places), np.int64)
+        cells = np.empty(len(places), np.int64)
         for number, (here, up) in enumerate(places):
             height = y + slope * (here - x)
             below = np.flatnonzero((x <= here) & (here < far_x) & (height <= up))
-            found[number] = self.cell[goes_right[below[height[below].argmax()]]]
-        return found
+            cells[number] = self.cell[goes_right[below[height[below].argmax()]]]
+        return cells
 
     def inner_points(self) -> NDArray[np.float64]:
         """Return a point well inside each cell. Shape: (num_cells, 2)."""
@@ -120,11 +120,11 @@ class Arrangement:
         corners = self.points[self.origin[of]]
         count = np.bincount(cell, minlength=self.num_cells)
         sums = [np.bincount(cell, c, self.num_cells) for c in corners.T]
-        found = np.stack(sums, -1) / count[:, None]
+        points = np.stack(sums, -1) / count[:, None]
         turn = (self.angle[self.following] - self.angle + np.pi) % (2 * np.pi) - np.pi
         for dented in np.unique(self.cell[(turn < -SAME) & of]):
-            found[dented] = _inside(self.points[self.origin[self._around(dented)]])
-        return found
+            points[dented] = _inside(self.points[self.origin[self._around(dented)]])
+        return points
 
     def outlines(self, labels: NDArray[np.int64]) -> list[tuple[int, NDArray[np.float64]]]:
         """Return the borders between cells with different labels (num_cells,).
@@ -178,14 +178,14 @@ def arrange(pieces: Pieces, window: Window, most_cells: int) -> Arrangement:
     following = _following(origin, angle)
     graph = coo_array((np.ones(len(origin), bool), (np.arange(len(origin)), following)))
     num_cells, cell = connected_components(graph, directed=False)
-    found = Arrangement(points, origin, angle, following, cell.astype(np.int64), num_cells)
-    areas = found.areas()
+    arrangement = Arrangement(points, origin, angle, following, cell.astype(np.int64), num_cells)
+    areas = arrangement.areas()
     is_outside = areas <= 0
     number = np.where(is_outside, -1, np.cumsum(~is_outside) - 1)
     inside, area = areas[~is_outside], 2 * window.sideways * (window.farthest - window.nearest)
     if abs(inside.sum() - area) > 1e-9 * area:
         raise ArithmeticError(f"cells of {inside.sum()} m2 do not fill {area} m2")
-    return dataclasses.replace(found, cell=number[found.cell], num_cells=len(inside))
+    return dataclasses.replace(arrangement, cell=number[arrangement.cell], num_cells=len(inside))
 
 
 def _meetings(pieces: Pieces, most: int) -> tuple[NDArray, NDArray]:
