@@ -220,10 +220,10 @@ def _not_fused(renderer: DirectRenderer) -> list[str]:
         reasons.append(f"renderer {type(worlds.renderer).__name__} on {device} is not fused")
     if renderer.view.modalities != ("gray",):
         reasons.append("frames that are not gray are not fused")
-    known = [CropRows, StandardizePixels]
+    fusable = [CropRows, StandardizePixels]
     for transform in renderer.after:
-        if type(transform) in known:
-            known.remove(type(transform))
+        if type(transform) in fusable:
+            fusable.remove(type(transform))
         else:
             reasons.append(f"transform {type(transform).__name__} is not fused")
     if worlds.appearance is not None:

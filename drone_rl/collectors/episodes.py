@@ -58,9 +58,11 @@ class EpisodeCollector(BatchedCollector):
         super().__init__(env, actor, **options)
         entries: dict[str, Any] = {"next_keys": self._kept, "actor_keys": actor_keys}
         entries["keep_actor_entries"] = keep_actor_entries
-        found = accelerated_collector(env, actor, acceleration, num_threads=num_threads, **entries)
+        source = accelerated_collector(env, actor, acceleration, num_threads=num_threads, **entries)
         self.source: FusedCollector | DirectCollector | SteppingCollector = (
-            SteppingCollector(env, actor, found, **entries) if isinstance(found, Reasons) else found
+            SteppingCollector(env, actor, source, **entries)
+            if isinstance(source, Reasons)
+            else source
         )
         """Implementation that runs the episodes."""
 

@@ -41,11 +41,11 @@ class RolloutCollector(BatchedCollector):
             raise InputError(f"num_steps={num_steps} is out of range; give 1 or more")
         super().__init__(env, actor, **options)
         self.num_steps = num_steps
-        found = accelerated_stepper(env, self._observed, self._kept)
+        stepper = accelerated_stepper(env, self._observed, self._kept)
         self._stepper: DirectStepper | TorchrlStepper = (
-            TorchrlStepper(env, self._observed, self._kept, found)
-            if isinstance(found, Reasons)
-            else found
+            TorchrlStepper(env, self._observed, self._kept, stepper)
+            if isinstance(stepper, Reasons)
+            else stepper
         )
         self._reward = torch.zeros(*env.batch_size, 1, device=env.device)
         self._steps = torch.zeros(*env.batch_size, 1, dtype=torch.int64, device=env.device)

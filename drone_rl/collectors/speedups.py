@@ -48,11 +48,11 @@ def accelerated_collector(
     direct = DirectCollector(renderer, actor, env.action_key, actor_keys, keep_actor_entries)
     if acceleration == "direct":
         return direct
-    found = FusedCollector.try_create(direct, num_threads)
-    if isinstance(found, Reasons):
-        direct.reasons = found
+    fused = FusedCollector.try_create(direct, num_threads)
+    if isinstance(fused, Reasons):
+        direct.reasons = fused
         return direct
-    return found
+    return fused
 
 
 def accelerated_stepper(
@@ -78,5 +78,5 @@ def accelerated_gradients(
 
     See `FusedNetwork.try_create` for the arguments.
     """
-    found = FusedNetwork.try_create(network, num_threads, wrt=wrt)
-    return network if isinstance(found, Reasons) else found
+    fused = FusedNetwork.try_create(network, num_threads, wrt=wrt)
+    return network if isinstance(fused, Reasons) else fused

@@ -54,8 +54,8 @@ class ThreadedCollector(BaseCollector):
 
         ("collector", "traj_ids") are unique only within the part of one collector.
         """
-        own = [contextvars.copy_context() for _ in self.collectors]  # as in the calling thread
-        parts = list(self._pool.map(lambda c, at: at.run(c.collect), self.collectors, own))
+        contexts = [contextvars.copy_context() for _ in self.collectors]  # as in the calling thread
+        parts = list(self._pool.map(lambda c, at: at.run(c.collect), self.collectors, contexts))
         joined: Any = torch.cat  # its annotation lacks TensorDicts
         batch = parts[0] if len(parts) == 1 else joined(parts)
         return batch if self.postproc is None else self.postproc(batch)

@@ -140,12 +140,12 @@ def check_appearance(
         InputError: Distractors can't be placed, the camera starts inside an object, or its field of
             view is too wide or narrow.
     """
-    own = camera.horizontal_fov
+    fov = camera.horizontal_fov
     for widening in _ends(settings.camera_widening):
-        if not _NARROWEST <= own + widening <= _WIDEST:
+        if not _NARROWEST <= fov + widening <= _WIDEST:
             raise InputError(
                 f"appearance.camera_widening={widening:g} makes a field of view of "
-                f"{own + widening:g} degrees; give {_NARROWEST - own:g} to {_WIDEST - own:g}"
+                f"{fov + widening:g} degrees; give {_NARROWEST - fov:g} to {_WIDEST - fov:g}"
             )
     if region is None:
         if _ends(settings.distractors)[1]:

@@ -38,7 +38,7 @@ class _Base(NamedTuple):
     """Base class, or protocol, of one kind of part."""
 
     name: str
-    own: str
+    attribute: str
     """Attribute that only it and classes derived from it have; "" for a protocol."""
     members: tuple[str, ...]
     """Attributes of its objects."""
@@ -181,7 +181,7 @@ def _decorator(
 
     def register(factory: F) -> F:
         code, base = cast(Any, factory), _BASES[part]
-        if base.own and isinstance(code, type) and not hasattr(code, base.own):
+        if base.attribute and isinstance(code, type) and not hasattr(code, base.attribute):
             raise InputError(
                 f"{code.__name__} does not derive from {base.name}; derive it from there"
             )

@@ -83,14 +83,14 @@ def named_settings(data: Any, where: str) -> tuple[type[BaseTaskSettings], Mappi
 
     A mapping without "name" describes `DEFAULT_TASK`. See `settings_of` for errors.
     """
-    given = dict(as_mapping(data, where))
-    return settings_of(given.pop("name", DEFAULT_TASK), f"{where}.name"), given
+    values = dict(as_mapping(data, where))
+    return settings_of(values.pop("name", DEFAULT_TASK), f"{where}.name"), values
 
 
 def read_task(data: Any, where: str) -> BaseTaskSettings:
     """Read settings of a task from plain data; see `named_settings` and `Settings.read`."""
-    cls, given = named_settings(data, where)
-    return cls.read(given, where)
+    cls, values = named_settings(data, where)
+    return cls.read(values, where)
 
 
 @add_task

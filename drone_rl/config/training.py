@@ -139,10 +139,10 @@ class TrainSettings(Settings):
         check_appearance(self.appearance, self.camera, self.task.object_region, self.task.name)
         needs, objective = self.objective.needs, self.objective.name
         for name, part in needs.items():
-            given = getattr(self, name)
-            if given.is_known and not isinstance(given, type(part)):
+            setting = getattr(self, name)
+            if setting.is_known and not isinstance(setting, type(part)):
                 raise InputError(
-                    f"objective={objective} requires {name}={part.name}, got {name}={given.name}"
+                    f"objective={objective} requires {name}={part.name}, got {name}={setting.name}"
                 )
         for name, kind in {"returns": Gae, "collector": Rollouts}.items():
             part = getattr(self, name)

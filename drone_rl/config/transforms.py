@@ -40,9 +40,9 @@ class Transform(Variant):
         return frame
 
 
-def as_transforms(given: Transform | Sequence[Transform]) -> tuple[Transform, ...]:
+def as_transforms(value: Transform | Sequence[Transform]) -> tuple[Transform, ...]:
     """Return one or several transforms as a tuple; raise an `InputError` for other values."""
-    transforms: Any = given if isinstance(given, list | tuple) else (given,)
+    transforms: Any = value if isinstance(value, list | tuple) else (value,)
     for i, transform in enumerate(transforms):
         if not isinstance(transform, Transform):
             raise InputError(

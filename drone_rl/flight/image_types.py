@@ -131,15 +131,15 @@ def images(
     wanted: list[Modality] = list(dict.fromkeys(kind.modality for kind in kinds))
     view, scene = worlds.view(cameras, wanted, height, width), worlds.scene
     ids, rendered = segmentation_ids(scene), worlds.render_all(state, view)
-    found: list[Tensor] = []
+    pictures: list[Tensor] = []
     for request, kind in zip(requests, kinds, strict=True):
         number = cameras.index(str(request.camera))
         fov = float(scene.model.cam_fovy[scene.camera(view.cameras[number])])
         focal = view.height / 2 / math.tan(math.radians(fov) / 2)
         values = rendered[kind.modality][:, number]
         image = pixels(kind, values, as_float=request.as_float, focal=focal, ids=ids)
-        found.append(_png(image) if request.compress else image)
-    return found
+        pictures.append(_png(image) if request.compress else image)
+    return pictures
 
 
 def encode(image: Image.Image, kind: str, *, quality: int = -1, compress_level: int = -1) -> bytes:
@@ -185,8 +185,8 @@ def pixels(
         return _color(values, as_float)
     if image_type is ImageType.SEGMENTATION:
         geoms = values.long()
-        known = geoms.clamp(min=0) if ids is None else ids.to(geoms.device)[geoms]
-        colors = palette().to(geoms.device)[known]
+        numbers = geoms.clamp(min=0) if ids is None else ids.to(geoms.device)[geoms]
+        colors = palette().to(geoms.device)[numbers]
         return _color(colors, as_float)
     if image_type is ImageType.SURFACE_NORMALS:
         is_hit = (values != 0).any(-1, keepdim=True)

@@ -140,13 +140,13 @@ def figures_in_the_loop(policy: BasePolicy, flights: int, seed: RootSeed) -> dic
 
 
 def _fly_or_restart(
-    policy: BasePolicy, world: int, *given: Any
+    policy: BasePolicy, world: int, *args: Any
 ) -> tuple[CompleteEpisodes, SitlEpisode]:
     """Run one episode; restart a firmware that fails before the policy acts."""
     for _ in range(STARTS - 1):
         with contextlib.suppress(NotReadyError):
-            return _fly(policy, world, *given)
-    return _fly(policy, world, *given)
+            return _fly(policy, world, *args)
+    return _fly(policy, world, *args)
 
 
 @torch.no_grad()

@@ -89,13 +89,13 @@ class ReturnEstimator(Transform, abc.ABC):
     @torch.no_grad()
     def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
         reward, done = (tensordict.get(key) for key in self.in_keys)
-        known = _ends_later(done)
-        if bool(known.all()) and not (self._is_contained or _MASK in tensordict.keys(True)):
+        ends = _ends_later(done)
+        if bool(ends.all()) and not (self._is_contained or _MASK in tensordict.keys(True)):
             return tensordict.set(self.out_keys[0], self._estimate(reward, done))
-        values = self._estimate(reward[known][:, None], done[known][:, None])
+        values = self._estimate(reward[ends][:, None], done[ends][:, None])
         filled = torch.zeros_like(reward, dtype=values.dtype)
-        filled[known] = values[:, 0]
-        return tensordict.set(self.out_keys[0], filled).set(_MASK, known[..., 0])
+        filled[ends] = values[:, 0]
+        return tensordict.set(self.out_keys[0], filled).set(_MASK, ends[..., 0])
 
     def _estimate(self, reward: Tensor, done: Tensor) -> Tensor:
         values: Any = self.estimate(reward, done)
@@ -127,20 +127,20 @@ class ReturnEstimator(Transform, abc.ABC):
 
 def _ends_later(done: Tensor) -> Tensor:
     """Return whether the episode of each step ends within its row. Shape: (*batch, T, 1)."""
-    known = done.flip(-2).cumsum(-2).flip(-2) > 0
-    if not bool(known.any()):
+    ends = done.flip(-2).cumsum(-2).flip(-2) > 0
+    if not bool(ends.any()):
         raise InputError(
             f"no episode ends in a batch of shape {tuple(done.shape[:-1])}, so no return is known; "
             "collect more steps a batch"
         )
-    return known
+    return ends
 
 
 class _Discounted(ReturnEstimator):
     def __init__(self, gamma: float | None = None, **keys: Unpack[ReturnKeys]) -> None:
         super().__init__(**keys)
-        own: Any = self.Settings
-        self.gamma: float = own.gamma if gamma is None else gamma
+        defaults: Any = self.Settings
+        self.gamma: float = defaults.gamma if gamma is None else gamma
         if not 0.0 <= self.gamma <= 1.0:
             raise InputError(f"gamma={gamma} is out of range; give a rate from 0 to 1")
 
@@ -230,11 +230,11 @@ class TimeBaseline(_Discounted):
         """See `returns.time_baseline`; the running mean takes in this batch only afterwards."""
         values = returns.time_baseline(reward, done, self.gamma, self.baseline)
         mean, _ = returns.mean_by_time(returns.reward_to_go(reward, done, self.gamma), done)
-        known = min(len(mean), len(self.baseline))
-        old, mean, seen = self.baseline[:known], mean[:known], self.seen[:known]
+        steps = min(len(mean), len(self.baseline))
+        old, mean, seen = self.baseline[:steps], mean[:steps], self.seen[:steps]
         blend = self.decay * old + (1 - self.decay) * mean
-        self.baseline[:known] = torch.where(seen, blend, mean)
-        self.seen[:known] = True
+        self.baseline[:steps] = torch.where(seen, blend, mean)
+        self.seen[:steps] = True
         return values
 
 

@@ -72,8 +72,8 @@ class ReinforceLoss(LossModule):
         """
         super().__init__()
         if reduction not in ("mean", "sum", "episode_mean", "none"):
-            known = "mean, sum, episode_mean or none"
-            raise InputError(f"reduction={reduction} is unknown; give {known}")
+            options = "mean, sum, episode_mean or none"
+            raise InputError(f"reduction={reduction} is unknown; give {options}")
         if entropy_coeff < 0:
             raise InputError(f"entropy_coeff={entropy_coeff} is negative; give 0 or more")
         self.reduction = reduction

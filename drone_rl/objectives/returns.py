@@ -97,9 +97,9 @@ def time_baseline(reward: Tensor, done: Tensor, gamma: float, baseline: Tensor) 
     The baseline (steps,) is from earlier episodes; times beyond its end have baseline 0.
     """
     padded, lengths = _pad(reward, done)
-    known = min(len(baseline), len(padded))
+    steps = min(len(baseline), len(padded))
     returns = _discount(padded, gamma)
-    returns[:known] -= baseline[:known, None]
+    returns[:steps] -= baseline[:steps, None]
     return _unpad(returns, lengths, reward)
 
 

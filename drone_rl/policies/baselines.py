@@ -36,7 +36,7 @@ def oracle_policy(
         )
     available = actions or rule.actions
     return TensorDictModule(
-        lambda *known: rule.decide(known, available),
+        lambda *entries: rule.decide(entries, available),
         in_keys=[("info", name) for name in rule.reads],
         out_keys=["action"],
     )

@@ -253,9 +253,11 @@ def _camera_of(logits: Function) -> CameraSettings:
     return CameraSettings() if shape is None else CameraSettings(height=shape[1], width=shape[2])
 
 
-def _transforms_of(logits: Function, given: tuple[Transform, ...] | None) -> tuple[Transform, ...]:
-    if given is not None:
-        return given
+def _transforms_of(
+    logits: Function, transforms: tuple[Transform, ...] | None
+) -> tuple[Transform, ...]:
+    if transforms is not None:
+        return transforms
     shape = getattr(logits, "observation_shape", None)
     return (Rgb(),) if shape is not None and shape[0] == 3 else (Gray(), Standardize())
 

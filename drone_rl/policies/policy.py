@@ -149,9 +149,9 @@ class BasePolicy(abc.ABC):
             InputError: The environment is not one of TorchRL's.
         """
         if env is None:
-            own = self.make_env(1, pixels=False)
-            own.close()
-            return self.make_actor(own, seed=seed, stream=stream)
+            blind_env = self.make_env(1, pixels=False)
+            blind_env.close()
+            return self.make_actor(blind_env, seed=seed, stream=stream)
         if not isinstance(env, EnvBase):
             raise InputError(f"env={shown(env)} is not a TorchRL environment; use policy.make_env")
         device = str(env.device or "cpu")

@@ -122,16 +122,18 @@ class Observations:
         """Return itself, so that copies of a network share the environment."""
         return self
 
-    def all_transforms(self, given: Sequence[Transform] | None = None) -> tuple[Transform, ...]:
+    def all_transforms(
+        self, transforms: Sequence[Transform] | None = None
+    ) -> tuple[Transform, ...]:
         """Return the transforms from the camera's frame to (C, H, W) with those of the wrappers.
 
         Args:
-            given: Transforms up to the wrappers; by default those of the environment.
+            transforms: Transforms up to the wrappers; by default those of the environment.
 
         Raises:
             InputError: There are none, and those of the environment are unknown.
         """
-        first = self.transforms if given is None else tuple(given)
+        first = self.transforms if transforms is None else tuple(transforms)
         if first is None:
             raise InputError(
                 f"the model observes {self.space.dtype} of shape {self.space.shape}, and how its "
@@ -154,14 +156,16 @@ class Observations:
         functions.append(_from(self.space))
         return (*first, *steps, Wrapped(functions=Functions(functions)))
 
-    def of_episode(self, frames: Tensor, given: Sequence[Transform] | None = None) -> NDArray[Any]:
+    def of_episode(
+        self, frames: Tensor, transforms: Sequence[Transform] | None = None
+    ) -> NDArray[Any]:
         """Return the observations of one episode by the library's own wrappers.
 
         Args:
             frames: RGB, uint8. Shape: (T, H, W, 3).
-            given: Transforms up to the wrappers, if those of the environment are unknown.
+            transforms: Transforms up to the wrappers, if those of the environment are unknown.
         """
-        first = given if self.transforms is None else self.transforms
+        first = transforms if self.transforms is None else self.transforms
         pixels = on_pixels([transform.make() for transform in first or ()])(frames)
         seen = [one[None] for one in _into(self._inner)(pixels.numpy())]
         for wrapper in self._wrappers:

@@ -174,8 +174,8 @@ class AppearanceSampler:
 
     def _sample(self, source: np.random.RandomState | None) -> list[float]:
         # New numbers are sampled last, so that earlier ones keep their values.
-        own = _sample_numbers(self.settings, source)
-        return [*own, *draw_distractors(self.settings, self._region, source)]
+        numbers = _sample_numbers(self.settings, source)
+        return [*numbers, *draw_distractors(self.settings, self._region, source)]
 
     def _to_appearance(self, values: Tensor) -> Appearance:
         """Appearance of rows of `_sample`, or of one. Shape: (num_envs, *) or (*)."""
@@ -223,8 +223,8 @@ class AppearanceSampler:
             return None
         roll, pitch, yaw = values[..., 3:6].unbind(-1)
         turn = product(turned("yaw", yaw), product(turned("pitch", pitch), turned("roll", roll)))
-        own = self._camera.horizontal_fov
-        zoom = None if s.camera_widening == 0.0 else zoom_for_fov(own, own + values[..., 6])
+        fov = self._camera.horizontal_fov
+        zoom = None if s.camera_widening == 0.0 else zoom_for_fov(fov, fov + values[..., 6])
         return Mounting(offset=values[..., :3], turn=turn, zoom=zoom)
 
     def _distractors(self, columns: list[Tensor]) -> Distractors | None:

@@ -145,7 +145,7 @@ class RunGroup:
 
     def plain(self) -> dict[str, Any]:
         """Return counts, fractions and medians with exact intervals, and their sentences."""
-        known, states = self.known, [row.state for row in self.rows]
+        known_runs, states = self.known, [row.state for row in self.rows]
         figures = {
             **self.choice,
             "runs": len(self.rows),
@@ -153,9 +153,9 @@ class RunGroup:
             **{name: states.count(name) for name in ("failed", "damaged", "unfinished")},
             "judged": sum(row.kind is not None for row in self.finished),
             "solved": self.solved,
-            "frames_to_solve": _to_solve(known, [row.frames for row in known]),
-            "seconds_to_solve": _to_solve(known, [row.seconds for row in known]),
-            "final_share": median_of_runs([row.final_share for row in known]),
+            "frames_to_solve": _to_solve(known_runs, [row.frames for row in known_runs]),
+            "seconds_to_solve": _to_solve(known_runs, [row.seconds for row in known_runs]),
+            "final_share": median_of_runs([row.final_share for row in known_runs]),
             "entropy": median_of_runs([r.entropy for r in self.finished if r.entropy is not None]),
             "verdicts": self.verdicts,
         }

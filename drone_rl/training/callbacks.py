@@ -258,14 +258,14 @@ class LoggerCallback(Callback):
                 logger.log_scalar(name, value, step=training.progress.frames)
 
 
-def with_progress(given: Sequence[Callback], progress: Progress | None) -> list[Callback]:
+def with_progress(callbacks: Sequence[Callback], progress: Progress | None) -> list[Callback]:
     """Return given callbacks and one that forwards the progress, by default to a bar.
 
     Raises:
         InputError: They are no callbacks, or `progress` is no function.
     """
-    known = Several(Instance(Callback), 0, _MANY).read(given, "callbacks")
-    return [*known, ForwardProgress(as_progress(progress))]
+    callbacks = Several(Instance(Callback), 0, _MANY).read(callbacks, "callbacks")
+    return [*callbacks, ForwardProgress(as_progress(progress))]
 
 
 class ForwardProgress(Callback):

@@ -156,9 +156,9 @@ class Cloner:
     def _terms(self, frames: RecordedFrames, chunk: TensorDictBase) -> TensorDict:
         """Return the mean loss and the accuracy of the frames with the indices "row"."""
         rows = chunk.get("row")
-        taken, own = frames.actions[rows], self.network.actions
+        taken, actions = frames.actions[rows], self.network.actions
         outputs = self.network(frames.observe(rows, self.transforms))
-        is_same = own.part(own.greedy(outputs)) == own.part(taken)
+        is_same = actions.part(actions.greedy(outputs)) == actions.part(taken)
         return TensorDict(
             {_LOSS: imitation_loss(outputs, taken).mean(), "accuracy": is_same.float().mean()}
         )

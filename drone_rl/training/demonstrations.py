@@ -95,9 +95,9 @@ class FlightConditions:
 
         `where` is the name of the demonstration for messages.
         """
-        own, theirs = self._effective, other._effective
-        for name in dict.fromkeys(("dynamics.mode", "actions.kind", *own, *theirs)):
-            recorded, needed = own.get(name), theirs.get(name)
+        ours, theirs = self._effective, other._effective
+        for name in dict.fromkeys(("dynamics.mode", "actions.kind", *ours, *theirs)):
+            recorded, needed = ours.get(name), theirs.get(name)
             if recorded != needed:
                 raise InputError(
                     f"{where} was recorded with {name}={_text(recorded)}, but this training has "
@@ -254,13 +254,13 @@ def read_demonstrations(
             f"demonstrations={folder} holds {len(paths)} files *.npz; give a folder with 1 to "
             f"{MOST_DEMONSTRATIONS} recorded flights"
         )
-    found = []
+    demonstrations = []
     for path in paths:
         demonstration = read_demonstration(path)
         if conditions is not None:
             demonstration.conditions.check_same(conditions, str(path))
-        found.append(demonstration)
-    return found
+        demonstrations.append(demonstration)
+    return demonstrations
 
 
 def add_demonstration(folder: str | Path, demonstration: Demonstration) -> Path:
@@ -331,7 +331,7 @@ def record_oracle(
         oracle = oracle_policy(settings.task, env.worlds.dynamics.actions)
         act: Any = oracle.module
         watching = TensorDictModule(
-            lambda pixels, *known: act(*known),
+            lambda pixels, *entries: act(*entries),
             in_keys=["pixels", *oracle.in_keys],
             out_keys=["action"],
         )

@@ -367,13 +367,13 @@ def descend(
     Raises:
         NotANumberError: The gradient is NaN or infinite; no parameter was changed.
     """
-    known = {name: p for name, p in parameters if p.grad is not None}
-    gradients = {name: p.grad for name, p in known.items() if p.grad is not None}
+    weights = {name: p for name, p in parameters if p.grad is not None}
+    gradients = {name: p.grad for name, p in weights.items() if p.grad is not None}
     norm = get_total_norm(gradients.values())
     if not bool(torch.isfinite(norm)):  # or finite numbers whose squares are not
         for name, gradient in gradients.items():
             check_finite(gradient, f"the gradient of {name}")
     if max_norm is not None:
-        clip_grads_with_norm_(known.values(), max_norm, norm)
+        clip_grads_with_norm_(weights.values(), max_norm, norm)
     optimizer.step()
     return float(norm)

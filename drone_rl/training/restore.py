@@ -44,10 +44,10 @@ def check_fits(saved: Any, own: Any, where: str) -> None:
 
 def check_optimizer(saved: Any, optimizer: torch.optim.Optimizer) -> None:
     """Check a state of an optimizer as `check_fits` does, before or after its first step."""
-    own = _after_a_step(optimizer)
+    current = _after_a_step(optimizer)
     if isinstance(saved, Mapping) and saved.get("state") == {}:
-        own["state"] = {}
-    check_fits(saved, own, "optimizer")
+        current["state"] = {}
+    check_fits(saved, current, "optimizer")
 
 
 def _after_a_step(optimizer: torch.optim.Optimizer) -> dict[str, Any]:

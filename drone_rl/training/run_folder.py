@@ -168,7 +168,7 @@ class RunFolder:
             InputError: The checkpoint has other settings, a demonstration is unusable, or there are
                 demonstrations for a recurrent policy or for resuming a run that began without any.
         """
-        folder, found = settings.demonstrations, []
+        folder, demonstrations = settings.demonstrations, []
         if state is not None:
             check_same_config(_own(state["config"]), as_config(settings), MAY_CHANGE)
             if folder is not None and "cloning" not in state:
@@ -179,10 +179,10 @@ class RunFolder:
         elif folder is not None:
             if describe(settings).is_recurrent:
                 raise InputError(refusal("the policy", "cloning", "set another network=..."))
-            found = read_demonstrations(folder, FlightConditions.of(settings))
+            demonstrations = read_demonstrations(folder, FlightConditions.of(settings))
         elif settings.cloning != CloningSettings():
             _log.warning("settings of cloning have no effect without demonstrations=FOLDER")
-        return found
+        return demonstrations
 
     def checkpoints(self, settings: TrainSettings) -> CheckpointCallback:
         """Return the callback that writes checkpoints, with the settings and their origin."""
@@ -226,13 +226,13 @@ def check_judge(settings: TrainSettings, judge: Judge | None) -> None:
     """Refuse, before the training, a task that the verdict after it would refuse."""
     if not settings.evaluate_after:
         return
-    given = f"evaluate_after={settings.evaluate_after}"
+    setting = f"evaluate_after={settings.evaluate_after}"
     if judge is None:
-        raise InputError(f"{given} needs a judge; give judge=, as drone_rl.train does")
+        raise InputError(f"{setting} needs a judge; give judge=, as drone_rl.train does")
     try:
         judge.check(as_task(settings.task), describe(settings).make_dynamics().actions)
     except InputError as error:
-        raise InputError(f"{given}: {error}; or give evaluate_after=0") from None
+        raise InputError(f"{setting}: {error}; or give evaluate_after=0") from None
 
 
 def possible_ends(settings: TrainSettings) -> list[enum.IntEnum]:
@@ -268,12 +268,12 @@ def result_of(
     confirmed = {} if confirmation is None else confirmation.result
     cloned = {k: v for k, v in checkpoints.extra.items() if k == "cloning"}
     progress = dataclasses.asdict(trainer.progress)
-    own = {
+    figures = {
         "reason": trainer.reason,
         **progress,
         "largest_reward": as_task(settings.task).largest_reward,
     }
-    return {**own, **confirmed, **cloned}
+    return {**figures, **confirmed, **cloned}
 
 
 def finish(

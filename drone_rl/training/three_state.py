@@ -57,13 +57,13 @@ def sample_gradients(count: int, *, episodes: int = 8, horizon: int = 3, seed: i
     Their expectation is the sum of `drone_rl.envs.three_state.exact_gradient` over the steps.
     """
     learner = _Learner(episodes, horizon, seed)
-    found = []
+    gradients = []
     for _ in range(count):
         learner.accumulate_gradient()
         (weight,) = learner.table.parameters()
         assert weight.grad is not None
-        found.append(-weight.grad[1, 0].clone())
-    return torch.stack(found)
+        gradients.append(-weight.grad[1, 0].clone())
+    return torch.stack(gradients)
 
 
 class _Learner:

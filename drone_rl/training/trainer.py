@@ -263,8 +263,8 @@ class Trainer:
             yield
             return
         watched = (signal.SIGINT, signal.SIGTERM)
-        found = {number: signal.getsignal(number) for number in watched}
-        before = {n: handler for n, handler in found.items() if handler is not None}
+        handlers = {number: signal.getsignal(number) for number in watched}
+        before = {n: handler for n, handler in handlers.items() if handler is not None}
 
         first_s = 0.0
 
@@ -306,14 +306,14 @@ class Trainer:
         Raises:
             InputError: It is not the state of such a training run.
         """
-        own = self.state_dict()
-        for key in own:
+        current = self.state_dict()
+        for key in current:
             if key not in state:
                 raise InputError(f"the checkpoint has no {key}, so no run can resume from it")
         self.learner.check_state(state)
         for key in ("collector", "estimator", "generators", "torch_rng", "progress"):
-            if key in own:
-                check_fits(state[key], own[key], key)
+            if key in current:
+                check_fits(state[key], current[key], key)
         try:
             self.learner.load_state_dict(state)
             self.collector.load_state_dict(state["collector"])

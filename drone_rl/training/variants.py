@@ -43,18 +43,18 @@ def rollout_collector(
 
 @implements(A2c, Ppo)
 def _actor_critic_learner(
-    settings: TrainSettings, components: Components, **own: Any
+    settings: TrainSettings, components: Components, **options: Any
 ) -> ActorCriticLearner:
     """Make the learner with a critic, on the policy's features or with its own network.
 
-    `own` are the settings of TorchRL's loss, whose dotted name is the objective's target.
+    `options` are the settings of TorchRL's loss, whose dotted name is the objective's target.
     """
     objective = settings.objective
     assert isinstance(objective, WithCritic)
     weights = torch_generator(settings.seed, Stream.CRITIC_INIT)
     critic = None if objective.shares_trunk else describe(settings).build_critic(weights)
     model = ActorCritic(components.network, critic, weights).to(settings.device)
-    loss = locate(objective.target)(model.actor, model.critic, functional=False, **own)
+    loss = locate(objective.target)(model.actor, model.critic, functional=False, **options)
     loss.deterministic_sampling_mode = exploration_type()  # see `ReinforceLoss`
     optimizer = settings.optimizer.make(model.parameters())
     learner = ActorCriticLearner(

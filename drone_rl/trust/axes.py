@@ -212,9 +212,9 @@ def check_axes(names: Iterable[str]) -> None:
     """Raise an `InputError` if one of the names is neither an axis nor a group."""
     for name in names:
         if name not in (*GROUPS, *AXES):
-            known = ", ".join(dict.fromkeys((*GROUPS, *AXES)))
+            options = ", ".join(dict.fromkeys((*GROUPS, *AXES)))
             meant = did_you_mean(name, (*GROUPS, *AXES))
-            raise InputError(f"axes={name} is unknown; give some of: {known}{meant}")
+            raise InputError(f"axes={name} is unknown; give some of: {options}{meant}")
 
 
 def find_axes(names: Iterable[str] | None, subject: EvaluatedPolicy) -> list[Axis]:
@@ -230,10 +230,10 @@ def find_axes(names: Iterable[str] | None, subject: EvaluatedPolicy) -> list[Axi
         return [axis.of(subject) for axis in AXES.values() if _is_for(axis, subject)]
     wanted = [*names]
     check_axes(wanted)
-    found = [axis for axis in AXES.values() if {axis.name, axis.group} & {*wanted}]
-    for axis in found:
+    axes = [axis for axis in AXES.values() if {axis.name, axis.group} & {*wanted}]
+    for axis in axes:
         axis.make(axis.strengths[0], subject)  # raises if it is not for the task or renderer
-    return [axis.of(subject) for axis in found]
+    return [axis.of(subject) for axis in axes]
 
 
 def _is_for(axis: Axis, subject: EvaluatedPolicy) -> bool:

@@ -146,7 +146,7 @@ def _load(policies: Any, outputs: str | Path) -> list[BasePolicy]:
     return loaded
 
 
-def changes_of(body: str, own: DynamicsSettings) -> Mapping[str, Any]:
+def changes_of(body: str, dynamics: DynamicsSettings) -> Mapping[str, Any]:
     """Return the settings in which named dynamics differ from a policy's own.
 
     Wind, if any, blows from the right, with gusts of a quarter of its speed along each axis.
@@ -159,7 +159,7 @@ def changes_of(body: str, own: DynamicsSettings) -> Mapping[str, Any]:
         speed = float(body.split()[1])
         return {**flying, "wind": [0.0, speed, 0.0], "gusts": GUSTS * speed}
     if body == "motors twice as slow":
-        return {**flying, "rotor_time_constant": 2.0 * own.rotor_time_constant}
+        return {**flying, "rotor_time_constant": 2.0 * dynamics.rotor_time_constant}
     return {**flying, "camera_mount": "body"} if body == "camera on the body" else flying
 
 
@@ -167,7 +167,9 @@ def rows(numbers: Evidence) -> list[list[str]]:
     """Return a table of texts: names of dynamics, then a row for each policy."""
     bodies, verdicts = [str(body) for body in numbers["bodies"]], numbers["policies"]
     table = [["", *bodies]]
-    table += [[name, *(cell(found[body]) for body in bodies)] for name, found in verdicts.items()]
+    table += [
+        [name, *(cell(by_body[body]) for body in bodies)] for name, by_body in verdicts.items()
+    ]
     if LOOPED not in numbers:
         return table
     column = [LOOPED, *(sitl_cell(numbers[LOOPED][name]) for name in verdicts)]

@@ -68,7 +68,7 @@ def _curve(
     name: str,
     along: Mapping[str, Any],
     plain: Mapping[str, Any],
-    found: Mapping[str, Any] | None,
+    range_: Mapping[str, Any] | None,
 ) -> None:
     levels = [level for level in along["levels"] if level["refused"] is None]
     ticks = [(0.0, along["neutral"]), *((v["position"], v["value"]) for v in levels)]
@@ -78,16 +78,16 @@ def _curve(
         ]
         if len(points) > 1:
             _line(axis, sorted(points, key=lambda point: point[0]), mode)
-    known = [(0.0, plain["oracle"]), *((v["position"], v["oracle"]) for v in levels)]
+    oracles = [(0.0, plain["oracle"]), *((v["position"], v["oracle"]) for v in levels)]
     if plain["oracle"] is not None:
-        where, shares = zip(*sorted((x, o["share"]) for x, o in known), strict=True)
+        where, shares = zip(*sorted((x, o["share"]) for x, o in oracles), strict=True)
         label = "oracle"
         axis.plot(where, shares, color=_ORACLE, lw=1, label=label, zorder=1)
     for level in levels:
         if level["impossible"]:
             axis.plot(level["position"], 0.03, "x", color=css(BAD), label="impossible", ls="")
-    if found is not None and found["positions"] is not None:
-        low, high = found["positions"]
+    if range_ is not None and range_["positions"] is not None:
+        low, high = range_["positions"]
         axis.axvspan(low, high, color=_GOOD, alpha=0.13, lw=0, label="certainly good in this range")
     ticks.sort(key=lambda tick: tick[0])
     axis.set_xticks([x for x, _ in ticks], [_value(value) for _, value in ticks], fontsize=8)

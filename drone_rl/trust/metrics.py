@@ -84,6 +84,6 @@ def failure_table(episodes: CompleteEpisodes) -> dict[str, Any]:
 
 
 def _row(by: str, value: str, episodes: int, failed: int, *, confidence: float) -> dict[str, Any]:
-    found = proportion(failed, episodes, confidence)
-    interval = {key: found[key] for key in ("share", "lower95", "upper95")}
+    estimate = proportion(failed, episodes, confidence)
+    interval = {key: estimate[key] for key in ("share", "lower95", "upper95")}
     return {"by": by, "value": value, "episodes": episodes, "failed": failed, **interval}

@@ -120,7 +120,7 @@ def scene_appearance(scene: Scene) -> Appearance:
     """
     classes = {*scene.semantic_classes} - {SemanticClass.DISTRACTOR}
     by_class = {m: {*map(tuple, scene.colors[scene.geoms(m), :3].tolist())} for m in classes}
-    colors = {m: next(iter(own)) for m, own in by_class.items() if len(own) == 1}
+    colors = {m: next(iter(shades)) for m, shades in by_class.items() if len(shades) == 1}
     model = scene.model
     lights = (model.light_ambient[0], model.light_diffuse[0], model.light_dir[0])
     ambient, sun, direction = (tuple(light.tolist()) for light in lights)
@@ -135,14 +135,14 @@ def scene_appearance(scene: Scene) -> Appearance:
 def tint(classes: Sequence[SemanticClass], by: float) -> AppearanceChange:
     """Shift red, green and blue of some classes by up to `by`, differently in each environment."""
     return AppearanceChange(
-        lambda look, v: _repaint(look, classes, lambda own: (own.to(v) + by * v).clamp(0, 1)), 3
+        lambda look, v: _repaint(look, classes, lambda color: (color.to(v) + by * v).clamp(0, 1)), 3
     )
 
 
 def whiten(classes: Sequence[SemanticClass], fraction: float) -> AppearanceChange:
     """Mix this fraction of white into the colors of some classes."""
     return AppearanceChange(
-        lambda look, _: _repaint(look, classes, lambda own: own + fraction * (1.0 - own))
+        lambda look, _: _repaint(look, classes, lambda color: color + fraction * (1.0 - color))
     )
 
 
@@ -165,8 +165,8 @@ def expose(gain: float) -> AppearanceChange:
     """Multiply the camera's exposure; values above white are white."""
 
     def change(appearance: Appearance, variation: Tensor) -> Appearance:
-        own = 1.0 if appearance.exposure is None else appearance.exposure
-        return dataclasses.replace(appearance, exposure=gain * own)
+        exposure = 1.0 if appearance.exposure is None else appearance.exposure
+        return dataclasses.replace(appearance, exposure=gain * exposure)
 
     return AppearanceChange(change)
 
@@ -236,8 +236,10 @@ def clutter(appearance: Appearance | None, region: ObjectRegion, places: Tensor)
         colors=color.expand(places.shape),
     )
     appearance = appearance or Appearance()
-    own = appearance.distractors
-    return dataclasses.replace(appearance, distractors=more if own is None else own.concat(more))
+    distractors = appearance.distractors
+    return dataclasses.replace(
+        appearance, distractors=more if distractors is None else distractors.concat(more)
+    )
 
 
 def frozen_frames(rate: float) -> FaultModel:

@@ -175,10 +175,10 @@ def shifts(
 def ranges_of(numbers: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Convert the operating domain of `shifts.json` to the format of `require_domain`."""
     return {
-        name: {end: found[end] for end in ("low", "high") if found[end] is not None}
+        name: {end: range_[end] for end in ("low", "high") if range_[end] is not None}
         | {"unit": AXES[name].unit}
-        for name, found in numbers["domain"]["ranges"].items()
-        if found["positions"] is not None and is_tested(numbers, name)
+        for name, range_ in numbers["domain"]["ranges"].items()
+        if range_["positions"] is not None and is_tested(numbers, name)
     }
 
 

@@ -102,13 +102,13 @@ class _Each:
 
     def read(self, value: Any, where: str) -> dict[str, Any]:
         """See `drone_rl.utils.schema.Kind`."""
-        given = as_mapping(value, where)
+        items = as_mapping(value, where)
         if self.names is None:
-            Plain().read(given, where)
+            Plain().read(items, where)
         else:
-            for key in given:
+            for key in items:
                 OneOf(self.names).read(key, f"a name in {where}")
-        return {key: self.kind.read(item, f"{where}.{key}") for key, item in given.items()}
+        return {key: self.kind.read(item, f"{where}.{key}") for key, item in items.items()}
 
 
 _ANY = Real(-1e12, 1e12)

@@ -58,7 +58,7 @@ class FindClaim(Protocol):
     def __call__(
         self,
         policy: BasePolicy,
-        given: str | Path | None = None,
+        certificate: str | Path | None = None,
         *,
         flights: int = ...,
         seed: RootSeed | None = None,
@@ -302,8 +302,8 @@ def observe_each(
     return [values.numpy() for values in observed]
 
 
-def _is_certain(found: tuple[Quantity, ...], rule: Rule) -> bool:
-    box = tuple(quantity.levels for quantity in found)
+def _is_certain(quantities: tuple[Quantity, ...], rule: Rule) -> bool:
+    box = tuple(quantity.levels for quantity in quantities)
     return len(kinds_within(box, len(rule.strata))) == 1
 
 

@@ -44,10 +44,10 @@ class Batch:
 
     def with_tensors(self, tensors: Mapping[str, Any]) -> Self:
         """Return a batch with copies of the tensors that `tensors` returned."""
-        own = {k: (v, tensors[k]) for k, v in vars(self).items()}
+        pairs = {k: (v, tensors[k]) for k, v in vars(self).items()}
         return type(self)(
             **{
                 k: v.with_tensors(new) if isinstance(v, Batch) else new.to(v, copy=True)
-                for k, (v, new) in own.items()
+                for k, (v, new) in pairs.items()
             }
         )

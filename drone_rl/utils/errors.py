@@ -14,12 +14,12 @@ class InputError(ValueError):
     """
 
 
-def did_you_mean(name: object, known: Iterable[str]) -> str:
+def did_you_mean(name: object, names: Iterable[str]) -> str:
     """Return the end of a message with the known name that is most like an unknown one.
 
     Else it is the only one with the unknown name among its words, as in fov and horizontal_fov.
     """
-    lower, word = {one.lower(): one for one in known}, str(name)[:100].lower()
+    lower, word = {one.lower(): one for one in names}, str(name)[:100].lower()
     near = difflib.get_close_matches(word, lower, 1, 0.7)
     if not near:
         longer = [one for one in lower if word in one.split("_")]

@@ -132,11 +132,11 @@ def mean_interval(
     """
     means = episode_means(values, episode)
     bounds = mean_bounds(means, low, high)
-    known = bounds["mean"] is not None
+    has_mean = bounds["mean"] is not None
     return {
         "mean": bounds["mean"],
-        "lower95": bounds["lower95"] if known else None,
-        "upper95": bounds["upper95"] if known else None,
+        "lower95": bounds["lower95"] if has_mean else None,
+        "upper95": bounds["upper95"] if has_mean else None,
         "frames": int(np.isfinite(values).sum()),
         "episodes": len(means),
     }

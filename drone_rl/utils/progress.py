@@ -33,14 +33,14 @@ def log(text: str, done: int = 0, total: int = 0) -> None:
     _log.info("%s", f"[{done}/{total}] {text}" if total else text)
 
 
-def as_progress(given: Progress | None) -> Progress:
+def as_progress(progress: Progress | None) -> Progress:
     """Return an argument `progress`, a bar by default; raise an `InputError` for other values."""
-    if given is not None and not callable(given):
+    if progress is not None and not callable(progress):
         raise InputError(
-            f"progress={shown(given)} is no function; leave it out for a bar, or give "
+            f"progress={shown(progress)} is no function; leave it out for a bar, or give "
             "drone_rl.utils.progress.silent for none"
         )
-    return given or Bar()
+    return progress or Bar()
 
 
 class Bar:

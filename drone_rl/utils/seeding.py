@@ -91,9 +91,9 @@ def fresh_seed() -> int:
     return secrets.randbits(FRESH_BITS)
 
 
-def root_seed(given: int | None) -> RootSeed:
+def root_seed(seed: int | None) -> RootSeed:
     """Return the given seed, or a fresh one."""
-    return RootSeed(fresh_seed(), False) if given is None else RootSeed(given, True)
+    return RootSeed(fresh_seed(), False) if seed is None else RootSeed(seed, True)
 
 
 def with_seed(settings: T, drawn: RootSeed | None = None) -> tuple[T, RootSeed]:

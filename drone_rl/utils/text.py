@@ -148,8 +148,8 @@ def fixed_seed(name: str, what: str = "environments") -> Sentence:
 
     def text(evidence: Evidence) -> str:
         seed = evidence.get("seed")
-        known = f"Fixed {what}" if seed is None else f"Fixed seed {seed}"
-        return f"{known}: a policy could have been fitted to these {what}."
+        label = f"Fixed {what}" if seed is None else f"Fixed seed {seed}"
+        return f"{label}: a policy could have been fitted to these {what}."
 
     return Sentence(name, "the seed was known before the analysis", is_fixed, text)
 

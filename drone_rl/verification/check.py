@@ -71,8 +71,8 @@ class Check(Result):
     def lines(self) -> list[str]:
         """Return the result, the statements, and each finding in one line."""
         stated, seed = self.certificate, self.seed.as_dict()
-        own = self.policy.state["description"]["task"]
-        changed = [f"{n}={v}" for n, v in self.policy.task.values().items() if own.get(n) != v]
+        task = self.policy.state["description"]["task"]
+        changed = [f"{n}={v}" for n, v in self.policy.task.values().items() if task.get(n) != v]
         return [
             f"{'accepted' if self.accepted else 'refused'}: {self.path}, of policy "
             f"{self.policy.name}{' with ' if changed else ''}{', '.join(changed)}, "

@@ -97,7 +97,7 @@ class Claim:
 
 def find_claim(
     policy: BasePolicy,
-    given: str | Path | None = None,
+    certificate: str | Path | None = None,
     *,
     flights: int = JudgeSettings.certificate_flights,
     seed: RootSeed | None = None,
@@ -115,15 +115,15 @@ def find_claim(
         InputError: The given one is unreadable, of another network or task, or refuted.
     """
     if not isinstance(policy, Policy):
-        if given is not None:
+        if certificate is not None:
             raise InputError(
-                f"certificate={given}, but policy={policy.name} was made elsewhere, and nothing is "
-                "proved of it; leave the certificate out"
+                f"certificate={certificate}, but policy={policy.name} was made elsewhere, and "
+                "nothing is proved of it; leave the certificate out"
             )
         return None
     seed = seed or root_seed(None)
-    if given is not None:
-        path = as_path(given, "certificate")
+    if certificate is not None:
+        path = as_path(certificate, "certificate")
         path = path / "certificate.json" if path.is_dir() else path
         return _read_and_check(policy, path, flights, seed, device, renderer)
     path = certificate_path(policy.path)
@@ -170,16 +170,16 @@ def _read_and_check(
     certificate = read_validated(path, policy.description, weights)
     if not flights:
         return Claim(path, certificate)
-    found = check_certificate(
+    findings = check_certificate(
         certificate, weights, flights=flights, seed=seed.value, device=device, renderer=renderer
     )
-    if not found.accepted:
-        raise InputError(f"certificate {path} does not hold: {found.lines()[0]}; prove again")
+    if not findings.accepted:
+        raise InputError(f"certificate {path} does not hold: {findings.lines()[0]}; prove again")
     return Claim(
         path,
         certificate,
-        flights=sum(found.flights.values()),
-        uniform=found.flights.get(ANYWHERE, 0),
+        flights=sum(findings.flights.values()),
+        uniform=findings.flights.get(ANYWHERE, 0),
         seed=seed.value,
         seed_is_fixed=seed.is_fixed,
     )

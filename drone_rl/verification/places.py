@@ -120,15 +120,15 @@ def places(
             settings.compared, np.random.RandomState(legacy_seed(fresh_seed()))
         )
         progress("deciding the cells")
-        found = map_policy(spec.images, transform, network, settings)
+        action_map = map_policy(spec.images, transform, network, settings)
     progress("mapped", 1, 1)
     numbers = {
         "policy": policy.name,
         "path": str(policy.path),
         "task": policy.task.values(),
         "names": list(SHOWN_MOVES.names),
-        **found.summary(settings.logit_gap),
+        **action_map.summary(settings.logit_gap),
         "compared": compared,
         "seconds": time.perf_counter() - begin,
     }
-    return Places(policy, settings, found, numbers)
+    return Places(policy, settings, action_map, numbers)

@@ -29,11 +29,11 @@ def places_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]
     """
     settings = PlacesSettings()
     try:
-        found = _exact_map(context, settings)
+        action_map = _exact_map(context, settings)
     except InputError as error:
         return {"places": {"refused": str(error)}}, {}
-    arrays = {f"places_{name}": array for name, array in found.outlines().items()}
-    return {"places": found.summary(settings.logit_gap)}, arrays
+    arrays = {f"places_{name}": array for name, array in action_map.outlines().items()}
+    return {"places": action_map.summary(settings.logit_gap)}, arrays
 
 
 def _exact_map(context: Context, settings: PlacesSettings) -> ActionMap:

@@ -249,17 +249,17 @@ def find_failures(
         Placements, metres to the left of the start, (failures, num_cubes); number of episodes.
     """
     names = ("collected", "cube_positions")
-    found: list[NDArray[np.float64]] = []
+    failures: list[NDArray[np.float64]] = []
     episodes = 0
     for batch in episode_batches(env, actor, num_episodes, keep=names, is_exact=False):
         is_last = batch["next", "done"][:, 0]
         collected, cubes = (batch["next", "info", name][is_last] for name in names)
         failed = cubes[~collected.all(-1)]
-        found.append(np.asarray(failed[..., 1].double().cpu()))
+        failures.append(np.asarray(failed[..., 1].double().cpu()))
         episodes += len(collected)
-        if sum(map(len, found)) >= enough:
+        if sum(map(len, failures)) >= enough:
             break
-    return np.concatenate(found), episodes
+    return np.concatenate(failures), episodes
 
 
 def _is_stopped(journal: Journal, result: Mapping[str, Any]) -> bool:

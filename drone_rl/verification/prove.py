@@ -161,13 +161,13 @@ def _prove(
     begin = time.monotonic()
     stopped = _advance(prover, settings, progress, state, proof_id)
     seconds = time.monotonic() - begin
-    found = certify(policy.name, policy.description, weights, prover, seconds, stopped)
-    found |= provenance()
+    certificate = certify(policy.name, policy.description, weights, prover, seconds, stopped)
+    certificate |= provenance()
     if folder is not None and state is not None:
-        write_atomically(folder / _CERTIFICATE_NAME, json.dumps(found))
+        write_atomically(folder / _CERTIFICATE_NAME, json.dumps(certificate))
         if prover.is_finished:
             state.unlink(missing_ok=True)
-    return Proof(found, folder)
+    return Proof(certificate, folder)
 
 
 def _advance(

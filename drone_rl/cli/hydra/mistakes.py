@@ -82,11 +82,11 @@ def _problem(word: str, name: str, conf: Path, words: Sequence[str]) -> str | No
     group = key.lstrip("+").partition("@")[0]
     if not _is_group(conf, group) or "(" in value or _has_own_folders(words):
         return None
-    known = choices(conf, group)
-    unknown = {*re.findall(r"[\w.-]+", value)} - {*known}
-    own = ", or your own with plugins=[MODULE]" if group in _EXTENSIBLE else ""
-    meant = did_you_mean(min(unknown), known) if unknown else ""
-    return f"{group} is one of {', '.join(known)}{own}{meant}" if unknown else None
+    options = choices(conf, group)
+    unknown = {*re.findall(r"[\w.-]+", value)} - {*options}
+    alternative = ", or your own with plugins=[MODULE]" if group in _EXTENSIBLE else ""
+    meant = did_you_mean(min(unknown), options) if unknown else ""
+    return f"{group} is one of {', '.join(options)}{alternative}{meant}" if unknown else None
 
 
 def explain(error: Exception, name: str, conf: Path, words: Sequence[str]) -> InputError:
@@ -146,8 +146,8 @@ def similar(name: str, keys: Collection[str]) -> Iterator[str]:
     for key in difflib.get_close_matches(word, keys, 1, 0.85):
         yield key
     for end in dict.fromkeys((word, last, *near)):
-        known = [key for key in ends.get(end, ()) if key.partition("=")[0] in keys]
-        yield from sorted(known, key=lambda key: not key.startswith(f"{group}."))
+        matches = [key for key in ends.get(end, ()) if key.partition("=")[0] in keys]
+        yield from sorted(matches, key=lambda key: not key.startswith(f"{group}."))
 
 
 def no_command(word: str, following: Sequence[str], commands: Sequence[str]) -> str:

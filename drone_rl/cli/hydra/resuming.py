@@ -71,8 +71,8 @@ def _is_run(folder: Path) -> bool:
 
 def _outputs(typed: Sequence[str]) -> Path:
     """Return the folder of all outputs."""
-    given = [o.partition("=")[2] for o in typed if o.startswith("paths.outputs=")]
-    return Path(_unquoted((given or ["outputs"])[-1]))
+    folders = [o.partition("=")[2] for o in typed if o.startswith("paths.outputs=")]
+    return Path(_unquoted((folders or ["outputs"])[-1]))
 
 
 def _newest_run(outputs: Path) -> Path:
@@ -109,8 +109,8 @@ def resume_command(folder: Path) -> str:
 
 def _overrides() -> list[str]:
     """The settings of the running command."""
-    found: Any = OmegaConf.to_container(HydraConfig.get().overrides.task)  # without interpolation
-    return [str(override) for override in found]
+    values: Any = OmegaConf.to_container(HydraConfig.get().overrides.task)  # without interpolation
+    return [str(override) for override in values]
 
 
 def _resume(folder: Path) -> str:

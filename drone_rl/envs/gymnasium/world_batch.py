@@ -55,7 +55,7 @@ def action_space(entry: Entry) -> spaces.Space[Any]:
     return space(np.full(entry.shape, count) if entry.shape else count)
 
 
-def read_action(given: Any, actions: Actions, batch: tuple[int, ...] = ()) -> Tensor:
+def read_action(action: Any, actions: Actions, batch: tuple[int, ...] = ()) -> Tensor:
     """Check and convert an action, or a batch of them. Shape: (*batch, *actions.entry.shape).
 
     Raises:
@@ -64,7 +64,7 @@ def read_action(given: Any, actions: Actions, batch: tuple[int, ...] = ()) -> Te
     entry, (low, high) = actions.entry, _finite_bounds(actions.entry)
     is_whole = entry.dtype == torch.int64
     try:
-        array = np.asarray(given)
+        array = np.asarray(action)
     except (ValueError, TypeError, RuntimeError):  # a ragged list, a tensor elsewhere
         array = np.empty(0, object)
     shape = (*batch, *entry.shape)
@@ -73,7 +73,7 @@ def read_action(given: Any, actions: Actions, batch: tuple[int, ...] = ()) -> Te
         numbers = ", ".join(f"{i} {name}" for i, name in enumerate(actions.names))
         numbers = numbers if is_whole else f"numbers from {low:g} to {high:g}"
         many = f"an array of shape {shape} of" if shape else "one of"
-        text = " ".join(repr(given).split())[:80]
+        text = " ".join(repr(action).split())[:80]
         raise InputError(f"action={text} is invalid; give {many}: {numbers}")
     return torch.as_tensor(array, dtype=entry.dtype)
 
@@ -110,22 +110,22 @@ class KeywordError(InputError, TypeError):
 class WorldBatch:
     """A batch of environments, their observations and their spaces."""
 
-    def __init__(self, num_envs: int, task: Chosen, given: Mapping[str, Any]) -> None:
+    def __init__(self, num_envs: int, task: Chosen, arguments: Mapping[str, Any]) -> None:
         """Create the environments.
 
-        `given` has fields of `GymnasiumSettings`, some as mappings, and settings of the task.
+        `arguments` has fields of `GymnasiumSettings`, some as mappings, and settings of the task.
 
         Raises:
             InputError: An option or setting is unknown or out of range.
         """
         names = kinds_of(GymnasiumSettings)
-        options = {name: value for name, value in given.items() if name in names}
+        options = {name: value for name, value in arguments.items() if name in names}
         for name, kind in _PARTS.items():
             if isinstance(options.get(name), Mapping):
                 options[name] = kind(**Changes(kind).read(options[name], name))
         options = GymnasiumSettings(**options)
         options.dynamics.check_air()
-        changes = {name: value for name, value in given.items() if name not in names}
+        changes = {name: value for name, value in arguments.items() if name not in names}
         self.options = options
         self.task = _chosen_task(task, changes)
         """The task or its settings."""
@@ -197,10 +197,10 @@ class WorldBatch:
 
 def _chosen_task(task: Chosen, changes: Mapping[str, Any]) -> BaseTaskSettings | Task[Any]:
     chosen: Any = settings_of(task, "task")() if isinstance(task, str) else task or TaskSettings()
-    known = kinds_of(type(chosen)) if isinstance(chosen, Settings) else {}
+    kinds = kinds_of(type(chosen)) if isinstance(chosen, Settings) else {}
     for name in changes:
-        if name not in known:
-            there = (*kinds_of(GymnasiumSettings), *known)
+        if name not in kinds:
+            there = (*kinds_of(GymnasiumSettings), *kinds)
             meant = did_you_mean(name, there)
             raise KeywordError(
                 f"unexpected keyword argument {name!r}; valid names: {', '.join(there)}{meant}"

@@ -187,8 +187,8 @@ class Airframe(Pilot):
         seconds = ticks * self.settings.tick
         if len(self._unseen) == RECENT:
             _, earlier = self._unseen.popleft()
-            body, own = self._unseen[0]
-            self._unseen[0] = (body, own + earlier)
+            body, duration = self._unseen[0]
+            self._unseen[0] = (body, duration + earlier)
         self._unseen.append((self.body, seconds))
 
     def change_dynamics(self, dynamics: DynamicsSettings) -> None:
@@ -324,13 +324,13 @@ class Airframe(Pilot):
         With `is_legacy` it is that of AirSim 1.1, see `CollisionRecord.read_current`.
         """
         record = self.collisions
-        found, is_new = record.read_current(self.time) if is_legacy else record.read(clear=read)
+        collision, is_new = record.read_current(self.time) if is_legacy else record.read(clear=read)
         return collision_info(
-            found,
+            collision,
             has_collided=is_new,
             home=self._home,
-            time_stamp=self._stamp(found.time) if found else 0,
-            number=self._object_id(found.name) if found else -1,
+            time_stamp=self._stamp(collision.time) if collision else 0,
+            number=self._object_id(collision.name) if collision else -1,
         )
 
     def sensor(self, kind: str) -> Map:

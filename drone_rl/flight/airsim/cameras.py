@@ -42,19 +42,19 @@ class CameraState:
 
     def capture(self, kind: ImageType) -> Capture:
         """Return the size and field of view of images of a type."""
-        found = self.captures.get(kind, _DEFAULT)
-        return found if self.fov is None else dataclasses.replace(found, fov=self.fov)
+        capture = self.captures.get(kind, _DEFAULT)
+        return capture if self.fov is None else dataclasses.replace(capture, fov=self.fov)
 
     def mounting(self, capture: Capture, vertical_fov: float) -> Mounting | None:
         """Return how it differs from the model's camera; None if it does not.
 
         `vertical_fov` is that of the model's camera, degrees.
         """
-        own = math.degrees(
+        model_fov = math.degrees(
             2 * math.atan(math.tan(math.radians(vertical_fov) / 2) * capture.width / capture.height)
         )
         base = _attitude(self.name, Offset())
-        zoom = zoom_for_fov(own, torch.tensor(capture.fov, dtype=torch.float64))
+        zoom = zoom_for_fov(model_fov, torch.tensor(capture.fov, dtype=torch.float64))
         spec = find_camera(self.name)
         offset = tuple(a - b for a, b in zip(self.position, spec.pos, strict=True))
         turn = product(self.attitude, inverse(base))
@@ -85,11 +85,11 @@ def make_cameras(
     }
 
 
-def _camera(spec: Any, captures: Mapping[ImageType, Capture], own: CameraChoice) -> CameraState:
-    offset = own.offset
+def _camera(spec: Any, captures: Mapping[ImageType, Capture], choice: CameraChoice) -> CameraState:
+    offset = choice.offset
     x, y, z = known(to_world((offset.x, offset.y, offset.z)), spec.pos)
     attitude = _attitude(spec.name, offset)
-    return CameraState(spec.name, {**captures, **own.captures}, (x, y, z), attitude)
+    return CameraState(spec.name, {**captures, **choice.captures}, (x, y, z), attitude)
 
 
 def _attitude(name: str, offset: Offset) -> Tensor:

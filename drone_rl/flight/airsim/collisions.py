@@ -47,7 +47,7 @@ class VehicleCollision(NamedTuple):
 
 
 def collision_info(
-    found: VehicleCollision | None,
+    collision: VehicleCollision | None,
     *,
     has_collided: bool,
     home: Sequence[float],
@@ -55,20 +55,20 @@ def collision_info(
     number: int,
 ) -> Map:
     """Return a CollisionInfo, relative to the start position `home`, of an object's number."""
-    if found is None:
-        found = VehicleCollision("", home, home, (0.0, 0.0, 0.0), 0.0, 0.0)
+    if collision is None:
+        collision = VehicleCollision("", home, home, (0.0, 0.0, 0.0), 0.0, 0.0)
     point, place = (
         messages.vector(to_world([a - b for a, b in zip(value, home, strict=True)]))
-        for value in (found.point, found.position)
+        for value in (collision.point, collision.position)
     )
     return {
         "has_collided": has_collided,
-        "penetration_depth": found.depth,
+        "penetration_depth": collision.depth,
         "time_stamp": time_stamp,
-        "normal": messages.vector(to_world(found.normal)),
+        "normal": messages.vector(to_world(collision.normal)),
         "impact_point": point,
         "position": place,
-        "object_name": found.name,
+        "object_name": collision.name,
         "object_id": number,
     }
 
@@ -106,23 +106,23 @@ class CollisionRecord:
             if name in touched and now - one.time <= GAP
         }
 
-    def add(self, found: VehicleCollision) -> None:
+    def add(self, contact: VehicleCollision) -> None:
         """Note a contact."""
-        earlier = self._contacts.get(found.name)
-        self._contacts[found.name] = found
-        lasts = earlier is not None and found.time - earlier.time <= GAP
-        if found.is_event or not lasts:
-            self._last = self._unread[found.name] = found
+        earlier = self._contacts.get(contact.name)
+        self._contacts[contact.name] = contact
+        lasts = earlier is not None and contact.time - earlier.time <= GAP
+        if contact.is_event or not lasts:
+            self._last = self._unread[contact.name] = contact
 
     def read(self, *, clear: bool = True) -> tuple[VehicleCollision | None, bool]:
         """Return an unread collision, else the last one, and whether it was unread.
 
         With `clear` it is then read.
         """
-        found, is_unread = next(iter(self._unread.values()), self._last), bool(self._unread)
-        if clear and found is not None:
-            self._unread.pop(found.name, None)
-        return found, is_unread
+        collision, is_unread = next(iter(self._unread.values()), self._last), bool(self._unread)
+        if clear and collision is not None:
+            self._unread.pop(collision.name, None)
+        return collision, is_unread
 
     def read_current(self, now: float) -> tuple[VehicleCollision | None, bool]:
         """Return an unread event, else a contact that lasts at the vehicle's time `now`, seconds.
@@ -133,8 +133,8 @@ class CollisionRecord:
         if event is not None:
             return self._unread.pop(event.name), True
         lasting = (one for one in self._contacts.values() if now - one.time <= GAP)
-        found = next((one for one in lasting if not one.is_event), None)
-        return found or self._last, found is not None
+        contact = next((one for one in lasting if not one.is_event), None)
+        return contact or self._last, contact is not None
 
 
 class Solids(NamedTuple):

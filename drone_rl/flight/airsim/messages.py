@@ -99,12 +99,12 @@ def read_date(text: str) -> int:
     Raises an `InputError` if it is none, or before 1970.
     """
     try:
-        found = datetime.datetime.fromisoformat(text)
+        date = datetime.datetime.fromisoformat(text)
     except ValueError as error:
         raise InputError(
             f"date={shown(text)} is no date and time; give YYYY-MM-DDTHH:MM:SS"
         ) from error
-    seconds = (found if found.tzinfo else found.replace(tzinfo=datetime.UTC)).timestamp()
+    seconds = (date if date.tzinfo else date.replace(tzinfo=datetime.UTC)).timestamp()
     if seconds < 0.0:
         raise InputError(f"date={shown(text)} is before 1970; give a later one")
     return nanoseconds(seconds)
@@ -126,11 +126,11 @@ def attitude_to_world(values: Sequence[float]) -> Tensor:
 
     Raises an `InputError` if it has no length.
     """
-    given = torch.tensor(values, dtype=torch.float64)
-    length = float(given.norm())
+    attitude = torch.tensor(values, dtype=torch.float64)
+    length = float(attitude.norm())
     if not 1e-6 < length < math.inf:
         raise InputError(f"orientation={[*values]} is no rotation; give a unit quaternion")
-    return ned_attitude_from_world(given / length)
+    return ned_attitude_from_world(attitude / length)
 
 
 # What clients send
@@ -148,10 +148,10 @@ def number(value: Any, name: str, low: float = -_LARGEST, high: float = _LARGEST
 
 def whole(value: Any, name: str, low: int, high: int) -> int:
     """Return a whole number from `low` to `high`, else raise an `InputError`."""
-    found = number(value, name)
-    if not low <= found <= high or found != int(found):
+    real = number(value, name)
+    if not low <= real <= high or real != int(real):
         raise InputError(f"{name}={shown(value)} is out of range; give {low} to {high}")
-    return int(found)
+    return int(real)
 
 
 def flag(value: Any, name: str) -> bool:
@@ -185,14 +185,14 @@ def read_map(
     Numbers are limited to `most` in magnitude. Raises an `InputError` if it is no map, or a value
     is missing or no number; NaN is accepted if `can_be_nan`.
     """
-    found = []
+    numbers = []
     for key in keys:
-        given = part(value, name, key)
-        if can_be_nan and isinstance(given, float) and math.isnan(given):
-            found.append(given)
+        item = part(value, name, key)
+        if can_be_nan and isinstance(item, float) and math.isnan(item):
+            numbers.append(item)
         else:
-            found.append(number(given, f"{name}.{key}", -most, most))
-    return found
+            numbers.append(number(item, f"{name}.{key}", -most, most))
+    return numbers
 
 
 def read_vector(

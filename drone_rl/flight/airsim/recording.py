@@ -77,7 +77,7 @@ _USUAL = (RecordedImage("front_center", "0", ImageType.SCENE, False, True),)
 _ORIGIN = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 
 
-def read_choice(given: Mapping[str, Any], file: str) -> RecordingChoice:
+def read_choice(settings: Mapping[str, Any], file: str) -> RecordingChoice:
     """Return the choice of settings with the keys of `RECORDING`, and a list `Cameras`.
 
     Raises an `InputError` that names the file if a camera is unknown.
@@ -85,23 +85,23 @@ def read_choice(given: Mapping[str, Any], file: str) -> RecordingChoice:
     try:
         images = [
             RecordedImage(
-                find_camera(own.get("CameraName", "0")).name,
-                own.get("CameraName", "0"),
-                ImageType(own.get("ImageType", 0)),
-                own.get("PixelsAsFloat", False),
-                own.get("Compress", True),
-                own.get("VehicleName"),
+                find_camera(item.get("CameraName", "0")).name,
+                item.get("CameraName", "0"),
+                ImageType(item.get("ImageType", 0)),
+                item.get("PixelsAsFloat", False),
+                item.get("Compress", True),
+                item.get("VehicleName"),
             )
-            for own in given.get("Cameras", [])
+            for item in settings.get("Cameras", [])
         ]
     except InputError as error:
         raise InputError(f"{file}: Recording.Cameras: {error}") from error
     return RecordingChoice(
-        given.get("RecordOnMove", False),
-        float(given.get("RecordInterval", RecordingChoice.interval)),
-        given.get("Folder", ""),
-        given.get("Enabled", False),
-        tuple(images) if "Cameras" in given else None,
+        settings.get("RecordOnMove", False),
+        float(settings.get("RecordInterval", RecordingChoice.interval)),
+        settings.get("Folder", ""),
+        settings.get("Enabled", False),
+        tuple(images) if "Cameras" in settings else None,
     )
 
 

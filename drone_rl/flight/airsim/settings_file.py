@@ -162,16 +162,16 @@ def find_settings() -> AirsimSettings | None:
         path = folder / "settings.json"
         if path.is_file() and _is_of_airsim(path):
             try:
-                found = read_settings(path)
+                settings = read_settings(path)
             except InputError as error:
                 raise InputError(f"{error}; or give settings=FILE or settings=none") from error
             _log.info("settings: %s", path)
-            if found.address != ADDRESS:
+            if settings.address != ADDRESS:
                 _log.warning(
                     "%s: LocalHostIp=%s is ignored; give settings=FILE or address=",
-                    *(path, shown(found.address)),
+                    *(path, shown(settings.address)),
                 )
-            return dataclasses.replace(found, address=ADDRESS)
+            return dataclasses.replace(settings, address=ADDRESS)
     return None
 
 
@@ -206,25 +206,25 @@ def _read_text(path: Path) -> str:
 def parse_settings(text: str, name: str = "settings.json") -> AirsimSettings:
     """Read settings from the text of a file; see `read_settings` for errors."""
     data = _load(text, name)
-    found = _read(_FILE, data, "", name) or {}
-    if found.get("SimMode", "").lower() == "car":
+    settings = _read(_FILE, data, "", name) or {}
+    if settings.get("SimMode", "").lower() == "car":
         raise InputError(f"{name}: SimMode=Car is not supported; give {' or '.join(SIM_MODES)}")
-    scenario = found.get("UsageScenario", "")
-    posed = "ComputerVision" in (scenario, found.get("SimMode"))
+    scenario = settings.get("UsageScenario", "")
+    posed = "ComputerVision" in (scenario, settings.get("SimMode"))
     mode = SIM_MODES[1] if posed else SIM_MODES[0]
-    defaults = found.get("CameraDefaults", {})
+    defaults = settings.get("CameraDefaults", {})
     vehicles = [
-        _vehicle(vehicle, given, mode, name)
-        for vehicle, given in found.get("Vehicles", {}).items()
-        if given.get("AutoCreate", True)
+        _vehicle(vehicle, values, mode, name)
+        for vehicle, values in settings.get("Vehicles", {}).items()
+        if values.get("AutoCreate", True)
     ]
     default = VehicleChoice(_kind(mode), _kind(mode))
-    origin, wind = found.get("OriginGeopoint", {}), found.get("Wind", {})
+    origin, wind = settings.get("OriginGeopoint", {}), settings.get("Wind", {})
     return AirsimSettings(
         sim_mode=mode,
-        address=found.get("LocalHostIp") or ADDRESS,
-        port=found.get("ApiServerPort", PORT),
-        clock_speed=float(found.get("ClockSpeed", 1.0)),
+        address=settings.get("LocalHostIp") or ADDRESS,
+        port=settings.get("ApiServerPort", PORT),
+        clock_speed=float(settings.get("ClockSpeed", 1.0)),
         home=GeoPoint(
             float(origin.get("Latitude", HOME.latitude)),
             float(origin.get("Longitude", HOME.longitude)),
@@ -233,9 +233,9 @@ def parse_settings(text: str, name: str = "settings.json") -> AirsimSettings:
         wind=(float(wind.get("X", 0)), float(wind.get("Y", 0)), float(wind.get("Z", 0))),
         captures=_captures(defaults),
         vehicles=tuple(vehicles) or (default,),
-        segmentation=found.get("SegmentationSettings", {}).get("InitMethod")
+        segmentation=settings.get("SegmentationSettings", {}).get("InitMethod")
         or AirsimSettings.segmentation,
-        recording=read_choice(found.get("Recording", {}), name),
+        recording=read_choice(settings.get("Recording", {}), name),
         text=json.dumps(data),
     )
 
@@ -293,24 +293,24 @@ def _read(kind: Any, value: Any, where: str, name: str) -> Any:
 def _read_table(
     kind: Mapping[str, Any], value: Mapping[str, Any], where: str, name: str
 ) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    table: dict[str, Any] = {}
     for key, item in value.items():
         inner = f"{where}.{key}" if where else key
         if key in kind or "" in kind:
             content = _read(kind.get(key) or kind[""], item, inner, name)
             if content is not None:
-                found[key] = content
+                table[key] = content
         elif meant := did_you_mean(key, kind):
             _log.warning("%s: %s is unknown and ignored%s", name, inner, meant)
-    return found
+    return table
 
 
 def _kind(mode: str) -> str:
     return FLYING if mode == SIM_MODES[0] else POSING
 
 
-def _vehicle(vehicle: str, given: Mapping[str, Any], mode: str, name: str) -> VehicleChoice:
-    kind = given.get("VehicleType") or _kind(mode)
+def _vehicle(vehicle: str, settings: Mapping[str, Any], mode: str, name: str) -> VehicleChoice:
+    kind = settings.get("VehicleType") or _kind(mode)
     if kind not in _TYPES:
         raise InputError(
             f"{name}: Vehicles.{vehicle}.VehicleType={kind} is not supported; give one of "
@@ -322,38 +322,38 @@ def _vehicle(vehicle: str, given: Mapping[str, Any], mode: str, name: str) -> Ve
             *(name, vehicle, kind),
         )
     cameras: dict[str, CameraChoice] = {}
-    for camera, own in given.get("Cameras", {}).items():
+    for camera, values in settings.get("Cameras", {}).items():
         try:
             spec = find_camera(camera)
         except InputError as error:
             raise InputError(f"{name}: Vehicles.{vehicle}.Cameras.{camera}: {error}") from error
-        cameras[spec.name] = CameraChoice(_offset(own), _captures(own))
+        cameras[spec.name] = CameraChoice(_offset(values), _captures(values))
     return VehicleChoice(
         name=vehicle,
         kind=POSING if mode == SIM_MODES[1] else kind,
-        start=_offset(given),
-        is_armed=given.get("DefaultVehicleState") != "Disarmed",
-        has_api_control=bool(given.get("AllowAPIAlways", False)),
+        start=_offset(settings),
+        is_armed=settings.get("DefaultVehicleState") != "Disarmed",
+        has_api_control=bool(settings.get("AllowAPIAlways", False)),
         cameras=cameras,
     )
 
 
-def _offset(given: Mapping[str, Any]) -> Offset:
-    return Offset(*(float(given.get(key, math.nan)) for key in _POSE))
+def _offset(settings: Mapping[str, Any]) -> Offset:
+    return Offset(*(float(settings.get(key, math.nan)) for key in _POSE))
 
 
-def _captures(given: Mapping[str, Any]) -> dict[ImageType, Capture]:
-    found: dict[ImageType, Capture] = {}
-    for own in given.get("CaptureSettings", []):
-        kind = own.get("ImageType", 0)
+def _captures(settings: Mapping[str, Any]) -> dict[ImageType, Capture]:
+    captures: dict[ImageType, Capture] = {}
+    for item in settings.get("CaptureSettings", []):
+        kind = item.get("ImageType", 0)
         kinds = (
             list(ImageType) if kind == -1 else [ImageType(kind)] if kind < len(ImageType) else []
         )
         for one in kinds:
-            old = found.get(one, Capture())
-            found[one] = Capture(
-                own.get("Width") or old.width,
-                own.get("Height") or old.height,
-                float(own.get("FOV_Degrees") or old.fov),
+            old = captures.get(one, Capture())
+            captures[one] = Capture(
+                item.get("Width") or old.width,
+                item.get("Height") or old.height,
+                float(item.get("FOV_Degrees") or old.fov),
             )
-    return found
+    return captures

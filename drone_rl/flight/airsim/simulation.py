@@ -152,15 +152,15 @@ class Simulation:
 
     def add_named(self, name: str, kind: str, pose: Pose) -> bool:
         """Add a vehicle as `simAddVehicle` does; return whether its type is known."""
-        found = {"simpleflight": FLYING, "computervision": POSING}.get(kind.lower())
-        if found is None:
+        vehicle_kind = {"simpleflight": FLYING, "computervision": POSING}.get(kind.lower())
+        if vehicle_kind is None:
             return False
         angles = Attitude(0.0, 0.0, 0.0)
         if not any(map(math.isnan, pose.attitude)):
             angles = Attitude.of(attitude_to_world(pose.attitude).tolist())
         x, y, z = pose.position
         start = Offset(x, y, z, angles.roll, angles.pitch, angles.yaw)
-        self.add(VehicleChoice(name, found, start))
+        self.add(VehicleChoice(name, vehicle_kind, start))
         return True
 
     def find(self, name: str, *, is_sim_api: bool = False) -> Vehicle:
@@ -194,11 +194,11 @@ class Simulation:
         """Return the Pose of an object or a vehicle in NED, see `place`."""
         if name in self.vehicles:
             body = self.vehicles[name].body
-            found = Pose.of(body.position[0], body.attitude[0])
+            pose = Pose.of(body.position[0], body.attitude[0])
         else:
-            found = self.stage.object_pose(name)
-        x, y, z = found.position
-        return pose_map(found._replace(position=(x, y, z + self._origin)))
+            pose = self.stage.object_pose(name)
+        x, y, z = pose.position
+        return pose_map(pose._replace(position=(x, y, z + self._origin)))
 
     def place(self, position: Sequence[float]) -> tuple[float, float, float]:
         """Return the position in our world of one in NED from where vehicles start by default."""

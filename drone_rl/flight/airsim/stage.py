@@ -119,14 +119,14 @@ class Stage:
         contacts = self.task.touch(self.worlds.state, position[None], start)
         if contacts is None:
             return []
-        found, ways = [], contacts[0].tolist()
+        touches, ways = [], contacts[0].tolist()
         for index in sorted(range(len(ways)), key=ways.__getitem__):
             if ways[index] < math.inf:
                 there = position if before is None else torch.lerp(before, position, ways[index])
                 name, center = self._names[index], self._placed[0, index]
                 half = center.new_tensor(self.worlds.scene.model.geom_size[self._geoms(name)[0]])
-                found.append((name, there, nearest(there, center, half)))
-        return found
+                touches.append((name, there, nearest(there, center, half)))
+        return touches
 
     @property
     def _placed(self) -> Tensor:
@@ -152,15 +152,15 @@ class Stage:
         model = self.worlds.scene.model
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
-        found = {}
+        poses = {}
         for geom in self._geoms(self._names[0]):
             name = model.geom(geom).name.partition("/")[2]
             attitude = np.zeros(4)
             mujoco.mju_mat2Quat(attitude, data.geom_xmat[geom])
             if name:
                 place = torch.tensor(data.geom_xpos[geom])
-                found[name] = Pose.of(place, torch.tensor(attitude))
-        return found
+                poses[name] = Pose.of(place, torch.tensor(attitude))
+        return poses
 
     def find(self, pattern: str) -> list[str]:
         """Return the names that match a regular expression; see `matching`."""
@@ -172,9 +172,9 @@ class Stage:
         if name in ("Ground", SKY):
             return Pose((0.0, 0.0, 0.0), level)
         if name in self._of_file:
-            own, by = self._of_file[name], ned(self.task.places(self.worlds.state)[0, 0])
-            whole = [a + b for a, b in zip(own.position, by, strict=True)]
-            return Pose(whole, own.attitude)
+            pose, by = self._of_file[name], ned(self.task.places(self.worlds.state)[0, 0])
+            whole = [a + b for a, b in zip(pose.position, by, strict=True)]
+            return Pose(whole, pose.attitude)
         if name in self._spawned:
             return Pose(to_world(self._spawned[name].place), level)
         if name in self._names:
@@ -287,11 +287,11 @@ class Stage:
 
         A negative id counts as 0.
         """
-        found = self.find(name) if is_pattern else [n for n in self.names if n == name]
-        kept = {one: own for one, own in self._own_ids.items() if one not in found}
-        self._own_ids = kept | dict.fromkeys(found, number)  # the last one wins
+        matches = self.find(name) if is_pattern else [n for n in self.names if n == name]
+        kept = {one: id_ for one, id_ in self._own_ids.items() if one not in matches}
+        self._own_ids = kept | dict.fromkeys(matches, number)  # the last one wins
         self._ids = self._segmentation()
-        return bool(found)
+        return bool(matches)
 
     def get_id(self, name: str) -> int:
         """Return the segmentation id of an object; -1 if there is none of that name."""
@@ -335,7 +335,7 @@ class Stage:
 
         Raises an `InputError` if the renderer does not support a type.
         """
-        found: dict[ImageType, Shot] = {}
+        shots: dict[ImageType, Shot] = {}
         groups: dict[Capture, list[ImageType]] = {}
         for kind in dict.fromkeys(kinds):
             groups.setdefault(camera.capture(kind), []).append(kind)
@@ -349,8 +349,8 @@ class Stage:
             focal = capture.width / 2 / math.tan(math.radians(capture.fov) / 2)
             for kind in some:
                 values = rendered[kind.modality][:, 0]
-                found[kind] = Shot(values, focal, capture)
-        return [found[kind] for kind in kinds]
+                shots[kind] = Shot(values, focal, capture)
+        return [shots[kind] for kind in kinds]
 
     def _appearance(self, camera: CameraState, capture: Capture) -> Appearance | None:
         """Return the appearance in a camera, the same object as long as nothing changes.
@@ -358,18 +358,18 @@ class Stage:
         Renderers reuse what they have prepared for an object; None is the scene's own appearance.
         """
         spawned = tuple(self._spawned.values())
-        weather, earlier, known = self._shown
-        if weather is not self._weather or earlier != spawned or len(known) > _MOST_SHOWN:
-            known = {}
-            self._shown = (self._weather, spawned, known)
+        weather, earlier, appearances = self._shown
+        if weather is not self._weather or earlier != spawned or len(appearances) > _MOST_SHOWN:
+            appearances = {}
+            self._shown = (self._weather, spawned, appearances)
         key = (id(camera), capture)
-        if key not in known:
+        if key not in appearances:
             mounting = camera.mounting(capture, self.worlds.camera.vertical_fov)
-            found = dataclasses.replace(self._weather, camera=mounting, distractors=self._spares())
+            look = dataclasses.replace(self._weather, camera=mounting, distractors=self._spares())
             is_own = self._weather is _PLAIN and mounting is None and not spawned
             # keeping the camera keeps its id unique
-            known[key] = camera, None if is_own else found
-        return known[key][1]
+            appearances[key] = camera, None if is_own else look
+        return appearances[key][1]
 
     @property
     def appearance(self) -> Appearance:

@@ -37,12 +37,12 @@ def find_firmware(path: str | Path | None = None) -> Path:
     Raises:
         InputError: The program is missing or not executable.
     """
-    found = firmware_path() if path is None else Path(path)
-    if not found.is_file():
-        raise InputError(f"firmware={found} doesn't exist; {REMEDY}")
-    if not os.access(found, os.X_OK):
-        raise InputError(f"firmware={found} isn't executable; give a program, or build it again")
-    return found.resolve()
+    firmware = firmware_path() if path is None else Path(path)
+    if not firmware.is_file():
+        raise InputError(f"firmware={firmware} doesn't exist; {REMEDY}")
+    if not os.access(firmware, os.X_OK):
+        raise InputError(f"firmware={firmware} isn't executable; give a program, or build it again")
+    return firmware.resolve()
 
 
 def build_firmware(path: str | Path | None = None, source: str | Path | None = None) -> Path:
@@ -96,11 +96,11 @@ def _compile(tree: Path, folder: Path) -> Path:
         )
     except subprocess.TimeoutExpired as error:
         raise InputError(f"building the firmware took over {_TIMEOUT:g} s; try again") from error
-    found = sorted(programs.glob("betaflight_*_SITL"))
-    if done.returncode or not found:
+    binaries = sorted(programs.glob("betaflight_*_SITL"))
+    if done.returncode or not binaries:
         lines = [line for line in done.stderr.splitlines() if "rror" in line] or ["no error line"]
         raise InputError(f"the firmware can't be built from {tree}: {lines[0].strip()}")
-    return found[-1]
+    return binaries[-1]
 
 
 def main() -> None:

@@ -121,18 +121,18 @@ def serve(link: socket.socket, lines: IO[bytes]) -> None:
     try:
         for line in lines:
             request = json.loads(line)
-            given, reply = [], {}
+            sockets, reply = [], {}
             try:
                 name = request.pop("request")
                 if name == "connect":
-                    given = [make_socket(**request)]
+                    sockets = [make_socket(**request)]
                 else:
                     reply = getattr(supervisor, name)(**request)
             except OSError as error:
                 reply = {"error": str(error)}
             text = json.dumps(reply).encode() + b"\n"
-            socket.send_fds(link, [text], [sock.fileno() for sock in given])
-            for sock in given:
+            socket.send_fds(link, [text], [sock.fileno() for sock in sockets])
+            for sock in sockets:
                 sock.close()
     finally:
         supervisor.stop()

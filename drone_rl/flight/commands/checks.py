@@ -25,8 +25,8 @@ SHARE = Real(0.0, 1.0)
 
 def numbers(values: Any, name: str, count: int, kind: Real = COORDINATE) -> tuple[float, ...]:
     """Return `count` numbers of a sequence, array or tensor; an `InputError` if it has others."""
-    given = values.tolist() if isinstance(values, Tensor | np.ndarray) else values
-    return Several(kind, count, count).read(given, name)
+    items = values.tolist() if isinstance(values, Tensor | np.ndarray) else values
+    return Several(kind, count, count).read(items, name)
 
 
 def degrees(value: Any, name: str, limit: float = 3600.0) -> float:

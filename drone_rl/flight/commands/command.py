@@ -73,11 +73,11 @@ def goals_of(
 
     A value is what its mode says: a position, velocity, angle or rate.
     """
-    given, count = (x, y, heading, z), len(body)
+    goals, count = (x, y, heading, z), len(body)
     if count == 1 and body.numbers.device.type == "cpu":
-        row = np.array([[float(value) for value in given]])
+        row = np.array([[float(value) for value in goals]])
         return FlightGoals(modes, torch.from_numpy(row))  # a tenth of the time, in each period
-    values = (torch.as_tensor(value, dtype=torch.float64) for value in given)
+    values = (torch.as_tensor(value, dtype=torch.float64) for value in goals)
     return FlightGoals(modes, torch.stack([value.expand(count) for value in values], -1))
 
 

@@ -123,8 +123,8 @@ class SceneDrone(Drone):
             raise PilotError("there are no objects; give worlds=Worlds(1, ...)")
         names = self.object_names
         if name not in names:
-            known = f"{', '.join(names)}{did_you_mean(name, names)}"
-            raise InputError(f"object {name!r} is unknown; give one of: {known}")
+            options = f"{', '.join(names)}{did_you_mean(name, names)}"
+            raise InputError(f"object {name!r} is unknown; give one of: {options}")
         return self.worlds, names.index(name)
 
 

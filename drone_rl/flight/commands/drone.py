@@ -102,8 +102,8 @@ class Drone:
         self.settings = self._quadrotor.settings
         """Vehicle and wind."""
         height = [] if self.is_computer_vision and np.size(start) == 3 else [self.settings.radius]
-        given = checks.numbers(start, "start", 3 - len(height))
-        place = [[*given, *height]]
+        coordinates = checks.numbers(start, "start", 3 - len(height))
+        place = [[*coordinates, *height]]
         attitude = attitude_of(0.0, 0.0, checks.degrees(yaw, "yaw"))
         self._seed = Whole(0, 2**31 - 1).read(seed, "seed")
         self.body = FlightState.at_rest(
@@ -245,7 +245,7 @@ class Drone:
         """
         requests = Several(Instance(ImageRequest), 1, 1000).read(requests, "requests")
         worlds, state = self._scene("images")
-        return [found[0] for found in images(worlds, state, requests, height=height, width=width)]
+        return [batch[0] for batch in images(worlds, state, requests, height=height, width=width)]
 
     def _scene(self, name: str) -> tuple[Worlds, State]:
         if self.worlds is None:

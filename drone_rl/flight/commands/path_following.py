@@ -300,10 +300,10 @@ def nearest(paths: Paths, position: Tensor, first: Tensor, last: Tensor) -> Tens
     high = torch.minimum(paths.along[:, 1:], last[:, None])
     away = position[:, None] - paths.points[:, :-1]
     reach = (away * paths.directions).sum(-1) + paths.along[:, :-1]
-    found = torch.minimum(torch.maximum(reach, low), high)
-    rest = (found - paths.along[:, :-1])[..., None] * paths.directions
+    lengths = torch.minimum(torch.maximum(reach, low), high)
+    rest = (lengths - paths.along[:, :-1])[..., None] * paths.directions
     distance = (away - rest).norm(dim=-1).masked_fill(low > high, torch.inf)
-    return found.gather(1, distance.argmin(1, keepdim=True))[:, 0]
+    return lengths.gather(1, distance.argmin(1, keepdim=True))[:, 0]
 
 
 def distance_from(paths: Paths, position: Tensor) -> Tensor:

@@ -167,9 +167,9 @@ class Pilot(SceneDrone):
         if yaw is not None and yaw_rate is not None:
             raise InputError(f"yaw={yaw} and yaw_rate={yaw_rate} are both given; give one of them")
         tilt = checks.radians(roll, "roll", 90.0), checks.radians(pitch, "pitch", 90.0)
-        name, given = ("yaw", yaw) if yaw_rate is None else ("yaw_rate", yaw_rate)
-        x, y, wanted = to_simulator(*tilt, checks.radians(0.0 if given is None else given, name))
-        turn = self.body.heading if given is None else wanted
+        name, value = ("yaw", yaw) if yaw_rate is None else ("yaw_rate", yaw_rate)
+        x, y, wanted = to_simulator(*tilt, checks.radians(0.0 if value is None else value, name))
+        turn = self.body.heading if value is None else wanted
         turn_mode = Mode.ANGLE if yaw_rate is None else Mode.RATE
         lift_mode, lift = self._lift(z, throttle)
         modes: Modes = (Mode.ANGLE, Mode.ANGLE, turn_mode, lift_mode)

@@ -97,9 +97,9 @@ class Flight:
 
     def handle(self, message: Any) -> None:
         """Do what a browser's message says; an `InputError` if it is wrong or impossible."""
-        given = dict(as_mapping(message, "message"))
-        kind = OneOf(tuple(_MESSAGES)).read(given.pop("type", None), "type")
-        getattr(self, f"_{kind}")(**_MESSAGES[kind].read(given, kind))
+        values = dict(as_mapping(message, "message"))
+        kind = OneOf(tuple(_MESSAGES)).read(values.pop("type", None), "type")
+        getattr(self, f"_{kind}")(**_MESSAGES[kind].read(values, kind))
 
     def _hold(self, controls: Sequence[str]) -> None:
         self.controls.hold(controls)

@@ -81,8 +81,8 @@ class Guard:
         has_token = hmac.compare_digest(path, self._start)
         host, origin = headers.get(b"host", []), headers.get(b"origin", [])
         is_here = len(host) == 1 and host[0] in self._hosts
-        own = [b"http://" + name for name in self._hosts]
-        is_own = len(origin) == 1 and origin[0] in own
+        origins = [b"http://" + name for name in self._hosts]
+        is_own = len(origin) == 1 and origin[0] in origins
         has_origin = is_own or (scope["type"] == "http" and not origin)
         return has_token and is_here and has_origin
 
@@ -276,13 +276,13 @@ class FlyPage:
             if message["type"] == "websocket.disconnect":
                 return
             try:
-                given = json.loads(message.get("text") or "")
+                content = json.loads(message.get("text") or "")
             except (ValueError, RecursionError):
-                given = None
-            if isinstance(given, dict) and given.get("type") == "ack":
+                content = None
+            if isinstance(content, dict) and content.get("type") == "ack":
                 page.acknowledge()
             else:
-                self._messages.put((given, page))
+                self._messages.put((content, page))
 
     def _publish(self, frame: bytes) -> None:
         """Offer a frame to all pages."""
@@ -316,14 +316,14 @@ class FlyPage:
 
     def _handle_messages(self) -> None:
         for _ in range(self._messages.qsize()):
-            given, page = self._messages.get()
-            if given is _CLOSED:
+            message, page = self._messages.get()
+            if message is _CLOSED:
                 if page is self._holder:
                     self._flight.release()
                 continue
             try:
-                self._flight.handle(given)
-                if given["type"] in ("hold", "sticks"):
+                self._flight.handle(message)
+                if message["type"] in ("hold", "sticks"):
                     self._holder = page
             except InputError as error:
                 _call_soon(self._loop, page.tell, str(error))
@@ -374,10 +374,10 @@ def fly(
         InputError: A setting is wrong, the port is in use, or the extra `fly` is not installed.
     """
     settings = from_arguments(FlySettings, settings, changes, fly)
-    found = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
+    flown_policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     folder = settings.demonstrations or as_path(outputs, "outputs") / "demonstrations"
     return FlyPage(
-        lambda: Flight(found, settings, Path(folder)),
+        lambda: Flight(flown_policy, settings, Path(folder)),
         port=settings.port,
         frames_per_second=settings.frames_per_second,
     )

@@ -225,9 +225,9 @@ class World:
     @property
     def conditions(self) -> tuple[Any, Any, DynamicsSettings, ActionSettings]:
         """Task, camera, dynamics and actions, as demonstrations note them."""
-        own = self.policy
-        dynamics = self.flight_dynamics if self.has_dynamics else own.dynamics
-        return own.task, own.description.camera, dynamics, own.actions
+        policy = self.policy
+        dynamics = self.flight_dynamics if self.has_dynamics else policy.dynamics
+        return policy.task, policy.description.camera, dynamics, policy.actions
 
     # Images
 
@@ -244,11 +244,11 @@ class World:
 
     def _look(self) -> Appearance | None:
         """Return the episode's appearance under the present light; one object until it changes."""
-        own = self._base.appearances.current()
+        appearance = self._base.appearances.current()
         if self.light == 1.0:
-            return own
+            return appearance
         if self._lit is None:
-            whole = own or self._base.appearances.middle or Appearance()
+            whole = appearance or self._base.appearances.middle or Appearance()
             exposure = self.light * (1.0 if whole.exposure is None else whole.exposure)
             self._lit = dataclasses.replace(whole, exposure=exposure)
         return self._lit

@@ -274,11 +274,11 @@ def output_of(transform: Transform, frame: Frame) -> Frame:
     return Frame(tuple(after.shape[1:]), after.is_floating_point())
 
 
-def _check_returned(given: Any, who: str, images: torch.Tensor, wanted: Any) -> None:
+def _check_returned(output: Any, who: str, images: torch.Tensor, wanted: Any) -> None:
     """Raise an `InputError` about `who` if it returned no tensor of the wanted shape."""
-    if not isinstance(given, torch.Tensor) or tuple(given.shape) != wanted:
+    if not isinstance(output, torch.Tensor) or tuple(output.shape) != wanted:
         raise InputError(
-            f"{who} returns {described(given)} for input of shape {tuple(images.shape)}; return a "
+            f"{who} returns {described(output)} for input of shape {tuple(images.shape)}; return a "
             f"tensor of shape {wanted}"
         )
 
@@ -324,8 +324,8 @@ class _Registered:
 
     def read(self, value: Any, where: str) -> Any:
         """See `drone_rl.utils.schema.Kind`."""
-        given = dict(as_mapping(value, where))
-        return self.part.named(given.pop("name", None), f"{where}.name").read(given, where)
+        values = dict(as_mapping(value, where))
+        return self.part.named(values.pop("name", None), f"{where}.name").read(values, where)
 
 
 def _as_dict(part: Variant) -> dict[str, Any]:

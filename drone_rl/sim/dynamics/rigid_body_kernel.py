@@ -217,7 +217,7 @@ class Overlap:
 @wp.func
 def box_overlap(center: wp.vec3, radius: float, half: wp.vec3) -> Overlap:
     """Return how far a ball overlaps a box; `center` is in the box's frame. Metres."""
-    found = Overlap()
+    overlap = Overlap()
     nearest = wp.vec3(
         wp.clamp(center[0], -half[0], half[0]),
         wp.clamp(center[1], -half[1], half[1]),
@@ -226,22 +226,22 @@ def box_overlap(center: wp.vec3, radius: float, half: wp.vec3) -> Overlap:
     away = center - nearest
     distance = wp.length(away)
     if distance > 0.0:
-        found.normal = away / distance
-        found.depth = radius - distance
-        return found
+        overlap.normal = away / distance
+        overlap.depth = radius - distance
+        return overlap
     inside = wp.vec3(
         half[0] - wp.abs(center[0]), half[1] - wp.abs(center[1]), half[2] - wp.abs(center[2])
     )
     if inside[0] <= inside[1] and inside[0] <= inside[2]:
-        found.normal = wp.vec3(wp.sign(center[0]), 0.0, 0.0)
-        found.depth = radius + inside[0]
+        overlap.normal = wp.vec3(wp.sign(center[0]), 0.0, 0.0)
+        overlap.depth = radius + inside[0]
     elif inside[1] <= inside[2]:
-        found.normal = wp.vec3(0.0, wp.sign(center[1]), 0.0)
-        found.depth = radius + inside[1]
+        overlap.normal = wp.vec3(0.0, wp.sign(center[1]), 0.0)
+        overlap.depth = radius + inside[1]
     else:
-        found.normal = wp.vec3(0.0, 0.0, wp.sign(center[2]))
-        found.depth = radius + inside[2]
-    return found
+        overlap.normal = wp.vec3(0.0, 0.0, wp.sign(center[2]))
+        overlap.depth = radius + inside[2]
+    return overlap
 
 
 @wp.func

@@ -55,9 +55,9 @@ def turned(axis: str, degrees: float | Tensor) -> Tensor:
     return torch.cat([half.cos()[..., None], half.sin()[..., None] * around], -1)
 
 
-def zoom_for_fov(own: float, wanted: Tensor) -> Tensor:
+def zoom_for_fov(fov: float, wanted: Tensor) -> Tensor:
     """Return the `Mounting.zoom` for a wanted field of view. Degrees. Shape: (*)."""
-    return math.tan(math.radians(own) / 2) / torch.tan(torch.deg2rad(wanted) / 2)
+    return math.tan(math.radians(fov) / 2) / torch.tan(torch.deg2rad(wanted) / 2)
 
 
 def product(a: Tensor, b: Tensor) -> Tensor:

@@ -220,10 +220,10 @@ def check_same_policy(
         InputError: Another network, camera or task, or the policy has memory or camera faults.
     """
     require_cubes(described, "certificates")
-    if certificate.weights != (own := fingerprint(weights)):
+    if certificate.weights != (policy_hash := fingerprint(weights)):
         raise InputError(
             f"the certificate is for a network with hash {certificate.weights[:12]}..., but the "
-            f"policy's network has {own[:12]}...; set policy to the file that was proved"
+            f"policy's network has {policy_hash[:12]}...; set policy to the file that was proved"
         )
     stated, own_parts = certificate.description.as_dict(), described.as_dict()
     for part in ("appearance", "dynamics", "actions", "camera", "transforms", "network"):

@@ -69,7 +69,7 @@ def find(boxes: Boxes, points: Points) -> Indices:
         ValueError: There is none.
     """
     low, high = (np.ascontiguousarray(boxes[..., end].T) for end in (0, 1))  # (cubes, boxes)
-    found = np.zeros(len(points), np.intp)
+    indices = np.zeros(len(points), np.intp)
     for i, point in enumerate(points):
         holding = np.flatnonzero((low[0] <= point[0]) & (point[0] <= high[0]))
         for axis in range(1, len(point)):
@@ -77,8 +77,8 @@ def find(boxes: Boxes, points: Points) -> Indices:
             holding = holding[(sides[0] <= point[axis]) & (point[axis] <= sides[1])]
         if not len(holding):
             raise ValueError(f"no box holds {point}")
-        found[i] = holding[0]
-    return found
+        indices[i] = holding[0]
+    return indices
 
 
 def _mixed(boxes: Boxes, rng: np.random.Generator) -> Indices:

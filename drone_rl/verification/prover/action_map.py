@@ -231,11 +231,11 @@ def _levels(aside: NDArray, outer: NDArray, leaves: NDArray, half: float) -> lis
     height = (aside[:, None] * leaves + outer[:, None]).reshape(-1)
     spans = np.stack([leaves - half, leaves + half], -1)[None].repeat(len(aside), 0).reshape(-1, 2)
     order = np.argsort(height)
-    found = []
+    borders = []
     for group in np.split(order, np.flatnonzero(np.diff(height[order]) > SAME) + 1):
         for begin, end in unite(spans[group], SAME):
-            found.append(np.array([[0.0], [height[group[0]]], [begin], [end]]))
-    return found
+            borders.append(np.array([[0.0], [height[group[0]]], [begin], [end]]))
+    return borders
 
 
 @torch.no_grad()

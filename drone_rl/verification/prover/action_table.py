@@ -108,16 +108,16 @@ class ActionTable:
     def _gather(self, block: NDArray) -> None:
         """Combine the actions of images into those of cells and bands."""
         (images,) = self._images_of(block[None])
-        found = self._known[_slices(images)]
+        actions = self._known[_slices(images)]
         for axis, (cells, span, seen) in enumerate(
             zip(self.cells[::-1], block[::-1], images[::-1], strict=True)
         ):
             cell = np.arange(span[0], span[1] + 1)
             ranges = np.stack([cells.first[cell], cells.last[cell] + 1], -1) - seen[0]
-            padded = np.concatenate([found, np.take(found, [0], axis)], axis)
+            padded = np.concatenate([actions, np.take(actions, [0], axis)], axis)
             reduced = np.bitwise_or.reduceat(padded, ranges.reshape(-1), axis)
-            found = np.take(reduced, np.arange(0, 2 * len(cell), 2), axis)
-        self.table[_slices(block)] = found
+            actions = np.take(reduced, np.arange(0, 2 * len(cell), 2), axis)
+        self.table[_slices(block)] = actions
 
     def _share_out(
         self, work: Callable[[NDArray], NDArray[np.uint8]], blocks: NDArray
@@ -137,11 +137,11 @@ class ActionTable:
             for i, alike in enumerate(nearer):
                 shown[:, k] = alike[shown[:, i], shown[:, k]]
         code = np.asarray(np.ravel_multi_index(tuple(shown.T[::-1]), self._known.shape))
-        known = self._known.reshape(-1)
-        new = np.unique(code[known[code] == 0])
+        entries = self._known.reshape(-1)
+        new = np.unique(code[entries[code] == 0])
         index = np.stack(np.unravel_index(new, self._known.shape)[::-1], -1)
-        known[new] = self._share_out(self._decide, index)
-        self._known[tuple(combinations.T[::-1])] = known[code]
+        entries[new] = self._share_out(self._decide, index)
+        self._known[tuple(combinations.T[::-1])] = entries[code]
 
     def _decide(self, combinations: NDArray) -> NDArray[np.uint8]:
         """Return the possible actions of single images, given by their indices."""
@@ -176,8 +176,8 @@ def _open(table: NDArray[np.uint8], spans: NDArray) -> NDArray[np.int64]:
     for span in spans:
         is_wanted[_slices(span - lowest[:, None])] = True
     is_wanted &= table[_slices(np.stack([lowest, highest], -1))] == 0
-    found = merge(blocks(is_wanted)[:, ::-1])
-    return found + lowest[:, None] - [0, 1]
+    gaps = merge(blocks(is_wanted)[:, ::-1])
+    return gaps + lowest[:, None] - [0, 1]
 
 
 def _counts(blocks: NDArray) -> NDArray[np.int64]:
@@ -189,11 +189,11 @@ def _combinations(blocks: NDArray) -> NDArray[np.int64]:
     """Return the combinations of all blocks. Shape: (total, cubes)."""
     block, place = ragged(_counts(blocks))
     sizes = blocks[..., 1] - blocks[..., 0] + 1
-    found = np.empty((len(block), blocks.shape[1]), np.int64)
+    combinations = np.empty((len(block), blocks.shape[1]), np.int64)
     for k in range(blocks.shape[1]):
         place, step = np.divmod(place, sizes[block, k])
-        found[:, k] = blocks[block, k, 0] + step
-    return found
+        combinations[:, k] = blocks[block, k, 0] + step
+    return combinations
 
 
 def _halve(blocks: NDArray, doubts: NDArray) -> NDArray:

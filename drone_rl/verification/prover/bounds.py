@@ -246,6 +246,6 @@ class ImageRanges:
         masks = self._levels[0].new_empty(len(code), *self._levels[0].shape[1:])
         for level in np.unique(levels):
             those = np.flatnonzero(levels == level)
-            found, reach = self._levels[level], 1 << int(level)
-            masks[those] = found[first[those]] | found[last[those] + 1 - reach]
+            level_masks, reach = self._levels[level], 1 << int(level)
+            masks[those] = level_masks[first[those]] | level_masks[last[those] + 1 - reach]
         return masks

@@ -77,8 +77,8 @@ def union(boxes: Boxes, most: int = MAX_GRIDS) -> Boxes:
         return boxes
     boxes = np.unique(boxes, axis=0)
     hull = np.stack([boxes[..., 0].min(0), boxes[..., 1].max(0)], -1)[None]
-    found = _select(boxes, hull, most, covered=True)
-    return merge(boxes) if found is None else found
+    parts = _select(boxes, hull, most, covered=True)
+    return merge(boxes) if parts is None else parts
 
 
 def complement(boxes: Boxes, space: Boxes, most: int = MAX_GRIDS) -> Boxes | None:
@@ -91,11 +91,11 @@ def complement(boxes: Boxes, space: Boxes, most: int = MAX_GRIDS) -> Boxes | Non
 
 def _select(boxes: Boxes, space: Boxes, most: int, *, covered: bool) -> Boxes | None:
     """Return the part of a space that is covered, or not; None if `most` grids do not suffice."""
-    found = []
+    parts = []
     for some, sides in _grids(boxes, space, most) or ():
         ends = blocks(_covered(some, sides) == covered)
-        found.append(merge(np.stack([side[ends[:, k]] for k, side in enumerate(sides)], 1)))
-    return merge(np.concatenate(found)) if found else None
+        parts.append(merge(np.stack([side[ends[:, k]] for k, side in enumerate(sides)], 1)))
+    return merge(np.concatenate(parts)) if parts else None
 
 
 def unite(intervals: NDArray[np.float64], gap: float) -> NDArray[np.float64]:
@@ -161,32 +161,32 @@ def resolve_forks(
 
 def _meets(boxes: Boxes, others: Boxes) -> NDArray[np.bool_]:
     """Return which boxes intersect any of the others."""
-    found = np.zeros(len(boxes), bool)
+    meets = np.zeros(len(boxes), bool)
     step = max(1, _MAX_PAIRS // max(1, len(others)))
     for begin in range(0, len(boxes), step):
         some = boxes[begin : begin + step, None]
         is_apart = (some[..., 0] >= others[..., 1]) | (some[..., 1] <= others[..., 0])
-        found[begin : begin + step] = (~is_apart.any(-1)).any(-1)
-    return found
+        meets[begin : begin + step] = (~is_apart.any(-1)).any(-1)
+    return meets
 
 
 def _grids(boxes: Boxes, space: Boxes, most: int) -> list[tuple[Boxes, Sides]] | None:
     """Cut a space into up to `most` small grids, each with its boxes and borders, if possible."""
-    found: list[tuple[Boxes, Sides]] = []
+    grids: list[tuple[Boxes, Sides]] = []
     rest = [(boxes, space)]
     while rest:
         boxes, space = rest.pop()
         every = np.concatenate([boxes, space])
         sides = [np.unique(every[:, k]) for k in range(every.shape[1])]
         if math.prod(map(len, sides)) <= AT_ONCE:
-            found.append((boxes, sides))
+            grids.append((boxes, sides))
         else:
             longest = max(range(len(sides)), key=lambda k: len(sides[k]))
             middle = longest, sides[longest][len(sides[longest]) // 2]
             rest += zip(cut(boxes, *middle), cut(space, *middle), strict=True)
-        if len(found) + len(rest) > most:
+        if len(grids) + len(rest) > most:
             return None
-    return found
+    return grids
 
 
 def _covered(boxes: Boxes, sides: Sides) -> NDArray[np.bool_]:

@@ -130,13 +130,13 @@ def _within(
     next_to = np.concatenate([rendered[:, 0], rendered[-1:, -1]])
     if (rendered[:-1, -1] != rendered[1:, 0]).any() or (renderer.read(next_to) != pure).any():
         return None
-    band, found = np.arange(len(bands)), []
+    band, changes = np.arange(len(bands)), []
     while True:
         row, k = np.nonzero((rendered[:, 1:] != rendered[:, :-1]).any((2, 3, 4)))
         band, a, b = band[row], left[row, k], left[row, k + 1]
         first, last = rendered[row, k], rendered[row, k + 1]
         is_done = np.nextafter(a, b) >= b
-        found.append((band[is_done], b[is_done], last[is_done]))
+        changes.append((band[is_done], b[is_done], last[is_done]))
         band, a, b, first, last = (v[~is_done] for v in (band, a, b, first, last))
         if not len(band):
             break
@@ -145,7 +145,7 @@ def _within(
         between = np.stack([(a + middle) / 2, middle, (middle + b) / 2], -1)
         left = np.concatenate([a[:, None], between, b[:, None]], -1)
         rendered = np.concatenate([first[:, None], _render(renderer, between), last[:, None]], 1)
-    band, where, images = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    band, where, images = (np.concatenate(parts) for parts in zip(*changes, strict=True))
     order = np.lexsort((where, band))
     is_inner = band[order][1:] == band[order][:-1]  # the last of a band is that of its end
     inner = order[:-1][is_inner]

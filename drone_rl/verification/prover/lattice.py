@@ -200,10 +200,10 @@ def explore(settings: TaskSettings, cubes: Tensor) -> Graph:
     number = torch.full((count * math.prod(shape),), -1)
     zeros = torch.zeros(count, dtype=torch.int64)
     frontier = Nodes(torch.arange(count), zeros, zeros, zeros)
-    parts, known = [], 0
+    parts, num_nodes = [], 0
     while len(frontier):
-        number[_keys(shape, frontier)] = torch.arange(known, known + len(frontier))
-        known += len(frontier)
+        number[_keys(shape, frontier)] = torch.arange(num_nodes, num_nodes + len(frontier))
+        num_nodes += len(frontier)
         moved, reason = _follow(settings, cubes, frontier)
         goes_on = reason == CubesEnd.RUNNING
         keys = torch.where(goes_on.flatten(), _keys(shape, moved), -1).view(reason.shape)

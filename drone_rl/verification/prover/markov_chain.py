@@ -134,14 +134,14 @@ class NodeEvaluator:
         node, image = graph.images()
         every = graph.states()
         shape = len(node), len(self._worlds.dynamics.actions.names)
-        known = torch.full(shape, torch.nan, dtype=torch.float64)
+        probabilities = torch.full(shape, torch.nan, dtype=torch.float64)
 
         def evaluate(nodes: Tensor) -> Tensor:
             wanted = image[nodes].unique()
-            new = wanted[known[wanted, 0].isnan()]
+            new = wanted[probabilities[wanted, 0].isnan()]
             if len(new):
-                known[new] = self._probabilities(every[node[new]])
-            return known[image[nodes]]
+                probabilities[new] = self._probabilities(every[node[new]])
+            return probabilities[image[nodes]]
 
         return evaluate
 
@@ -245,7 +245,7 @@ def _reachable(spec: PolicySpec, box: Boxes) -> tuple[list[LatticeState], NDArra
     lattice, index_of = spec.lattice, {LatticeState(0, 0): 0}
     # moves cut half-open boxes, but the upper ends belong to this one
     box = np.stack([box[:, 0], np.nextafter(box[:, 1], np.inf)], -1)
-    states, found = [LatticeState(0, 0)], []
+    states, all_targets = [LatticeState(0, 0)], []
     for state in states:  # the loop appends to `states`
         for move in _MOVES:
             targets = []
@@ -258,9 +258,9 @@ def _reachable(spec: PolicySpec, box: Boxes) -> tuple[list[LatticeState], NDArra
                     index_of[untimed] = len(states)
                     states.append(untimed)
                 targets.append(2 + index_of[untimed])
-            found.append(targets)
-    most = max(map(len, found))
-    padded = [targets + targets[:1] * (most - len(targets)) for targets in found]
+            all_targets.append(targets)
+    most = max(map(len, all_targets))
+    padded = [targets + targets[:1] * (most - len(targets)) for targets in all_targets]
     return states, np.array(padded).reshape(len(states), len(_MOVES), most)
 
 

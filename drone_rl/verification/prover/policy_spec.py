@@ -134,15 +134,15 @@ MAX_PARTS = 1_000  # a task with more would take days
 
 def images_per_cube(spec: PolicySpec) -> list[int]:
     """Return the approximate numbers of images of the cubes, at the step of the largest product."""
-    lattice, found = spec.lattice, []
+    lattice, per_step = spec.lattice, []
     for steps in range(lattice.last):
         counts = []
         for ahead in lattice.cubes - steps * lattice.task.step_length:
             borders = spec.camera.borders(ahead - camera_ahead())[0] if ahead >= 0 else np.empty(0)
             inside = np.abs(borders) <= lattice.task.lateral_bound
             counts.append(1 + IMAGES_PER_BORDER * int(inside.sum()))
-        found.append(counts)
-    return max(found, key=math.prod)
+        per_step.append(counts)
+    return max(per_step, key=math.prod)
 
 
 def partition_placements(spec: PolicySpec, most: int) -> Boxes:

@@ -118,16 +118,16 @@ class Prover:
     def findings(self) -> ProofFindings:
         """Return what is known of all placements, without forks of the part in progress."""
         task = self.lattice.task
-        found = [self.done, so_far(self.ended, self.part), ProofFindings({}, self.parts, {})]
-        return simplified(combine(found), all_placements(task.lateral_bound, task.num_cubes))
+        parts = [self.done, so_far(self.ended, self.part), ProofFindings({}, self.parts, {})]
+        return simplified(combine(parts), all_placements(task.lateral_bound, task.num_cubes))
 
     def _finish_part(self) -> None:
         """Resolve the forks of a finished part and clear its records."""
         endings = {e: union(np.concatenate(b)) for e, b in self.fork_ends.items() if e}
         unknown, num_cubes = self.fork_ends.get(None, []), self.lattice.task.num_cubes
         forks = ProofFindings(*resolve_forks(self.forked, endings, unknown, num_cubes), {})
-        found = combine([ended(self.ended, self.part[:0]), forks])
-        self.done = combine([self.done, simplified(found, self.part)])
+        findings = combine([ended(self.ended, self.part[:0]), forks])
+        self.done = combine([self.done, simplified(findings, self.part)])
         self.decided = self.done.decided
         self.part = self.part[:0]
         for record in (self.ended, self.forked, self.fork_ends):
@@ -178,7 +178,7 @@ class Prover:
         table.fill(spans)
         self.num_images += table.num_images - num_images
         self.least_gap = min(self.least_gap, table.least_gap)
-        found: dict[int, list[Boxes]] = defaultdict(list)
+        by_kind: dict[int, list[Boxes]] = defaultdict(list)
         for owner, ranges, bits in runs(table, spans, MAX_ROWS):
             pieces = boxes[owner]
             for k, cube in enumerate(cubes):
@@ -192,8 +192,8 @@ class Prover:
             is_some = (pieces[..., 0] < pieces[..., 1]).all(-1)
             pieces, bits = pieces[is_some], bits[is_some]
             for kind in np.flatnonzero(np.bincount(bits)):
-                found[int(kind)].append(merge(pieces[bits == kind]))
-        for kind, parts in found.items():
+                by_kind[int(kind)].append(merge(pieces[bits == kind]))
+        for kind, parts in by_kind.items():
             yield kind, merge(np.concatenate(parts))
 
     def _table(self, state: LatticeState, cubes: list[int], boxes: Boxes) -> ActionTable:
@@ -222,28 +222,28 @@ class Prover:
         return cells
 
 
-def ended(known: Ended, none: Boxes) -> ProofFindings:
+def ended(endings: Ended, none: Boxes) -> ProofFindings:
     """Return the findings of placements followed to their end without forks."""
-    found = [ProofFindings({}, none, {})]
-    for (ending, steps), parts in known.items():
+    findings = [ProofFindings({}, none, {})]
+    for (ending, steps), parts in endings.items():
         volume = float(volumes(boxes := np.concatenate(parts)).sum())
-        found.append(ProofFindings({ending: boxes}, none, {ending: {steps: volume}}))
-    return combine(found)
+        findings.append(ProofFindings({ending: boxes}, none, {ending: {steps: volume}}))
+    return combine(findings)
 
 
-def so_far(known: Ended, part: Boxes) -> ProofFindings:
+def so_far(endings: Ended, part: Boxes) -> ProofFindings:
     """Return the largest boxes of a part in progress; the rest counts as undecided.
 
     Many cubes give millions of boxes, which nobody could check one by one.
     """
-    if not known:
+    if not endings:
         return ProofFindings({}, part, {})
-    each = [np.concatenate(parts) for parts in known.values()]
+    each = [np.concatenate(parts) for parts in endings.values()]
     boxes, owner = np.concatenate(each), np.repeat(range(len(each)), [len(b) for b in each])
     largest = np.argsort(-volumes(boxes), kind="stable")[:MAX_STATED]
     while (left := complement(boxes[largest], part)) is None:
         largest = largest[: len(largest) // 2]
-    stated = {key: [boxes[largest[owner[largest] == i]]] for i, key in enumerate(known)}
+    stated = {key: [boxes[largest[owner[largest] == i]]] for i, key in enumerate(endings)}
     return combine([ended(stated, part[:0]), ProofFindings({}, left, {})])
 
 
@@ -251,27 +251,27 @@ def combine(some: Sequence[ProofFindings]) -> ProofFindings:
     """Combine the findings of disjoint placements."""
     endings: dict[Ending, list[Boxes]] = defaultdict(list)
     steps: dict[Ending, dict[int, float]] = defaultdict(lambda: defaultdict(float))
-    for found in some:
-        for ending, boxes in found.endings.items():
+    for findings in some:
+        for ending, boxes in findings.endings.items():
             if len(boxes):
                 endings[ending].append(boxes)
-        for ending, volume in found.steps.items():
+        for ending, volume in findings.steps.items():
             for count, more in volume.items():
                 steps[ending][count] += more
     return ProofFindings(
         {ending: np.concatenate(boxes) for ending, boxes in endings.items()},
-        np.concatenate([found.undecided for found in some]),
+        np.concatenate([findings.undecided for findings in some]),
         dict(steps),
     )
 
 
-def simplified(found: ProofFindings, space: Boxes) -> ProofFindings:
+def simplified(findings: ProofFindings, space: Boxes) -> ProofFindings:
     """Reduce the boxes of a whole space: one ending becomes the complement of the others."""
-    endings = {ending: merge(boxes) for ending, boxes in found.endings.items()}
-    left = merge(found.undecided)
+    endings = {ending: merge(boxes) for ending, boxes in findings.endings.items()}
+    left = merge(findings.undecided)
     if endings:
         usual = max(endings, key=lambda e: volumes(endings[e]).sum())
         holes = np.concatenate([left, *(b for e, b in endings.items() if e != usual)])
         if (rest := complement(holes, space)) is not None:
             endings[usual] = min(endings[usual], rest, key=len)
-    return ProofFindings(endings, left, found.steps)
+    return ProofFindings(endings, left, findings.steps)

@@ -24,12 +24,12 @@ _OF_TYPE = (CAMERA, given(whole, "image_type", 0, 10))
 
 @sim_vehicle_method("simAddDetectionFilterMeshName", *_OF_TYPE, given(text, "mesh_name", MAX_NAME))
 def _add_pattern(vehicle: Vehicle, camera: str, kind: int, pattern: str) -> None:
-    known = vehicle.cameras[camera].detected
-    if len(known) >= MAX_PATTERNS:
+    patterns = vehicle.cameras[camera].detected
+    if len(patterns) >= MAX_PATTERNS:
         raise InputError(
             f"a camera can have {MAX_PATTERNS} mesh names; call simClearDetectionMeshNames"
         )
-    change_camera(vehicle, camera, {"detected": (*known, pattern)})
+    change_camera(vehicle, camera, {"detected": (*patterns, pattern)})
 
 
 @sim_vehicle_method("simSetDetectionFilterRadius", *_OF_TYPE, given(number, "radius_cm", 0.0, 1e9))
@@ -44,7 +44,7 @@ def _clear_patterns(vehicle: Vehicle, camera: str, kind: int) -> None:
 
 @method("simGetDetections", *_OF_TYPE, SIM_VEHICLE)
 def _detections(simulation: Simulation, name: str, kind: int, vehicle: Vehicle) -> list[Map]:
-    stage, camera, found = simulation.stage, vehicle.cameras[name], []
+    stage, camera, detections = simulation.stage, vehicle.cameras[name], []
     names = [n for n in stage.names if any(fnmatch.fnmatch(n, p) for p in camera.detected)]
     if not names:
         return []
@@ -58,9 +58,9 @@ def _detections(simulation: Simulation, name: str, kind: int, vehicle: Vehicle) 
             turn = product(inverse(attitude), messages.attitude_to_world(pose.attitude))
             relative = Pose.of(from_camera, turn)
             geo_point = geo_from_world(place, vehicle.geo_home).tolist()
-            found.append({"name": one, "geo_point": messages.geo_point(geo_point)})
-            found[-1].update(_boxes(relative, box, stage.radius(one)))
-    return found
+            detections.append({"name": one, "geo_point": messages.geo_point(geo_point)})
+            detections[-1].update(_boxes(relative, box, stage.radius(one)))
+    return detections
 
 
 def _boxes(relative: Pose, box: Sequence[int], radius: float) -> Map:

@@ -25,7 +25,7 @@ _INFRARED = 7
 
 @dataclasses.dataclass(frozen=True)
 class _Request:
-    given: Any
+    camera: Any
     """The camera as the client called it."""
     number: int
     """Of the image type."""
@@ -59,13 +59,13 @@ def _read_requests(value: Any, name: str) -> list[_Request]:
 
 
 def _read_type(value: Any, name: str) -> int:
-    found = whole(value, name, 0, 10)
-    if found > _INFRARED:
+    number = whole(value, name, 0, 10)
+    if number > _INFRARED:
         names = ", ".join(f"{kind.value} ({kind.name.lower()})" for kind in ImageType)
         raise InputError(
-            f"{name}={found} is not supported; give one of: {names}, {_INFRARED} (infrared)"
+            f"{name}={number} is not supported; give one of: {names}, {_INFRARED} (infrared)"
         )
-    return found
+    return number
 
 
 def _rendered(number: int) -> ImageType:
@@ -80,16 +80,16 @@ def _pixels(stage: Stage, shot: Shot, number: int, *, as_float: bool) -> Tensor:
 
 @method("simGetImages", given(_read_requests, "requests"), SIM_VEHICLE)
 def _images(simulation: Simulation, requests: Sequence[_Request], vehicle: Vehicle) -> list[Map]:
-    cameras = [read_camera(request.given) for request in requests]
-    found: dict[int, Map] = {}
+    cameras = [read_camera(request.camera) for request in requests]
+    responses: dict[int, Map] = {}
     for camera in dict.fromkeys(cameras):
         rows = [i for i, one in enumerate(cameras) if one == camera]
         kinds = [_rendered(requests[i].number) for i in rows]
         shots = simulation.stage.render(vehicle.body, vehicle.cameras[camera], kinds)
         place = messages.pose(camera_in_world(vehicle, camera))
         for i, shot in zip(rows, shots, strict=True):
-            found[i] = _response(simulation, requests[i], shot, place)
-    return [found[i] for i in range(len(requests))]
+            responses[i] = _response(simulation, requests[i], shot, place)
+    return [responses[i] for i in range(len(requests))]
 
 
 def _response(simulation: Simulation, request: _Request, shot: Shot, place: Map) -> Map:
@@ -117,8 +117,8 @@ def _response(simulation: Simulation, request: _Request, shot: Shot, place: Map)
         "image_type": request.number,
     }
     if channels == "rgba":
-        return {**response, "camera_id": request.given}
-    response["camera_name"] = str(request.given)
+        return {**response, "camera_id": request.camera}
+    response["camera_name"] = str(request.camera)
     return {**response, "annotation_name": ""} if channels == "rgb" else response
 
 

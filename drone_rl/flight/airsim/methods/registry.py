@@ -88,17 +88,17 @@ def call(simulation: Simulation, name: str, args: Sequence[Any]) -> Any:
         UnknownMethodError: There is no such method.
         InputError: An argument is wrong, or the vehicle's state does not allow it.
     """
-    found = METHODS.get(name)
-    if found is None:
+    entry = METHODS.get(name)
+    if entry is None:
         if name in UNSUPPORTED:
             raise InputError(f"{name} is not supported: this server has no {UNSUPPORTED[name]}")
         raise UnknownMethodError(name)
-    sent = [*args, *(argument.default for argument in found.arguments[len(args) :])]
+    sent = [*args, *(argument.default for argument in entry.arguments[len(args) :])]
     if _REQUIRED in sent:
-        least = sum(argument.default is _REQUIRED for argument in found.arguments)
+        least = sum(argument.default is _REQUIRED for argument in entry.arguments)
         raise InputError(f"{name} was called with {len(args)} arguments; give {least} or more")
-    values = [a.read(simulation, v) for a, v in zip(found.arguments, sent, strict=False)]
-    result = found.compute(simulation, *values)
+    values = [a.read(simulation, v) for a, v in zip(entry.arguments, sent, strict=False)]
+    result = entry.compute(simulation, *values)
     simulation.settle()  # it may have ended other calls, as cancelLastTask and simPause do
     if isinstance(result, FlightFuture):
         return Wait(lambda: result.done, result.result)

@@ -94,8 +94,8 @@ def _spawn(simulation: Simulation, name: str, asset: str, pose: Pose, size: floa
     given(number, "object_id", -1, 255),
     given(flag, "is_name_regex", default=False),
 )
-def _set_id(simulation: Simulation, name: str, found: float, is_pattern: bool) -> bool:
-    return simulation.stage.set_id(name, int(found), is_pattern=is_pattern)
+def _set_id(simulation: Simulation, name: str, object_id: float, is_pattern: bool) -> bool:
+    return simulation.stage.set_id(name, int(object_id), is_pattern=is_pattern)
 
 
 @method("simSetWind", given(read_vector, "wind", 50.0))
@@ -121,10 +121,10 @@ def _time_of_day(simulation: Simulation, is_enabled: bool, moment: str) -> None:
     if not is_enabled:
         simulation.stage.clear_sun()
         return
-    found = re.search(r"\b(\d|[01]\d|2[0-3]):([0-5]\d)", moment or "12:00")
-    if not found:
+    match = re.search(r"\b(\d|[01]\d|2[0-3]):([0-5]\d)", moment or "12:00")
+    if not match:
         raise InputError(f"start_datetime={moment!r} has no time; give YYYY-MM-DD HH:MM:SS")
-    hour = int(found[1]) + int(found[2]) / 60
+    hour = int(match[1]) + int(match[2]) / 60
     angle = (hour - 12.0) / 12.0 * 180.0
     elevation = math.degrees(math.asin(math.cos(math.radians(angle)) * 0.82))
     simulation.stage.set_sun(elevation, 180.0 - angle)  # at noon in the south, behind

@@ -108,14 +108,14 @@ def write_span(
 @wp.func
 def _lambert(materials: structs.Materials, env: int, geom: int, normal: wp.vec3) -> wp.vec3:
     """Lambert's law under distant lights, 0 to 255. Normal: world frame."""
-    own = materials.colors[env % materials.colors.shape[0], geom]
+    albedo = materials.colors[env % materials.colors.shape[0], geom]
     row = env % materials.ambient.shape[0]
     color = wp.vec3()
     for light in range(materials.ambient.shape[1]):
-        color += wp.cw_mul(own, materials.ambient[row, light])
+        color += wp.cw_mul(albedo, materials.ambient[row, light])
     for light in range(materials.ambient.shape[1]):
         facing = wp.max(0.0, wp.dot(normal, -materials.direction[row, light]))
-        color += wp.cw_mul(own, materials.diffuse[row, light] * facing)
+        color += wp.cw_mul(albedo, materials.diffuse[row, light] * facing)
     return 255.0 * wp.vec3(
         wp.clamp(color[0], 0.0, 1.0), wp.clamp(color[1], 0.0, 1.0), wp.clamp(color[2], 0.0, 1.0)
     )
@@ -144,11 +144,11 @@ def _color_geom(
     shown: structs.PixelValue,
 ) -> None:
     env, geom = job.env, shown.number
-    own = 255.0 * materials.colors[env % materials.colors.shape[0], geom]
+    albedo = 255.0 * materials.colors[env % materials.colors.shape[0], geom]
     lit, shaded = light_surface(materials, env, shown.normal)
     light = structs.SurfaceLight()
-    light.lit = wp.cw_mul(own, lit)
-    light.shaded = wp.cw_mul(own, shaded)
+    light.lit = wp.cw_mul(albedo, lit)
+    light.shaded = wp.cw_mul(albedo, shaded)
     light.extinction = effects.extinction[env % effects.extinction.shape[0]]
     light.horizon = materials.sky[env % materials.sky.shape[0]]
     row = env % effects.texture.shape[0]
