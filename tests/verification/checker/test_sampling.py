@@ -83,6 +83,8 @@ def test_find():
     assert find(BOXES, points).tolist() == [1, 0, 0]
     with pytest.raises(ValueError, match="no box holds"):
         find(BOXES, np.array([[3.0, 0.0]]))
+    beside = np.array([[[0.0, 2.0], [-1.0, 1.0]], [[0.0, 2.0], [1.0, 3.0]]])
+    assert find(beside, np.array([[1.0, 2.0], [1.0, 0.0]])).tolist() == [1, 0]
 
 
 def test_sample_placements(parsed):
