@@ -1,10 +1,9 @@
 """Collectors on a Ray cluster, whose workers may die.
 
-TorchRL's `RayCollector` creates the workers, places them and ends them. It stacks the workers'
-batches, which must have one length, and sends parameters through a process group that breaks with
-its first member. Therefore the exchange of a batch is implemented here: parameters travel with the
-request and random streams with the result, so that the replacement of a lost worker runs the very
-episodes that were under way.
+TorchRL's `RayCollector` stacks the workers' batches, which must have one length, and sends
+parameters through a process group that breaks with its first member. Here, parameters travel with
+the request and random streams with the result, so that the replacement of a lost worker runs the
+very episodes that were under way.
 """
 
 import logging
@@ -16,7 +15,6 @@ import torch
 from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import nn
-from torchrl.collectors import BaseCollector
 
 from drone_rl.collectors.episodes import EpisodeCollector
 from drone_rl.utils.errors import InputError
@@ -28,19 +26,12 @@ WorkerComponents = tuple[EpisodeCollector, nn.Module, torch.Generator]
 _log = logging.getLogger(__name__)
 
 
-class _RemoteEpisodes(BaseCollector):
+class _RemoteEpisodes:
     """Run an `EpisodeCollector` in a worker, with the parameters and state of each request."""
 
-    def __init__(
-        self, create_env_fn: Sequence[Callable[[], WorkerComponents]], **unused: object
-    ) -> None:
-        super().__init__()
+    def __init__(self, make: Callable[[], WorkerComponents]) -> None:
         torch.set_num_threads(1)
-        self._episodes, self._network, self._actions = create_env_fn[0]()
-
-    def __bool__(self) -> bool:
-        """Return True; else Ray would ask for a length before it reports an error of `__init__`."""
-        return True
+        self._episodes, self._network, self._actions = make()
 
     def collect(
         self, weights: dict[str, torch.Tensor], state: dict | None
@@ -51,32 +42,12 @@ class _RemoteEpisodes(BaseCollector):
         """
         self._network.load_state_dict(weights)
         if state is not None:
-            self.load_state_dict(state)
+            self._episodes.load_state_dict(state["episodes"])
+            self._actions.set_state(state["actions"])
         batch = self._episodes.collect().cpu()
         leaves = batch.items(include_nested=True, leaves_only=True)
-        return {key: value.numpy() for key, value in leaves}, self.state_dict()
-
-    def state_dict(self) -> dict:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Return the state between two batches."""
-        return {"episodes": self._episodes.state_dict(), "actions": self._actions.get_state()}
-
-    def load_state_dict(self, state_dict: dict) -> None:
-        """Resume from a state."""
-        self._episodes.load_state_dict(state_dict["episodes"])
-        self._actions.set_state(state_dict["actions"])
-
-    def iterator(self) -> Iterator[TensorDictBase]:
-        """Yield batches without end."""
-        while True:
-            yield self._episodes.collect()
-
-    def set_seed(self, seed: int, static_seed: bool = False) -> int:
-        """Raise an error: the seed is part of the settings."""
-        raise NotImplementedError("a worker's seed comes from its settings; set `seed` there")
-
-    def shutdown(self, *args: object, **kwargs: object) -> None:
-        """Close the environment."""
-        self._episodes.shutdown()
+        after = {"episodes": self._episodes.state_dict(), "actions": self._actions.get_state()}
+        return {key: value.numpy() for key, value in leaves}, after
 
 
 class RayEpisodeCollector:
@@ -114,15 +85,17 @@ class RayEpisodeCollector:
         """
         self.actor, self.postproc = actor, postproc
         self._network, self._device = network, device
-        self._ray, self._pool = _start(makers, address, num_cpus)
         self._makers, self._num_cpus = list(makers), num_cpus
+        self._ray, is_own = connect(address, "collector=ray")
+        try:
+            self.workers = self._start()
+            """Handles of the remote `_RemoteEpisodes`."""
+        except InputError:
+            if is_own:
+                self._ray.shutdown()
+            raise
         self._states: list[dict | None] = [None] * len(makers)
         self._left = self._max_lost = max_lost_workers
-
-    @property
-    def workers(self) -> list[Any]:
-        """Handles of the remote `_RemoteEpisodes`."""
-        return self._pool.remote_collectors
 
     def __iter__(self) -> Iterator[TensorDictBase]:
         """Yield batches without end."""
@@ -155,7 +128,31 @@ class RayEpisodeCollector:
 
     def shutdown(self) -> None:
         """End the workers; a cluster that was started here ends with this process."""
-        self._pool.shutdown()
+        for worker in self.workers:
+            self._ray.kill(worker)
+
+    def _start(self) -> list[Any]:
+        """Return workers that are ready."""
+        number, cores = len(self._makers), self._ray.cluster_resources().get("CPU", 0)
+        if number * self._num_cpus > cores:
+            raise InputError(
+                f"collector.num_threads={number} workers of collector.num_cpus={self._num_cpus} "
+                f"need more than the cluster's {cores:g} cores; lower one of them"
+            )
+        workers = [self._worker(make) for make in self._makers]
+        try:
+            self._ray.get([worker.__ray_ready__.remote() for worker in workers])
+        except self._ray.exceptions.RayActorError as error:
+            reason = str(error).strip().splitlines()[-1]
+            raise InputError(
+                f"a Ray worker did not start ({reason}); its machine needs the packages and the "
+                "plugins= of this one"
+            ) from error
+        return workers
+
+    def _worker(self, make: Callable[[], WorkerComponents]) -> Any:
+        remote = self._ray.remote(_RemoteEpisodes)
+        return remote.options(num_cpus=self._num_cpus).remote(make)
 
     def _answer(self, number: int, task: Any, weights: Any) -> tuple[dict[str, Any], dict]:
         """Return the batch and state of a worker or of its replacement."""
@@ -179,54 +176,7 @@ class RayEpisodeCollector:
             ) from error
         self._left -= 1
         _log.warning("Ray worker %d was lost; another runs its unfinished episodes", number)
-        self._pool.add_collectors(
-            [self._makers[number]], 1, None, [{}], [{"num_cpus": self._num_cpus}]
-        )
-        self.workers[number] = self.workers.pop()
-
-
-def _start(
-    makers: Sequence[Callable[[], WorkerComponents]], address: str | None, num_cpus: float
-) -> tuple[Any, Any]:
-    """Return the module ray and TorchRL's collector, whose workers are ready."""
-    ray, is_own = connect(address, "collector=ray")
-    try:
-        return ray, _start_workers(ray, makers, num_cpus)
-    except InputError:
-        if is_own:
-            ray.shutdown()
-        raise
-
-
-def _start_workers(
-    ray: Any, makers: Sequence[Callable[[], WorkerComponents]], num_cpus: float
-) -> Any:
-    """Return TorchRL's collector, whose workers are ready."""
-    from torchrl.collectors.distributed import RayCollector
-
-    cores = ray.cluster_resources().get("CPU", 0)
-    if len(makers) * num_cpus > cores:
-        raise InputError(
-            f"collector.num_threads={len(makers)} workers of collector.num_cpus={num_cpus} need "
-            f"more than the cluster's {cores:g} cores; lower one of them"
-        )
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # about a policy, which need not be sent
-            return RayCollector(
-                list(makers),
-                collector_class=_RemoteEpisodes,  # pyright: ignore[reportArgumentType]
-                frames_per_batch=len(makers),
-                sync=True,
-                weight_sync_schemes={},
-                remote_configs={"num_cpus": num_cpus},
-            )
-    except ray.exceptions.RayActorError as error:
-        reason = str(error).strip().splitlines()[-1]
-        raise InputError(
-            f"a Ray worker did not start ({reason}); its machine needs the packages and the "
-            "plugins= of this one"
-        ) from error
+        self.workers[number] = self._worker(self._makers[number])
 
 
 def _to_tensordict(arrays: dict[Any, Any]) -> TensorDictBase:

@@ -81,10 +81,6 @@ class ThreadedCollector(BaseCollector):
         for collector in self.collectors:
             collector.shutdown(close_env=close_env)
 
-    def __len__(self) -> int:
-        """Raise a TypeError: there is no end of batches."""
-        raise TypeError("a ThreadedCollector has batches without end")
-
     def _maybe_fallback_update(
         self, policy_or_weights: Any = None, *, model_id: str | None = None
     ) -> None:

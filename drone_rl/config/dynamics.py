@@ -96,6 +96,12 @@ class DynamicsSettings(Settings):
         """Whether actions set poses."""
         return self.mode == MODES[0]
 
+    def effective(self, actions: str) -> tuple[str, ...]:
+        """Return the names of the settings that have an effect with a kind of actions."""
+        if not self.is_computer_vision:
+            return tuple(self.values())
+        return ("mode", "control_ticks", "tick") if actions == "velocity" else ("mode",)
+
     @property
     def control_timestep(self) -> float:
         """Seconds from one action to the next."""

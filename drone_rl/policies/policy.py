@@ -78,15 +78,14 @@ class BasePolicy(abc.ABC):
 
         Names are of `dynamics`, or "appearance.NAME".
         """
-        trained, flown = self.own_dynamics.values(), self.dynamics.values()
-        if self.dynamics.is_computer_vision:  # where little else counts
-            timing = ("control_ticks", "tick") if self.actions.kind == "velocity" else ()
-            trained, flown = ({n: of[n] for n in ("mode", *timing)} for of in (trained, flown))
-        looks = (self.own_appearance.values(), self.appearance.values())
-        trained, flown = (
-            {**of, **{f"appearance.{name}": value for name, value in look.items()}}
-            for of, look in zip((trained, flown), looks, strict=True)
-        )
+        names = self.dynamics.effective(self.actions.kind)
+
+        def values(dynamics: DynamicsSettings, look: AppearanceSettings) -> dict[str, Any]:
+            looks = {f"appearance.{name}": value for name, value in look.values().items()}
+            return {name: dynamics.values()[name] for name in names} | looks
+
+        trained = values(self.own_dynamics, self.own_appearance)
+        flown = values(self.dynamics, self.appearance)
         return {n: {"own": trained[n], "flown": v} for n, v in flown.items() if trained[n] != v}
 
     @abc.abstractmethod

@@ -109,16 +109,11 @@ class FlightConditions:
         """Values that have an effect, by their names on the command line."""
         parts = self.values()
         parts["task"] = {"name": self.task.name, **parts["task"]}
-        if self.dynamics.is_computer_vision:
-            names = ("mode", "control_ticks", "tick") if self._is_continuous else ("mode",)
-            parts["dynamics"] = {name: parts["dynamics"][name] for name in names}
-            if not self._is_continuous:
-                parts["actions"] = {"kind": self.actions.kind}
+        names = self.dynamics.effective(self.actions.kind)
+        parts["dynamics"] = {name: parts["dynamics"][name] for name in names}
+        if names == ("mode",):
+            parts["actions"] = {"kind": self.actions.kind}
         return {f"{part}.{k}": v for part, values in parts.items() for k, v in values.items()}
-
-    @property
-    def _is_continuous(self) -> bool:
-        return self.actions.kind == "velocity"
 
     @functools.cached_property
     def action_entry(self) -> Entry:

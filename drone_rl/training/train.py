@@ -19,7 +19,6 @@ from drone_rl.config.learning import Episodes, Reinforce
 from drone_rl.config.options import TrainOptions
 from drone_rl.config.registry import implements, modules_of
 from drone_rl.config.training import TrainSettings
-from drone_rl.envs import DroneEnv, with_transforms
 from drone_rl.objectives import ReinforceLoss
 from drone_rl.policies import make_actor
 from drone_rl.policies.actor import exploring
@@ -180,20 +179,15 @@ def make_groups(
     network = description.build_network(torch_generator(seed, Stream.POLICY_INIT)).to(device)
     groups = []
     for number in range(len(sizes)) if numbers is None else numbers:
-        base = DroneEnv(
+        env = description.build_env(
             sizes[number],
-            replay or settings.task,
-            settings.camera,
             seed=seed,
+            device=device,
+            task=replay,
             first_world=sum(sizes[:number]),
             num_shards=1,
-            device=device,
             renderer=settings.renderer,
-            dynamics=settings.dynamics,
-            actions=settings.actions,
-            appearance=settings.appearance,
         )
-        env = with_transforms(base, description.make_transforms())
         generator = torch_generator(seed, Stream.ACTIONS, number=number, device=device)
         actor = make_actor(network, env.action_spec, generator)
         groups.append(EnvGroup(env, actor, network, generator))

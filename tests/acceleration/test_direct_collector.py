@@ -1,6 +1,7 @@
 """The direct collector and stepper equal TorchRL's bit for bit."""
 
 import copy
+import dataclasses
 
 import pytest
 import torch
@@ -30,6 +31,7 @@ from tests.continuous import make_env as make_continuous_env
 from tests.continuous import make_policy
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
+EIGHT = dataclasses.replace(SHORT, step_limit=8)
 KEPT = [("next", name) for name in ("reward", "done", "terminated", "truncated")]
 LOOK = AppearanceSettings(fog_visibility=(5.0, 50.0), ground_texture=("none", "grid"), shadows=0.5)
 STACK = CatFrames(2, dim=-3, in_keys=["pixels"])
@@ -55,7 +57,7 @@ def collector(acceleration, task, next_keys=(REASON,), look=None):
 @pytest.mark.parametrize(
     ("task", "worlds", "look"),
     [
-        *((SHORT, None, LOOK), (SHORT, 3, None)),
+        *((SHORT, None, LOOK), (SHORT, 3, None), (EIGHT, 3, None)),
         *((PillarsSettings(num_rows=1), None, None), (PillarsSettings(num_rows=1), 3, LOOK)),
     ],
 )
@@ -63,8 +65,8 @@ def test_direct_and_stepping_batches_are_identical(task, worlds, look):
     next_keys = (REASON, ("next", "info", "drone"))
     collectors = [collector(how, task, next_keys, look) for how in ("direct", "none")]
     lengths = set()
-    for _ in range(3):  # random streams continue identically
-        one, other = (each.collect(worlds) for each in collectors)
+    for count in (worlds, None, worlds):  # random streams continue identically
+        one, other = (each.collect(count) for each in collectors)
         assert set(one.keys(True, True)) == set(other.keys(True, True))
         for key in one.keys(True, True):
             assert torch.equal(one[key], other[key]), key

@@ -1,7 +1,5 @@
 """Complete episodes in order, and the interface of TorchRL's collectors."""
 
-import gc
-
 import pytest
 import torch
 from tensordict import TensorDict
@@ -218,16 +216,6 @@ def test_construction_starts_no_episode():
     assert torch.equal(make()[0].collect(5)["pixels"][0], GrayPixels()(env.reset())["pixels"][0])
 
 
-def test_deleting_the_collector_keeps_the_environment_open():
-    collector, env = make()
-    collector.collect(5)
-    del collector
-    gc.collect()
-    assert not env.is_closed
-    env.reset()
-    env.close()
-
-
 @pytest.mark.parametrize("num_envs", [5, 2])
 def test_every_episode_is_complete_and_starts_once(num_envs):
     collector, env = make()
@@ -250,12 +238,10 @@ def test_outer_exploration_type_is_respected():
     assert not torch.equal(batch["action"], batch["logits"].argmax(-1))
 
 
-def test_no_other_exploration_type_is_set_for_other_threads(monkeypatch):
+def test_no_exploration_type_is_set_for_other_threads(monkeypatch):
+    """TorchRL's own collector sets one for the whole process."""
     collector, _ = make()
-    with set_exploration_type(ExplorationType.DETERMINISTIC):
-        kinds, set_mode = set(), probabilistic._interaction_type.set_mode
-        monkeypatch.setattr(
-            probabilistic._interaction_type, "set_mode", lambda k: (kinds.add(k), set_mode(k))
-        )
-        collector.collect(5)
-        assert kinds == {ExplorationType.DETERMINISTIC}
+    kinds = []
+    monkeypatch.setattr(probabilistic._interaction_type, "set_mode", kinds.append)
+    collector.collect(5)
+    assert not kinds

@@ -162,7 +162,7 @@ class Drone:
 
     @property
     def sensors(self) -> Sensors:
-        """IMU, barometer, magnetometer, GPS and collision sensor.
+        """IMU, barometer, magnetometer and GPS receiver.
 
         Without `sensors` at creation, AirSim's sensors are turned on at the first access; they cost
         nothing until then.

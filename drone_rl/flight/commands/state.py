@@ -23,7 +23,6 @@ from drone_rl.sim.dynamics.state import (
 )
 from drone_rl.sim.sensors import (
     BarometerReading,
-    CollisionState,
     GpsReading,
     ImuReading,
     MagnetometerReading,
@@ -133,7 +132,7 @@ def _triple(rows: Tensor) -> Triple:
 
 
 class Sensors:
-    """IMU, barometer, magnetometer, GPS and collision sensor of one drone.
+    """IMU, barometer, magnetometer and GPS receiver of one drone.
 
     Readings have batch shape (1, *). They are sampled in each control period, seven ticks by
     default, even if a sensor's rate is higher.
@@ -175,11 +174,6 @@ class Sensors:
     def gps(self) -> GpsReading:
         """Return place on Earth and velocity; `is_valid` from the first reading on, see `fix`."""
         return self._suite.gps.read(self._state.gps, self._state.time)
-
-    def collision(self) -> CollisionState:
-        """Return the last contact, and whether it is new since the last call."""
-        reading, self._state = self._suite.read_collision(self._state)
-        return reading
 
 
 class Trajectory:

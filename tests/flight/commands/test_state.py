@@ -73,7 +73,7 @@ def test_a_drone_that_lies_still_feels_gravity_alone():
     assert float(sensors.magnetometer().field.norm()) == pytest.approx(0.5, abs=0.1)  # gauss
 
 
-def test_of_a_flight_they_tell_height_place_and_touch():
+def test_of_a_flight_they_tell_height_and_place():
     pilot = Pilot(sensors=PERFECT)
     on_the_ground = float(pilot.sensors.barometer().altitude[0])
     assert not pilot.sensors.gps().is_valid[0]  # within its first second
@@ -88,20 +88,6 @@ def test_of_a_flight_they_tell_height_place_and_touch():
     north = math.radians(float(place.place[0, 0]) - HOME.latitude) * 6.37e6
     assert place.is_valid[0] and north == pytest.approx(x, abs=0.3)
     assert pilot.sensors.time == pytest.approx(pilot.time)
-    pilot.land()
-    touched = pilot.sensors.collision()
-    assert touched.has_collided[0] and int(touched.contact.thing[0]) == GROUND
-
-
-def test_a_touch_is_news_once():
-    pilot = Pilot(sensors=PERFECT)
-    pilot.advance(0.1)
-    pilot.sensors.collision()
-    pilot.arm()
-    pilot.take_off()
-    pilot.sensors.collision()
-    pilot.advance(0.5)
-    assert not pilot.sensors.collision().has_collided[0]
 
 
 def test_noise_is_the_seeds():

@@ -1,6 +1,5 @@
-"""All sensors together, their random streams, and collisions."""
+"""All sensors together, and their random streams."""
 
-import dataclasses
 import math
 
 import pytest
@@ -8,16 +7,9 @@ import torch
 
 from drone_rl.config.sensors import GpsSettings, SensorSettings
 from drone_rl.sim.dynamics.state import (
-    GROUND,
-    NOTHING,
-    THING,
-    TIME,
     BodyState,
-    Contact,
-    FlightState,
 )
 from drone_rl.sim.sensors import SensorSuite
-from drone_rl.sim.sensors import suite as collisions
 from drone_rl.utils.errors import InputError
 
 
@@ -25,13 +17,6 @@ def resting(count, z=3.0):
     position = torch.zeros(count, 3, dtype=torch.float64)
     position[:, 2] = z
     return BodyState.at_rest(position)
-
-
-def touching(thing, seconds):
-    """Return the state of a quadrotor that has touched something."""
-    state = FlightState.at_rest(resting(1).position)
-    state.numbers[:, THING], state.numbers[:, TIME] = thing, seconds
-    return state
 
 
 def tensors(state):
@@ -64,20 +49,6 @@ def test_ideal_sensors_of_a_hovering_drone():
     assert reading(suite, "gps", state).place[1].tolist() == pytest.approx(
         [47.641468, -122.140165, 125]
     )
-    assert suite.read_collision(state)[0].has_collided.tolist() == [False, False]
-
-
-def test_contacts_of_quadrotors_are_reported():
-    suite = SensorSuite()
-    state = suite.start(FlightState.at_rest(resting(1).position))
-    assert not suite.read_collision(state)[0].has_collided.item()
-    state = suite.update(state, touching(2, 0.003), 0.003)
-    readings, after = suite.read_collision(state)
-    assert readings.has_collided.item() and readings.contact.thing.item() == 2
-    assert not suite.read_collision(after)[0].has_collided.item()
-    assert same(dataclasses.replace(after, collision=state.collision), state)
-    grounded = suite.start(touching(GROUND, 0.0))
-    assert suite.read_collision(grounded)[0].contact.thing.item() == GROUND
 
 
 def test_noise_depends_only_on_the_seed():
@@ -114,60 +85,3 @@ def test_partial_reset_restarts_sensors():
     assert readings.time.tolist() == [-math.inf] * 3
     state = suite.update(state, resting(3), 0.2)
     assert reading(suite, "gps", state).is_valid.tolist() == [True, False, True]
-
-
-def contact(things, times):
-    """Return contacts at distinct positions."""
-    count = len(things)
-    numbers = torch.arange(1.0, count + 1, dtype=torch.float64)
-    up = torch.tensor([[0.0, 0.0, 1.0]], dtype=torch.float64).repeat(count, 1)
-    time = torch.tensor(times, dtype=torch.float64)
-    return Contact(torch.tensor(things), up, up * numbers[:, None], 0.01 * numbers, time)
-
-
-def place(x):
-    return torch.full((2, 3), float(x), dtype=torch.float64)
-
-
-def test_collision_is_kept_until_it_is_read():
-    state = collisions.start_collisions(place(0))
-    assert state.has_collided.tolist() == [False, False]
-    state = collisions.update_collisions(state, contact([NOTHING] * 2, [0.0] * 2), place(1))
-    assert state.has_collided.tolist() == [False, False]
-    touched = contact([NOTHING, 3], [0.0, 0.5])
-    state = collisions.update_collisions(state, touched, place(2))
-    state = collisions.update_collisions(state, touched, place(3))
-    assert state.has_collided.tolist() == [False, True]
-    collision, state = collisions.read_collisions(state)
-    assert collision.has_collided.tolist() == [False, True]
-    assert collision.contact.thing.tolist() == [NOTHING, 3]
-    assert collision.contact.normal[1].tolist() == [0.0, 0.0, 1.0]
-    assert collision.contact.point[1].tolist() == [0.0, 0.0, 2.0]
-    assert collision.contact.depth[1].item() == 0.02
-    assert collision.contact.time[1].item() == 0.5
-    assert collision.position[1].tolist() == [2.0, 2.0, 2.0]
-    again, state = collisions.read_collisions(state)
-    assert again.has_collided.tolist() == [False, False]
-    assert again.contact.thing.tolist() == [NOTHING, 3]
-    state = collisions.update_collisions(state, touched, place(4))
-    assert state.has_collided.tolist() == [False, False]
-
-
-def test_later_contact_with_the_same_object_is_new():
-    state = collisions.update_collisions(
-        collisions.start_collisions(place(0)), contact([GROUND] * 2, [0.0] * 2), place(1)
-    )
-    _, state = collisions.read_collisions(state)
-    state = collisions.update_collisions(state, contact([GROUND] * 2, [0.0, 0.003]), place(2))
-    assert state.has_collided.tolist() == [False, True]
-    assert state.position[:, 0].tolist() == [1.0, 2.0]
-
-
-def test_collisions_are_read_per_drone():
-    state = collisions.update_collisions(
-        collisions.start_collisions(place(0)), contact([1, 2], [0.1] * 2), place(1)
-    )
-    collision, after = collisions.read_collisions(state, torch.tensor([1]))
-    assert collision.contact.thing.tolist() == [2]
-    assert after.has_collided.tolist() == [True, False]
-    assert state.has_collided.tolist() == [True, True]
