@@ -4,7 +4,7 @@ This is the only module that imports that package. TorchRL and PyTorch do what i
 """
 
 from collections.abc import Iterable, Sequence
-from typing import Literal
+from typing import Literal, TypeVar
 
 from tensordict.nn import TensorDictModuleBase
 from tensordict.utils import NestedKey
@@ -14,6 +14,7 @@ from torchrl.envs import EnvBase
 from drone_rl.acceleration import DirectCollector, DirectStepper, FusedCollector, FusedNetwork
 from drone_rl.envs.direct_renderer import DirectRenderer, Reasons
 
+N = TypeVar("N", bound=nn.Module)
 Acceleration = Literal["none", "direct", "fused"]
 """Implementation. "none": step with TorchRL. "direct": step without it, bit-identical. "fused": one
 kernel per batch of episodes; sampling and sums are in another order."""
@@ -69,11 +70,11 @@ def accelerated_stepper(
 
 
 def accelerated_gradients(
-    network: nn.Module,
+    network: N,
     num_threads: int = 1,
     *,
     wrt: Literal["weights", "pixels"] = "weights",
-) -> nn.Module:
+) -> N | FusedNetwork:
     """Return the network with fused forward and backward pass if that is supported, else itself.
 
     See `FusedNetwork.try_create` for the arguments.

@@ -55,7 +55,8 @@ class Pieces:
         heights = [self.slope * at + self.offset for at in (self.begin, self.end)]
         starts = np.append(self.begin, x), np.append(heights[0], low)
         ends = np.append(self.end, x), np.append(heights[1], high)
-        return shapely.linestrings(np.stack([np.stack(starts, -1), np.stack(ends, -1)], 1))
+        points = np.stack([np.stack(starts, -1), np.stack(ends, -1)], 1)
+        return np.asarray(shapely.linestrings(points))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -99,7 +100,7 @@ def arrange(pieces: Pieces, window: Window, most_cells: int) -> Arrangement:
     """
     side = window.sideways
     frame = shapely.box(window.nearest, -side, window.farthest, side)
-    lines = np.append(pieces.lines(), frame.exterior)
+    lines = np.array([*pieces.lines(), frame.exterior])
     meetings = shapely.STRtree(lines).query(lines, "intersects").shape[1]  # each twice
     if meetings > 4 * most_cells:
         raise InputError(
