@@ -13,7 +13,7 @@ import msgpack
 
 from drone_rl.flight.airsim import methods
 from drone_rl.flight.airsim.calls import Calls, remark
-from drone_rl.flight.airsim.lockstep import PATIENCE, SLICE, Lockstep
+from drone_rl.flight.airsim.lockstep import SLICE, Lockstep
 from drone_rl.flight.airsim.methods import UnknownMethodError
 from drone_rl.flight.airsim.simulation import Simulation, Wait
 from drone_rl.utils.errors import InputError
@@ -246,7 +246,7 @@ def _packed(message: list[Any]) -> bytes:
 class AirsimServer:
     """Serves one simulation, and advances its time."""
 
-    def __init__(self, simulation: Simulation, patience: float = PATIENCE) -> None:
+    def __init__(self, simulation: Simulation, patience: float) -> None:
         """Create a server that does not listen yet; for `patience` see `lockstep`."""
         self.simulation = simulation
         self._lockstep = Lockstep(simulation, patience)
@@ -314,18 +314,3 @@ class AirsimServer:
             self._server.close()
         for client in [*self.clients]:
             client.close()
-
-
-async def run(
-    simulation: Simulation, host: str, port: int, ready: Callable[[str], Any], patience: float
-) -> None:
-    """Serve a simulation until cancelled; `ready` is called with the address once it listens.
-
-    Raises:
-        InputError: See `AirsimServer.start`.
-    """
-    server = AirsimServer(simulation, patience)
-    await server.start(host, port)
-    address, number = server.address
-    ready(f"{address}:{number}")
-    await server.serve()
