@@ -22,7 +22,7 @@ from drone_rl.utils.schema import shown
 _log = logging.getLogger(__name__)
 
 REQUEST, RESPONSE, NOTIFICATION = 0, 1, 2
-MAX_MESSAGE = 2**22
+MAX_REQUEST = 2**22
 """Bytes of a request: no method needs more."""
 TURN = 0.005
 """Seconds of work for one client before others have their turn."""
@@ -95,7 +95,7 @@ class Connection(asyncio.Protocol):
             self._unpacker.feed(data)
             self._backlog.extend(self._unpacker)
         except msgpack.BufferFull:
-            self._break(f"a request has more than {MAX_MESSAGE} bytes")
+            self._break(f"a request has more than {MAX_REQUEST} bytes")
             return
         except Exception as error:
             self._break(f"its bytes are no msgpack ({type(error).__name__})")
@@ -227,7 +227,7 @@ def _unpacker() -> Any:
         unicode_errors="replace",
         strict_map_key=False,
         use_list=True,
-        max_buffer_size=MAX_MESSAGE,
+        max_buffer_size=MAX_REQUEST,
         max_array_len=_MAX_ITEMS,
         max_map_len=_MAX_ITEMS,
         max_ext_len=0,
