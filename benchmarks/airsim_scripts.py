@@ -54,15 +54,17 @@ def run_script(name: str, version: str, folder: Path) -> list[str]:
     one, folder = PROGRAMS[name], folder.absolute()
     folder.mkdir(parents=True, exist_ok=True)
     settings = parse_settings(one.settings.replace("FOLDER", str(folder)))
-    usual = {"scene": "empty", "clock": "lockstep", "patience_s": 0.002}  # programs join at once
+    options: dict[str, Any] = {"scene": "empty", "clock": "lockstep"}
+    options |= {"patience_s": 0.002, **one.options}  # programs join at once
     page = (ROOT / "docs" / "airsim.md").read_text()
     fixes = re.search(r'title="airsim_fixes.py"\n(.*?)```', page, re.DOTALL)
     assert fixes is not None
     if version in VERSIONS[2:]:  # those with the transport that the page recommends
         (folder / "airsim_fixes.py").write_text(fixes[1])
     environment = {**os.environ, "PYTHONPATH": str(folder)}
-    channels = {"raw_channels": 4} if version == "airsim-1.2" else {}
-    with serve(settings, port=0, **{**usual, **channels, **one.options}) as server:
+    if version == "airsim-1.2":
+        options = {"raw_channels": 4, **options}
+    with serve(settings, port=0, **options) as server:
         client = CLIENT_OF[version]
         command = [
             *(str(python_of(client)), "-m", "benchmarks.airsim_programs"),

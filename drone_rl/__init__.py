@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from drone_rl.config.commands import PlacesSettings as PlacesSettings
     from drone_rl.config.commands import ProvableSettings as ProvableSettings
     from drone_rl.config.commands import ProveSettings as ProveSettings
+    from drone_rl.config.commands import ServeSettings as ServeSettings
     from drone_rl.config.commands import ShiftSettings as ShiftSettings
     from drone_rl.config.registry import register_collector as register_collector
     from drone_rl.config.registry import register_learner as register_learner

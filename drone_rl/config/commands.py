@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any
 
-from drone_rl.config import ActionSettings, CameraSettings, DynamicsSettings
+from drone_rl.config import ActionSettings, CameraSettings, DynamicsSettings, RendererName
 from drone_rl.config.camera import DeviceSettings, RendererSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Listed, Maybe, OneOf, Real, Several, Whole
@@ -290,3 +290,32 @@ class FlySettings(RendererSettings):
     """Images per second that the page is sent; slow browsers get fewer."""
     demonstrations: str | None = None
     """Folder to which recorded flights are added; null for outputs/demonstrations."""
+
+
+class ServeSettings(Settings):
+    """Settings of the server for AirSim's clients."""
+
+    scene: str = "cubes"
+    """Objects in the scene: cubes, which vanish when touched; blocks; pillars; empty; or the
+    path of an MJCF file, *.xml."""
+    clock: Annotated[str, OneOf(("wall", "lockstep"))] = "wall"
+    """wall: real time, multiplied by ClockSpeed. lockstep: time advances only while a call waits
+    for it, as fast as the machine can, with the same results every time if clients send their
+    requests within `patience_s` of each other."""
+    date: str = "2024-01-01T00:00:00"
+    """Time at which lockstep starts, as ISO 8601, UTC: time stamps count nanoseconds from 1970.
+    With the wall clock they start at the present time."""
+    patience_s: Annotated[float, Real(0.0, 60.0, unit="s")] = 0.02
+    """Real seconds without a request before time advances for a waiting call in lockstep. Give more
+    for a client that computes long between the start of a movement and its next request."""
+    address: str | None = None
+    """Address to listen at; null for that of the settings file, 127.0.0.1 by default."""
+    port: Annotated[int, Whole(0, 65535)] | None = None
+    """Port; null for that of the settings file, 41451 by default; 0 for a free one."""
+    seed: Annotated[int, Whole(0, 2**31 - 1)] = 0
+    """Seed of the placement of cubes and pillars, of gusts and of sensor noise."""
+    raw_channels: Annotated[int, Whole(3, 4)] = 3
+    """Channels of raw images of AirSim's clients from version 1.2 on: 3 (blue, green, red), or 4
+    (red, green, blue, opacity) for programs that were written for AirSim 1.2."""
+    renderer: RendererName | None = None
+    """raytrace or mujoco_warp; null for the one that fits the scene."""

@@ -4,6 +4,7 @@ Functions such as `drone_rl.train(**changes)` take them; `from_arguments` checks
 """
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, TypedDict
 
 from typing_extensions import TypedDict as OpenTypedDict
@@ -133,6 +134,20 @@ class FlyOptions(RendererOptions, total=False):
     port: int
     frames_per_second: int
     demonstrations: str | None
+
+
+class ServeOptions(TypedDict, total=False):
+    """Fields of `ServeSettings`."""
+
+    scene: str | Path
+    clock: str
+    date: str
+    patience_s: float
+    address: str | None
+    port: int | None
+    seed: int
+    raw_channels: int
+    renderer: str | None
 
 
 class VehicleOptions(TypedDict, total=False):

@@ -116,13 +116,3 @@ class SensorSettings(Settings):
     """Earth's field."""
     gps: GpsSettings = GpsSettings()
     """Position on Earth."""
-
-    @property
-    def perfect(self) -> "SensorSettings":
-        """The same without noise; rates, latencies, scales and the stated errors of GPS stay."""
-        return SensorSettings(
-            imu=self.imu.replace(noise=0.0),
-            barometer=self.barometer.replace(noise=0.0),
-            magnetometer=self.magnetometer.replace(noise=0.0),
-            gps=self.gps.replace(noise=0.0),
-        )

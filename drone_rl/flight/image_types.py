@@ -49,7 +49,7 @@ def segmentation_ids(scene: Scene) -> Tensor:
     return torch.tensor([*((5 + sum(map(ord, name))) % NUM_IDS for name in names), 0])
 
 
-FARTHEST = 65504.0
+MAX_DEPTH = 65504.0
 """Depth where nothing is hit, and the largest depth, metres."""
 WHITE_DEPTH = 100.0
 """Depth that is shown white, metres."""
@@ -175,7 +175,7 @@ def pixels(
     geoms and, last, of the sky, (num_geoms + 1,), by default the geoms' indices and 0.
 
     Returns:
-        As numbers, float32, shape (*, H, W): metres of depth, at most `FARTHEST`, also where
+        As numbers, float32, shape (*, H, W): metres of depth, at most `MAX_DEPTH`, also where
         nothing is hit; a fraction of white, of the width, or of red for all other types. Otherwise
         uint8, red, green and blue, shape (*, H, W, 3): depth in whole metres up to 255, fractions
         in 255ths, both in gray; normals from -1 to 1 as 0 to 255 along our world's x, y and z,
@@ -192,7 +192,7 @@ def pixels(
         is_hit = (values != 0).any(-1, keepdim=True)
         colors = ((values + 1) * 127.5 * is_hit).round().clamp(0, 255).to(torch.uint8)
         return _color(colors, as_float)
-    depth = torch.where(values > 0, values, FARTHEST).clamp(max=FARTHEST)
+    depth = torch.where(values > 0, values, MAX_DEPTH).clamp(max=MAX_DEPTH)
     if image_type is ImageType.DEPTH_VIS:
         return _gray((depth / WHITE_DEPTH).clamp(max=1.0), as_float, 255.0)
     if image_type is ImageType.DISPARITY_NORMALIZED:

@@ -19,7 +19,7 @@ import numpy as np
 
 from drone_rl.flight.in_the_loop.control import RcSticks
 from drone_rl.flight.in_the_loop.drone import FlightControllerError
-from drone_rl.flight.in_the_loop.instruments import Readings, Vector, into_body
+from drone_rl.flight.in_the_loop.instruments import Readings, Vector, rotation
 from drone_rl.sim.coordinates import frd_from_body, ned_from_world, world_from_ned
 from drone_rl.utils.errors import InputError, extra
 
@@ -287,7 +287,9 @@ class MavlinkBridge:
 def sensor_fields(readings: Readings) -> dict[str, Any]:
     """Return the fields of HIL_SENSOR: microseconds, m/s2, rad/s, gauss, hPa, metres, Celsius."""
     force, rates = frd_from_body(readings.force), frd_from_body(readings.rates)
-    field = frd_from_body(into_body(readings.attitude, world_from_ned(np.array(FIELD))))
+    field = frd_from_body(
+        rotation(readings.attitude).apply(world_from_ned(np.array(FIELD)), inverse=True)
+    )
     return {
         "time_usec": round(readings.time * 1e6),
         **dict(zip(("xacc", "yacc", "zacc"), map(float, force), strict=True)),

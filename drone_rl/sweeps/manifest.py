@@ -114,6 +114,12 @@ def quoted(value: str) -> str:
     return f"'{escaped}'"
 
 
+def path_argument(path: Path) -> str:
+    """Return a path for Hydra's command line, with quotes if it needs them."""
+    text = str(path)
+    return text if re.fullmatch(r"[\w./+-]+", text) else quoted(text)
+
+
 @dataclasses.dataclass
 class Sweep:
     """The content of `sweep.json`."""

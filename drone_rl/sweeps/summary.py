@@ -3,8 +3,6 @@
 import csv
 import dataclasses
 import io
-import os
-import re
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from drone_rl.sweeps.manifest import Run, Sweep, quoted
+from drone_rl.sweeps.manifest import Run, Sweep, path_argument
 from drone_rl.sweeps.rows import Array, Row
 from drone_rl.sweeps.text import GROUP_SENTENCES, SENTENCES
 from drone_rl.trust.rule import KINDS
@@ -89,9 +87,8 @@ def to_csv(rows: Sequence[Row]) -> str:
 
 def _path_argument(path: Path) -> str:
     """Return a path for Hydra's command line, relative if it is below the current folder."""
-    text = str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else str(path)
-    plain = re.fullmatch(rf"[\w.+:{re.escape(os.sep)}-]+", text)
-    return text if plain else quoted(text)
+    here = Path.cwd()
+    return path_argument(path.relative_to(here) if path.is_relative_to(here) else path)
 
 
 @dataclasses.dataclass

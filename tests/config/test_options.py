@@ -31,6 +31,7 @@ LEFT_OUT = {"BodiesSettings": {"policies"}, "FigureSettings": {"figure"}}
         (commands.PlacesSettings, options.PlacesOptions),
         (commands.ProveSettings, options.ProveOptions),
         (commands.FlySettings, options.FlyOptions),
+        (commands.ServeSettings, options.ServeOptions),
         (commands.GymnasiumSettings, options.GymnasiumOptions),
         (DynamicsSettings, options.DynamicsOptions),
         (TrainSettings, options.TrainOptions),

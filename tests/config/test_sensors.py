@@ -5,7 +5,6 @@ from drone_rl.config.sensors import (
     GpsSettings,
     ImuSettings,
     MagnetometerSettings,
-    SensorSettings,
 )
 from drone_rl.utils.errors import InputError
 
@@ -13,15 +12,6 @@ from drone_rl.utils.errors import InputError
 def test_an_unknown_field_is_refused():
     with pytest.raises(InputError, match="field='moon' is unknown; give dipole, constant"):
         MagnetometerSettings(field="moon")
-
-
-def test_perfect_sensors_differ_in_their_noise_alone():
-    chosen = SensorSettings(gps=GpsSettings(rate=10.0, horizontal_noise=1.0))
-    perfect = chosen.perfect
-    assert perfect.gps == GpsSettings(rate=10.0, horizontal_noise=1.0, noise=0.0)
-    kinds = (perfect.imu, perfect.barometer, perfect.magnetometer, perfect.gps)
-    assert all(kind.noise == 0.0 for kind in kinds)
-    assert perfect.gps.values()["rate"] == 10.0
 
 
 @pytest.mark.parametrize(

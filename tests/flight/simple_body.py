@@ -6,7 +6,7 @@ import numpy as np
 import torch
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.flight.in_the_loop.instruments import into_body
+from drone_rl.flight.in_the_loop.instruments import rotation
 from drone_rl.sim.dynamics import BodyState
 
 SETTINGS = DynamicsSettings(tick=0.001)
@@ -47,7 +47,7 @@ class SimpleBody:
         w, v = q[0], q[1:]
         q = np.array([w - v @ half, *(v + w * half + np.cross(v, half))])
         q /= np.linalg.norm(q)
-        up = into_body(np.array([q[0], *-q[1:]]), np.array([0.0, 0.0, 1.0]))
+        up = rotation(q).apply([0.0, 0.0, 1.0])
         thrust = SETTINGS.rotor_thrust * float(r.sum()) / SETTINGS.mass
         velocity += self.tick * (thrust * up - np.array([0.0, 0.0, 9.81]))
         place += self.tick * velocity

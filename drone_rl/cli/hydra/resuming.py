@@ -10,7 +10,7 @@ import yaml
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import OmegaConf
 
-from drone_rl.sweeps.manifest import is_sweep, quoted, sweep_name
+from drone_rl.sweeps.manifest import is_sweep, path_argument, quoted, sweep_name
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import last_of, refuse_links, trained_policies, write_atomically
 from drone_rl.utils.overrides import must_be_typed, taken_over
@@ -18,8 +18,6 @@ from drone_rl.utils.overrides import must_be_typed, taken_over
 _FOLDER = "hydra.sweep.dir=${paths.outputs}/${hydra.job.config_name}/multiruns/"
 _NO_EARLY_FILES = ("hydra.output_subdir=null", "++hydra.job_logging.handlers.file.delay=true")
 """Keep Hydra from writing settings before they are checked, and from opening a log."""
-_PLAIN = re.compile(r"[\w./+-]*")
-"""Values that Hydra parses alike with and without quotes."""
 
 
 def complete(overrides: Sequence[str]) -> list[str]:
@@ -45,11 +43,13 @@ def complete(overrides: Sequence[str]) -> list[str]:
         folder = _newest_run(_outputs(overrides))
     if not _is_run(folder):
         above = next(filter(_is_run, folder.parents), None)
-        remedy = "the folder of a run" if above is None else f"its folder, {_resume(above)}"
+        remedy = (
+            "the folder of a run" if above is None else f"its folder, resume={path_argument(above)}"
+        )
         raise InputError(f"resume={folder} has no checkpoints/last.pt; give {remedy}")
     refuse_links(folder)
     kept = taken_over(folder, overrides)
-    plain = [_resume(folder) if o.startswith("resume=") else o for o in overrides]
+    plain = [f"resume={path_argument(folder)}" if o.startswith("resume=") else o for o in overrides]
     place = ["hydra.mode=RUN", f"hydra.run.dir={quoted(str(folder))}", *_NO_EARLY_FILES]
     return [*kept, *plain, *place]
 
@@ -103,7 +103,7 @@ def note_settings(folder: Path) -> None:
 
 def resume_command(folder: Path) -> str:
     """Return the shell command that resumes the run in a folder, from any working directory."""
-    settings = [_resume(folder.absolute()), *must_be_typed(_overrides())]
+    settings = [f"resume={path_argument(folder.absolute())}", *must_be_typed(_overrides())]
     return shlex.join(["drone-rl", "train", *settings])
 
 
@@ -111,11 +111,6 @@ def _overrides() -> list[str]:
     """The settings of the running command."""
     values: Any = OmegaConf.to_container(HydraConfig.get().overrides.task)  # without interpolation
     return [str(override) for override in values]
-
-
-def _resume(folder: Path) -> str:
-    text = str(folder)
-    return f"resume={text if _PLAIN.fullmatch(text) else quoted(text)}"
 
 
 def _unquoted(value: str) -> str:

@@ -41,6 +41,7 @@ from drone_rl.sim.dynamics.state import (
     VELOCITY,
 )
 from drone_rl.sim.rendering.appearance import rotate
+from drone_rl.sim.tasks.common import first_contact
 from drone_rl.sim.worlds import Worlds
 
 RECENT = 16
@@ -275,12 +276,8 @@ class Airframe(Pilot):
         if around is None:
             return True
         half = there.new_tensor(around.half_sizes)
-        way = there - here
-        way = torch.where(way == 0.0, 1e-12, way)
-        away = around.centers[0] - here
-        ends = torch.stack([(away - half) / way, (away + half) / way])
-        enters, leaves = ends.amin(0).amax(-1), ends.amax(0).amin(-1)
-        return not bool(((enters <= leaves) & (leaves >= 0.0) & (enters <= 1.0)).any())
+        hits = first_contact(half, here[None], there[None], around.centers)
+        return not bool(hits.isfinite().any())
 
     def _from_geo(self, place: GeoPoint) -> torch.Tensor:
         return world_from_geo(torch.tensor(place, dtype=torch.float64), self.geo_home)

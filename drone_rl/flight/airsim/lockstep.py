@@ -14,8 +14,6 @@ from collections.abc import Callable
 
 from drone_rl.flight.airsim.simulation import Simulation
 
-PATIENCE = 0.02
-"""Default of the seconds of real time without a request after which time runs."""
 MOST_REQUESTS = 20
 """Requests at one simulated time while a call waits; then time runs for `STEP`, so that loops
 which ask until something has happened go on."""
@@ -30,7 +28,7 @@ SLICE = 0.005
 class Lockstep:
     """Alternates between answering requests and advancing time."""
 
-    def __init__(self, simulation: Simulation, patience: float = PATIENCE) -> None:
+    def __init__(self, simulation: Simulation, patience: float) -> None:
         """Start with time that stands; `patience` is in seconds, of real time."""
         self.is_running = False
         """Whether time runs, and requests have to wait."""

@@ -13,7 +13,7 @@ import msgpack
 
 from drone_rl.flight.airsim import methods
 from drone_rl.flight.airsim.calls import Calls, remark
-from drone_rl.flight.airsim.lockstep import PATIENCE, SLICE, Lockstep
+from drone_rl.flight.airsim.lockstep import SLICE, Lockstep
 from drone_rl.flight.airsim.methods import UnknownMethodError
 from drone_rl.flight.airsim.simulation import Simulation, Wait
 from drone_rl.utils.errors import InputError
@@ -22,7 +22,7 @@ from drone_rl.utils.schema import shown
 _log = logging.getLogger(__name__)
 
 REQUEST, RESPONSE, NOTIFICATION = 0, 1, 2
-MAX_MESSAGE = 2**22
+MAX_REQUEST = 2**22
 """Bytes of a request: no method needs more."""
 TURN = 0.005
 """Seconds of work for one client before others have their turn."""
@@ -95,7 +95,7 @@ class Connection(asyncio.Protocol):
             self._unpacker.feed(data)
             self._backlog.extend(self._unpacker)
         except msgpack.BufferFull:
-            self._break(f"a request has more than {MAX_MESSAGE} bytes")
+            self._break(f"a request has more than {MAX_REQUEST} bytes")
             return
         except Exception as error:
             self._break(f"its bytes are no msgpack ({type(error).__name__})")
@@ -227,7 +227,7 @@ def _unpacker() -> Any:
         unicode_errors="replace",
         strict_map_key=False,
         use_list=True,
-        max_buffer_size=MAX_MESSAGE,
+        max_buffer_size=MAX_REQUEST,
         max_array_len=_MAX_ITEMS,
         max_map_len=_MAX_ITEMS,
         max_ext_len=0,
@@ -246,7 +246,7 @@ def _packed(message: list[Any]) -> bytes:
 class AirsimServer:
     """Serves one simulation, and advances its time."""
 
-    def __init__(self, simulation: Simulation, patience: float = PATIENCE) -> None:
+    def __init__(self, simulation: Simulation, patience: float) -> None:
         """Create a server that does not listen yet; for `patience` see `lockstep`."""
         self.simulation = simulation
         self._lockstep = Lockstep(simulation, patience)
@@ -314,18 +314,3 @@ class AirsimServer:
             self._server.close()
         for client in [*self.clients]:
             client.close()
-
-
-async def run(
-    simulation: Simulation, host: str, port: int, ready: Callable[[str], Any], patience: float
-) -> None:
-    """Serve a simulation until cancelled; `ready` is called with the address once it listens.
-
-    Raises:
-        InputError: See `AirsimServer.start`.
-    """
-    server = AirsimServer(simulation, patience)
-    await server.start(host, port)
-    address, number = server.address
-    ready(f"{address}:{number}")
-    await server.serve()

@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
+from drone_rl.config.commands import ServeSettings
 from drone_rl.flight.airsim.cameras import make_cameras
 from drone_rl.flight.airsim.messages import (
     Pose,
@@ -34,9 +35,6 @@ from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.sim.coordinates import Attitude
 from drone_rl.utils.errors import InputError, did_you_mean
 
-CLOCKS = ("wall", "lockstep")
-DATE = "2024-01-01T00:00:00"
-"""Default of the time, UTC, at which lockstep starts."""
 _MOST_VEHICLES = 100
 
 
@@ -60,31 +58,22 @@ class Simulation:
     def __init__(
         self,
         settings: AirsimSettings,
-        scene: str = "cubes",
-        *,
-        clock: str = "wall",
-        date: str = DATE,
-        seed: int = 0,
-        raw_channels: int = 3,
-        renderer: str | None = None,
+        chosen: ServeSettings,
         recordings: Path | None = None,
     ) -> None:
         """Create the scene and the vehicles of the settings.
 
         Args:
             settings: Content of settings.json.
-            scene: See `scenes.make_task`.
-            clock: "wall" or "lockstep".
-            date: Time at which lockstep starts, as ISO 8601, UTC unless it says otherwise; an
-                `InputError` if it is none, or before 1970.
-            seed: Of placements, gusts and sensor noise.
-            raw_channels: Channels of raw images of clients from version 1.2 on: 3 or 4.
-            renderer: Name of a renderer; by default the one that fits the scene.
+            chosen: Scene, clock, date, seed, channels and renderer.
             recordings: Folder for recordings; None refuses to record.
+
+        Raises:
+            InputError: There is no such scene or date, or the date is before 1970.
         """
-        self.settings, self.clock, self.seed = settings, clock, seed
-        self.raw_channels = raw_channels
-        self.stage = Stage(scene, seed, renderer=renderer)
+        self.settings, self.clock, self.seed = settings, chosen.clock, chosen.seed
+        self.raw_channels = chosen.raw_channels
+        self.stage = Stage(chosen.scene, chosen.seed, renderer=chosen.renderer)
         if settings.segmentation == "None":
             self.stage.clear_ids()
         x, y, z = settings.wind
@@ -94,7 +83,7 @@ class Simulation:
         posing = settings.sim_mode == POSING
         self._origin = self.stage.start_height if posing else self._dynamics.radius
         """Height at which vehicles start, and z is 0 for clients, metres."""
-        self._start = time.time_ns() if clock == "wall" else read_date(date)
+        self._start = time.time_ns() if self.clock == "wall" else read_date(chosen.date)
         self._ticks = 0
         """Physics ticks that have passed."""
         self.vehicles: dict[str, Vehicle] = {}

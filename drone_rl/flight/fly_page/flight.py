@@ -14,7 +14,7 @@ from PIL import Image
 from torch import Tensor
 
 from drone_rl.config.commands import CAMERAS, FLY_MODES, FlySettings
-from drone_rl.flight.fly_page.pilots import CONTROLS, Controls, Sticks, VelocityPilot, make_pilot
+from drone_rl.flight.fly_page.pilots import CONTROLS, Axes, Controls, VelocityPilot, make_pilot
 from drone_rl.flight.fly_page.recorder import Recorder
 from drone_rl.flight.fly_page.saliency import LiveSaliency
 from drone_rl.flight.fly_page.world import Seen, World
@@ -104,7 +104,7 @@ class Flight:
     def _hold(self, controls: Sequence[str]) -> None:
         self.controls.hold(controls)
 
-    def _sticks(self, values: Sticks) -> None:
+    def _sticks(self, values: Axes) -> None:
         self.controls.set_sticks(values)
 
     def _take_off(self) -> None:

@@ -16,9 +16,9 @@ from drone_rl.sim.dynamics import FlightState, Obstacles, Quadrotor
 
 CONTROLS = tuple(KEYS)
 """Names of controls that can be held: those of `Pilot.press`."""
-Sticks = tuple[float, float, float, float]
+Axes = tuple[float, float, float, float]
 """Forward, left, up and turn left, each from -1 to 1."""
-CENTERED: Sticks = (0.0, 0.0, 0.0, 0.0)
+CENTERED: Axes = (0.0, 0.0, 0.0, 0.0)
 _MOST_PRESSES = 8
 """Presses that wait for the next step."""
 _DELAY = 0.3
@@ -58,7 +58,7 @@ class Controls:
         self._keys = tuple(dict.fromkeys(keys))
         self._update()
 
-    def set_sticks(self, sticks: Sticks) -> None:
+    def set_sticks(self, sticks: Axes) -> None:
         """Take the sticks' deflections; large ones count as held controls, too."""
         self.sticks = sticks
         self._update()
@@ -91,7 +91,7 @@ class Controls:
         return [name for name, since in self._since.items() if since >= _DELAY]
 
     @property
-    def axes(self) -> Sticks:
+    def axes(self) -> Axes:
         """Deflections by sticks and held keys together."""
         keys = self._keys
         forward, left, up, turn = (

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from drone_rl.config.commands import CAMERAS
 from drone_rl.flight.airsim.messages import to_world
+from drone_rl.flight.airsim.serving import RunningServer
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.fly_page.flight import JPEG_QUALITY, packed, pose_of
 from drone_rl.flight.fly_page.server import FlyPage
@@ -104,17 +105,14 @@ class Watched:
         return render_chase(worlds, stage.appearance, HEIGHT, WIDTH)[0]
 
 
-def watch(simulation: Simulation, loop: asyncio.AbstractEventLoop, port: int = 0) -> FlyPage:
-    """Start a page that shows a simulation, in threads of this process.
-
-    Args:
-        simulation: The simulation of AirSim's server.
-        loop: The event loop that advances it.
-        port: Port at 127.0.0.1; 0 for a free one.
+def watch(server: RunningServer) -> FlyPage:
+    """Start a page that shows a server's simulation, in threads of this process.
 
     Raises:
-        InputError: The port is in use, or the extra `fly` is not installed.
+        InputError: The extra `fly` is not installed.
     """
     return FlyPage(
-        lambda: Watched(simulation, loop), port=port, frames_per_second=_FRAMES_PER_SECOND
+        lambda: Watched(server.simulation, server.loop),
+        port=0,
+        frames_per_second=_FRAMES_PER_SECOND,
     )

@@ -89,9 +89,10 @@ class DroneInTheLoop:
         goals = rotor_goals(torch.from_numpy(self.rotors)[None])
         self.body = self.physics.fly(before, goals, 1, self.obstacles)
         self._ticks += 1
-        self.readings = measure(before, self.body, self.settings.tick, self.time)
-        if bool(self.body.is_lost[0]) or not np.isfinite(self.readings.position).all():
+        pose = torch.cat([self.body.position[0], self.body.attitude[0]])
+        if bool(self.body.is_lost[0]) or not bool(pose.isfinite().all()):
             raise FlightControllerError(f"the drone's motion diverged after {self.time:.3g} s")
+        self.readings = measure(before, self.body, self.settings.tick, self.time)
 
     def hold(self, sticks: RcSticks, seconds: float) -> None:
         """Advance with constant sticks."""

@@ -1,19 +1,20 @@
 """Ideal instruments: what a flight controller measures of one drone."""
 
 import dataclasses
-import math
+from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from drone_rl.config.dynamics import GRAVITY
 from drone_rl.sim.coordinates import HOME, GeoPoint, geo_from_world
 from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.dynamics.state import heading_of
+from drone_rl.sim.sensors.instruments import standard_pressure
 
 Vector = NDArray[np.float64]
-SEA_LEVEL_PRESSURE = 101_325.0
-"""Pressure of the standard atmosphere at sea level, pascals."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,13 +53,12 @@ class Readings:
     @property
     def pressure(self) -> float:
         """Air pressure, pascals."""
-        return pressure_at(self.altitude)
+        return standard_pressure(self.altitude)
 
     @property
     def heading(self) -> float:
         """Yaw: radians to the left of north, -pi to pi."""
-        w, x, y, z = self.attitude
-        return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        return float(heading_of(torch.from_numpy(self.attitude)))
 
 
 def measure(before: BodyState, after: BodyState, seconds: float, time: float) -> Readings:
@@ -69,40 +69,21 @@ def measure(before: BodyState, after: BodyState, seconds: float, time: float) ->
     """
     position, velocity, attitude = map(first_row, (after.position, after.velocity, after.attitude))
     acceleration = (velocity - first_row(before.velocity)) / seconds
+    turned = rotation(attitude)
+    turn = rotation(first_row(before.attitude)).inv() * turned
     return Readings(
         time=time,
         position=position,
         velocity=velocity,
         attitude=attitude,
-        rates=rotation_between(first_row(before.attitude), attitude) / seconds,
-        force=into_body(attitude, acceleration + np.array([0.0, 0.0, GRAVITY])),
+        rates=turn.as_rotvec() / seconds,
+        force=turned.apply(acceleration + np.array([0.0, 0.0, GRAVITY]), inverse=True),
     )
 
 
-def pressure_at(altitude: float) -> float:
-    """Return the pressure of the standard atmosphere (below 11 km), pascals."""
-    return SEA_LEVEL_PRESSURE * (1.0 - 2.25577e-5 * altitude) ** 5.25588
-
-
-def rotation_between(before: Vector, after: Vector) -> Vector:
-    """Return the rotation vector between two attitudes, radians about the body axes.
-
-    The attitudes are quaternions (w, x, y, z), less than half a turn apart.
-    """
-    w, axis = before[0] * after[0] + before[1:] @ after[1:], before[0] * after[1:]
-    axis = axis - after[0] * before[1:] - np.cross(before[1:], after[1:])
-    sine = float(np.linalg.norm(axis))
-    if sine < 1e-12:
-        return 2.0 * axis
-    angle = 2.0 * math.atan2(sine, abs(float(w)))
-    return axis * math.copysign(angle / sine, float(w))
-
-
-def into_body(attitude: Vector, vector: Vector) -> Vector:
-    """Rotate a world vector into the frame of a body. Shapes: (4,), (3,)."""
-    axis = -attitude[1:]
-    twice = 2.0 * np.cross(axis, vector)
-    return vector + attitude[0] * twice + np.cross(axis, twice)
+def rotation(attitude: Vector) -> Any:
+    """Return a quaternion (w, x, y, z) as scipy's rotation, from the body frame to the world's."""
+    return Rotation.from_quat(attitude[[1, 2, 3, 0]])
 
 
 def first_row(values: torch.Tensor) -> Vector:

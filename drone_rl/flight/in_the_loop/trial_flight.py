@@ -21,7 +21,7 @@ from drone_rl.flight.in_the_loop.instruments import Readings, Vector
 from drone_rl.sim.dynamics import FlightState
 from drone_rl.utils.schema import Real
 
-LANDING_SPEED = 0.5
+DESCENT_SPEED = 0.5
 """Sink rate, metres per second."""
 _NEAR_GROUND = 0.1
 """Height above the ground at which the rotors are stopped, metres."""
@@ -146,7 +146,7 @@ def land(drone: DroneInTheLoop, ground: Vector, within: float = 20.0) -> None:
 
     def descend(body: FlightState, readings: Readings) -> Setpoint:
         forward, left, _ = hold(body, readings).velocity
-        return Setpoint((forward, left, -LANDING_SPEED))
+        return Setpoint((forward, left, -DESCENT_SPEED))
 
     low = ground[2] + _NEAR_GROUND
     if not drone.fly(descend, within, until=lambda s: bool(s.position[2] < low)):

@@ -40,6 +40,8 @@ POLE = (80.31, -72.62)
 """Latitude and longitude of the dipole's northern pole, degrees."""
 SEA_LEVEL_TEMPERATURE, _LAPSE, _TOP = 288.15, 0.0065, 11_000.0
 """Of the standard atmosphere: kelvin, kelvin per metre, and the metres up to which this holds."""
+SEA_LEVEL_PRESSURE = 101_325.0
+"""Of the standard atmosphere, pascals."""
 _EXPONENT, _ATMOSPHERE_RADIUS = 5.255877, 6356766.0
 """Of pressure as a power of temperature; Earth's radius for heights under constant gravity."""
 
@@ -322,6 +324,11 @@ def pressure_ratio(altitude: Tensor) -> Tensor:
     """
     height = (_ATMOSPHERE_RADIUS * altitude / (_ATMOSPHERE_RADIUS + altitude)).clamp(max=_TOP)
     return (1 - _LAPSE * height / SEA_LEVEL_TEMPERATURE) ** _EXPONENT
+
+
+def standard_pressure(altitude: float) -> float:
+    """Return the pressure of the standard atmosphere at an altitude in metres, pascals."""
+    return SEA_LEVEL_PRESSURE * float(pressure_ratio(torch.tensor(altitude, dtype=torch.float64)))
 
 
 def altitude_from_pressure_ratio(ratio: Tensor) -> Tensor:

@@ -61,11 +61,11 @@ class PropTask(Task[S]):
         return dataclasses.replace(state, **{self.props: moved})
 
 
-def first_contact(reach: float, before: Tensor, now: Tensor, places: Tensor) -> Tensor:
+def first_contact(reach: float | Tensor, before: Tensor, now: Tensor, places: Tensor) -> Tensor:
     """Return where drones that fly straight from `before` to `now`, (N, D), touch `places`.
 
-    A drone touches a place, (N, P, D), if it is at most `reach` metres away along every axis. Its
-    path enters all slabs of that box before it leaves any.
+    A drone touches a place, (N, P, D), if it is at most `reach` metres away along every axis, the
+    same for all axes or one for each. Its path enters all slabs of that box before it leaves any.
 
     Returns:
         Fraction of the path before the first contact; inf without contact. Shape: (N, P).

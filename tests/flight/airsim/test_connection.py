@@ -8,7 +8,7 @@ from unittest.mock import MagicMock
 import msgpack
 import pytest
 
-from drone_rl.flight.airsim.server import MAX_MESSAGE, Connection
+from drone_rl.flight.airsim.server import MAX_REQUEST, Connection
 from tests.flight.airsim.conftest import CV, YAW, Client
 
 PING = bytes([0x94, 0x00, 0x00, 0xA4, *b"ping", 0x90])
@@ -84,7 +84,7 @@ def test_too_much_for_one_message_ends_the_connection(start):
 def _flood(raw):
     raw.sendall(b"\xc6" + (2**31 - 1).to_bytes(4, "big"))
     for _ in range(100):
-        raw.sendall(bytes(MAX_MESSAGE // 10))
+        raw.sendall(bytes(MAX_REQUEST // 10))
         time.sleep(0.01)
 
 

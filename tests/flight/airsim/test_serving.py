@@ -33,7 +33,7 @@ def test_a_server_whose_thread_has_ended_closes_its_simulation(monkeypatch):
     closed = []
     monkeypatch.setattr(Simulation, "close", lambda self: closed.append(self))
     server = serve(scene="empty", port=0)
-    server._loop.call_soon_threadsafe(server._task.cancel)
+    server.loop.call_soon_threadsafe(server._task.cancel)
     server._thread.join(20)
     server.close()
     assert closed == [server.simulation]

@@ -5,6 +5,7 @@ import time
 
 import pytest
 
+from drone_rl.config.commands import ServeSettings
 from drone_rl.flight.airsim.messages import Pose, nanoseconds
 from drone_rl.flight.airsim.settings_file import parse_settings
 from drone_rl.flight.airsim.simulation import Simulation, Wait
@@ -17,7 +18,8 @@ def make():
     open_ones = []
 
     def build(text="{}", **settings):
-        open_ones.append(Simulation(parse_settings(text), "empty", **settings))
+        chosen = ServeSettings(scene="empty", **settings)
+        open_ones.append(Simulation(parse_settings(text), chosen))
         return open_ones[-1]
 
     yield build

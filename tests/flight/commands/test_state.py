@@ -9,6 +9,7 @@ from drone_rl.flight.commands.state import Collision, LandedState, PilotState, S
 from drone_rl.sim.coordinates import HOME, Attitude, attitude_of
 from drone_rl.sim.dynamics import FlightState
 from drone_rl.sim.dynamics.state import DEPTH, GROUND, NORMAL, THING
+from tests.perfect_sensors import without_noise
 
 HALF = math.sqrt(0.5)
 
@@ -59,7 +60,7 @@ def test_speed():
     assert state.speed == 7.0
 
 
-PERFECT = SensorSettings(gps=GpsSettings(latency=0.0)).perfect
+PERFECT = without_noise(SensorSettings(gps=GpsSettings(latency=0.0)))
 
 
 def test_a_drone_that_lies_still_feels_gravity_alone():

@@ -9,7 +9,7 @@ import threading
 import pytest
 from PIL import Image
 
-from drone_rl.config.commands import CAMERAS
+from drone_rl.config.commands import CAMERAS, ServeSettings
 from drone_rl.flight.airsim.settings_file import parse_settings
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.fly_page.watch import Watched
@@ -18,7 +18,7 @@ from drone_rl.utils.errors import InputError
 
 @pytest.fixture(scope="module")
 def simulation():
-    made = Simulation(parse_settings("{}"), "blocks", clock="lockstep")
+    made = Simulation(parse_settings("{}"), ServeSettings(scene="blocks", clock="lockstep"))
     yield made
     made.close()
 

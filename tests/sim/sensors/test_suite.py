@@ -11,6 +11,7 @@ from drone_rl.sim.dynamics.state import (
 )
 from drone_rl.sim.sensors import SensorSuite
 from drone_rl.utils.errors import InputError
+from tests.perfect_sensors import without_noise
 
 
 def resting(count, z=3.0):
@@ -36,7 +37,7 @@ def reading(suite, name, state):
 
 
 def test_ideal_sensors_of_a_hovering_drone():
-    suite = SensorSuite(SensorSettings(gps=GpsSettings(startup=0.0, latency=0.0)).perfect)
+    suite = SensorSuite(without_noise(SensorSettings(gps=GpsSettings(startup=0.0, latency=0.0))))
     state = suite.start(resting(2))
     for _ in range(10):
         state = suite.update(state, resting(2), 0.003)

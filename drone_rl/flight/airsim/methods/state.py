@@ -16,6 +16,7 @@ from drone_rl.flight.airsim.sensors import SENSORS
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.sim.coordinates import GeoPoint
+from drone_rl.sim.sensors.instruments import standard_pressure
 
 vehicle_method("getMultirotorState")(Vehicle.multirotor_state)
 vehicle_method("getRotorStates")(Vehicle.rotor_states)
@@ -72,14 +73,14 @@ def _set_kinematics(
 
 
 _STRATOSPHERE = 11_000.0
-"""Altitude in metres from which temperature and pressure count as constant."""
+"""Altitude in metres from which the temperature counts as constant."""
 
 
 @sim_vehicle_method("simGetGroundTruthEnvironment")
 def _environment(vehicle: Vehicle) -> Map:
-    altitude = min(vehicle.geo_point()["altitude"], _STRATOSPHERE)
-    kelvin = 288.15 - 0.0065 * altitude
-    pressure = 101325.0 * (kelvin / 288.15) ** 5.25588
+    altitude = vehicle.geo_point()["altitude"]
+    kelvin = 288.15 - 0.0065 * min(altitude, _STRATOSPHERE)
+    pressure = standard_pressure(altitude)
     return {
         "position": messages.vector(vehicle.pose.position),
         "geo_point": vehicle.geo_point(),

@@ -2,6 +2,7 @@
 
 import pytest
 
+from drone_rl.config.commands import ServeSettings
 from drone_rl.flight.airsim.methods import METHODS, UnknownMethodError, call, suggestion
 from drone_rl.flight.airsim.settings_file import parse_settings
 from drone_rl.flight.airsim.simulation import Simulation
@@ -64,7 +65,9 @@ def test_gains_change_no_flight_and_are_logged(start, caplog):
 
 @pytest.fixture(scope="module")
 def simulation():
-    found = Simulation(parse_settings('{"Vehicles": {"A": {}, "B": {}}}'), "empty")
+    found = Simulation(
+        parse_settings('{"Vehicles": {"A": {}, "B": {}}}'), ServeSettings(scene="empty")
+    )
     yield found
     found.close()
 
