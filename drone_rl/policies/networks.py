@@ -5,7 +5,6 @@ Layers are named, and explanations address them by name. The registered networks
 `generator`, the source of their initial weights; they raise `InputError` if the frame is too small.
 """
 
-import copy
 import itertools
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
@@ -242,8 +241,8 @@ def _with_head(
 ) -> "OrderedDict[str, nn.Module]":
     """Add linear layers to convolutions."""
     layers = OrderedDict(convolutions)
+    width = _flat_size(convolutions, in_shape)
     layers["flatten"] = nn.Flatten()
-    width = _flat_size(nn.Sequential(layers), in_shape)
     for i, size in enumerate(hidden, start=1):
         layers[f"fc{i}"] = nn.Linear(width, size)
         layers[f"fc_relu{i}"] = nn.ReLU()
@@ -252,24 +251,30 @@ def _with_head(
     return layers
 
 
-def _flat_size(layers: nn.Module, in_shape: Sequence[int]) -> int:
-    """Return how many numbers layers give for a frame; only shapes are computed."""
+def _flat_size(convolutions: "OrderedDict[str, nn.Module]", in_shape: Sequence[int]) -> int:
     channels, height, width = in_shape
-    shapes = copy.deepcopy(layers).to("meta")
+    stack = [m for m in convolutions.values() if isinstance(m, nn.Conv2d | nn.MaxPool2d)]
+    high, wide = _left(stack, height), _left(stack, width)
+    if high < 1 or wide < 1:
+        smallest = next(s for s in range(1, 10_000) if _left(stack, s) >= 1)
+        raise InputError(
+            f"an image of {height}x{width} pixels is too small for the network; give at least "
+            f"{smallest}x{smallest} (camera.height, camera.width)"
+        )
+    filters = [m.out_channels for m in stack if isinstance(m, nn.Conv2d)]
+    return (filters[-1] if filters else channels) * high * wide
 
-    def size(height: int, width: int) -> int:
-        try:
-            return shapes(torch.empty(1, channels, height, width, device="meta")).shape[1]
-        except RuntimeError:  # a kernel is larger than its input
-            return 0
 
-    if found := size(height, width):
-        return found
-    smallest = next(s for s in range(1, 10_000) if size(s, s))
-    raise InputError(
-        f"an image of {height}x{width} pixels is too small for the network; give at least "
-        f"{smallest}x{smallest} (camera.height, camera.width)"
-    )
+def _left(stack: Sequence[nn.Conv2d | nn.MaxPool2d], size: int) -> int:
+    """Return the output size of square layers without padding; 0 if the input is too small."""
+    for layer in stack:
+        kernel, stride = _side(layer.kernel_size), _side(layer.stride)
+        size = (size - kernel) // stride + 1 if size >= kernel else 0
+    return size
+
+
+def _side(size: int | tuple[int, ...]) -> int:
+    return size if isinstance(size, int) else size[0]
 
 
 @implements(Mlp)
