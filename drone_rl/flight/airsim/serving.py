@@ -31,7 +31,8 @@ class RunningServer:
         """The event loop of its thread."""
         self._task: asyncio.Task[None] | None = None
         self._error: Exception | None = None
-        self._ready = threading.Event()
+        self._ready, self._ended = threading.Event(), threading.Event()
+        # Ctrl-C during `Thread.join` would mark the thread as ended, hence the events
         self._thread = threading.Thread(
             target=self._main, args=(address, port, patience_s), daemon=True
         )
@@ -50,16 +51,15 @@ class RunningServer:
 
     def wait(self) -> None:
         """Wait until the server ends; raise the error that ended it, if one did."""
-        while self._thread.is_alive():
-            self._thread.join(0.5)  # so that Ctrl-C is noticed
+        self._ended.wait()
         if self._error is not None:
             raise self._error
 
     def close(self) -> None:
         """Stop it; calls that wait are answered with an error."""
-        if self._task is not None and self._thread.is_alive():
+        if self._task is not None and not self._ended.is_set():
             self.loop.call_soon_threadsafe(self._task.cancel)
-            self._thread.join()
+            self._ended.wait()
         self.simulation.close()
 
     def _main(self, address: str, port: int, patience_s: float) -> None:
@@ -71,6 +71,7 @@ class RunningServer:
             if self._ready.is_set():
                 _log.error("the server failed: %s", error)
         finally:
+            self._ended.set()
             self._ready.set()
 
     async def _serve(self, address: str, port: int, patience_s: float) -> None:
