@@ -16,11 +16,12 @@ less than 3.%s, such as make PYTHON=python3.%s" % (version, low, high, low))
 
 .PHONY: demo notebook test check format bench readme keep stale docs mutants clean clean-outputs
 
+# --no-compile: modules are compiled when they are first imported, which most never are.
 $(STAMP): pyproject.toml
 	@$(PYTHON) -c '$(CHECK_PYTHON)'
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@echo "Installing into $(VENV) (a few minutes the first time) ..."
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(EXTRAS)]'
+	@$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check -e '.[$(EXTRAS)]'
 	@touch $@
 
 demo: $(STAMP)
@@ -28,7 +29,7 @@ demo: $(STAMP)
 
 # Open the notebook of the documentation in JupyterLab.
 notebook: $(STAMP)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(EXTRAS),notebook]'
+	@$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check -e '.[$(EXTRAS),notebook]'
 	@$(BIN)/jupyter lab docs/tutorials/notebook.ipynb
 
 test: $(STAMP)
@@ -72,7 +73,7 @@ SAMPLE := import sqlite3; db = sqlite3.connect("outputs/mutants.sqlite"); \
   db.execute("delete from mutation_specs where job_id not in (select job_id from work_items)"); \
   db.commit()
 mutants: $(STAMP)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(EXTRAS),mutants]'
+	@$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check -e '.[$(EXTRAS),mutants]'
 	@printf '[cosmic-ray]\nmodule-path = "%s"\ntimeout = 120\ntest-command = "%s -m pytest -x -q %s"\n\n[cosmic-ray.distributor]\nname = "local"\n' \
 	  '$(MODULE)' '$(BIN)/python' '$(TESTS)' > outputs/mutants.toml
 	@$(BIN)/cosmic-ray init --force outputs/mutants.toml outputs/mutants.sqlite

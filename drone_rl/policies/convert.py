@@ -59,7 +59,10 @@ def convert_policy(path: Path, output: Path | None = None) -> Path:
         else:
             save_checkpoint(output, _converted_state(read_any_version(path)))
     except InputError as error:
-        raise InputError(f"policy {path} can't be converted: {error}") from None
+        raise InputError(
+            f"policy {path} can't be converted ({error}); files from before version 0.1 must be "
+            "trained again"
+        ) from None
     return output
 
 

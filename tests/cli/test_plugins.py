@@ -95,7 +95,7 @@ FILES = {
         (["plugins=[nowhere]"], "give a module in this folder or on PYTHONPATH"),
         (["plugins=[my_parts.py]"], "type the module's name, plugins=[my_parts]"),
         (["plugins=[./my_parts]"], "type the module's name, plugins=[my_parts]"),
-        (["plugins=my_parts"], "plugins=my_parts Invalid value assigned: str is not a List"),
+        (["plugins=nowhere"], "give a module in this folder or on PYTHONPATH"),
         (["plugins=[needs_more]"], "install not_installed"),
         (["plugins=[fails]"], "fails.py (ZeroDivisionError: division by zero); correct it"),
         (["plugins=[nameless]"], "nameless.py: give a name in brackets"),

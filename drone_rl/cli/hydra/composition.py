@@ -230,6 +230,7 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
     topics = [word for word in overrides if is_help and re.fullmatch(r"[A-Za-z_][\w.]*", word)]
     words = [word for word in overrides if word not in topics]
     words = spare_run(command.prepare([*map(whole_numbers, words)]))
+    words = [re.sub(r"^(\+{0,2}plugins)=([\w.]+)$", r"\1=[\2]", word) for word in words]
     words.sort(key=lambda word: word not in OPTIONS)  # Hydra needs options before settings
     import_plugins(words)
     register_schemas({name: command})

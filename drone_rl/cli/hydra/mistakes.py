@@ -73,8 +73,9 @@ def check_words(name: str, conf: Path, words: Sequence[str]) -> None:
 def _problem(word: str, name: str, conf: Path, words: Sequence[str]) -> str | None:
     key, _, value = word.partition("=")
     if not _OVERRIDE.fullmatch(word):
-        hint = _meant(key.lstrip("-"), conf, _names(name, conf, words))
-        return f"settings are typed name=value, without dashes{hint}"
+        keys, has_dashes = _names(name, conf, words), word.startswith("-")
+        hint = "" if key in keys else _meant(key.lstrip("-"), conf, keys)
+        return f"settings are typed name=value{', without dashes' if has_dashes else ''}{hint}"
     if _EMPTY_FOLDER.fullmatch(word):
         return "it has no value; give a folder"
     if key in _FOR_SWEEPS and not is_sweep(words):
@@ -92,14 +93,19 @@ def _problem(word: str, name: str, conf: Path, words: Sequence[str]) -> str | No
 def explain(error: Exception, name: str, conf: Path, words: Sequence[str]) -> InputError:
     """Return the error for a user whose settings Hydra or OmegaConf rejected."""
     keys = [] if _has_own_folders(words) else _names(name, conf, words)
+    command = f"drone-rl {name.replace('_', '-')}"
     for word in words:
         key = word.lstrip("~").partition("=")[0]
         if keys and key not in keys and not word.startswith(("-", "+")):
-            command = f"drone-rl {name.replace('_', '-')}"
             remedy = _meant(key, conf, keys) or f"; {command} --help all lists the settings"
             return InputError(f"{word}: {command} has no setting {key}{remedy}")
     cause = str(error.__cause__ or "").split("\n")[:1]  # further lines repeat the name
-    return InputError(" ".join(" ".join([str(error), *cause]).split()))
+    reason = " ".join(" ".join([str(error), *cause]).split())
+    word, _, fault = reason.removeprefix("Error merging override ").partition(" ")
+    if word not in words:
+        return InputError(reason)
+    key = word.lstrip("+~").partition("=")[0]
+    return InputError(f"{word}: {fault.rstrip('.')}; {command} --help {key} shows what it takes")
 
 
 def _has_own_folders(words: Sequence[str]) -> bool:

@@ -55,7 +55,7 @@ def say_places(evidence: Evidence) -> Claims:
             f"It does not react to {listed(blind)}: a turn is needed, and it goes "
             f"{names[places['alone']]}, as without a cube. It may react when the cube is nearer."
         )
-    if places["blind"] == 0:
+    if places["blind"] == 0 and {"left", "right"} & places["sides"].keys():
         claims["places.sees"] = (
             "Wherever a turn is needed, the cube changes its action, or its action without a cube "
             "is that turn."

@@ -7,6 +7,7 @@ from drone_rl.cli.hydra.mistakes import check_words, explain, no_command
 from drone_rl.cli.main import COMMANDS
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import conf_dir
+from tests.cli.running import error_line
 
 pytestmark = pytest.mark.usefixtures("registered")
 
@@ -26,7 +27,8 @@ def message(line):
     [
         ("train --seed 1", "without dashes; did you mean seed?"),
         ("train --cuda", "did you mean device=cuda?"),
-        ("train nothing", "settings are typed name=value, without dashes"),
+        ("train nothing", "nothing: settings are typed name=value"),
+        ("train seed", "seed: settings are typed name=value"),
         ("train sed=1", "has no setting sed; did you mean seed?"),
         ("train task.max_steps=9", "did you mean task.step_limit?"),
         ("train hydra.run.dri=x", "did you mean hydra.run.dir?"),
@@ -44,6 +46,12 @@ def message(line):
 )
 def test_a_mistake_has_a_remedy(line, remedy):
     assert remedy in message(line)
+
+
+def test_a_value_of_a_wrong_type_is_named_with_the_help_of_its_setting(in_process):
+    line = error_line(in_process("train", "optimizer.lr=abc"))
+    assert line.startswith("error: optimizer.lr=abc: Value 'abc'")
+    assert line.endswith("; drone-rl train --help optimizer.lr shows what it takes")
 
 
 def test_correct_words_pass_the_check():

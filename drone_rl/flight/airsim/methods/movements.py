@@ -21,7 +21,7 @@ from drone_rl.flight.commands.path_following import AUTOMATIC
 from drone_rl.flight.commands.pilot import Sticks
 from drone_rl.sim.coordinates import GeoPoint
 
-_FASTEST, _SLOWEST = 100.0, 0.001
+_FASTEST = 100.0
 """Metres per second."""
 _QUARTER, _TURN = math.pi / 2, math.radians(MOST_TURN)
 
@@ -32,7 +32,6 @@ def _limits(names: str, low: float, high: float) -> dict[str, tuple[float, float
 
 _LIMITS = {
     **_limits("vx vy vz", -_FASTEST, _FASTEST),
-    **_limits("velocity vx_max vy_max", _SLOWEST, _FASTEST),
     **_limits("x y z z_min altitude", -FARTHEST, FARTHEST),
     **_limits("roll pitch", -_QUARTER, _QUARTER),
     **_limits("roll_rate pitch_rate yaw_rate", -_TURN, _TURN),
@@ -41,10 +40,21 @@ _LIMITS = {
     "longitude": (-360.0, 360.0),
 }
 """Lowest and highest values of arguments, by name: metres, seconds, radians."""
+_SPEEDS = ("velocity", "vx_max", "vy_max")
+
+
+def _speed(value: Any, name: str) -> float:
+    """Return a speed, limited; raise an `InputError` if it is not above 0: none ever arrives."""
+    if (speed := number(value, name, -_FASTEST, _FASTEST)) <= 0:
+        raise InputError(f"{name}={speed:g} is invalid; give a speed above 0 (m/s)")
+    return speed
 
 
 def _numbers(names: str) -> list[Argument]:
-    return [given(number, name, *_LIMITS.get(name, ())) for name in names.split()]
+    return [
+        given(_speed, name) if name in _SPEEDS else given(number, name, *_LIMITS.get(name, ()))
+        for name in names.split()
+    ]
 
 
 def _timeout(default: float = 1e6) -> Argument:

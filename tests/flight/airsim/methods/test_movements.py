@@ -81,7 +81,7 @@ def test_wrong_arguments_are_one_error(start, method, args, message):
     [
         ("moveByVelocity", (500.0, 0.0, 0.0, 0.1), "vx is limited to 100"),
         ("moveByManual", (1e6, 1e6, -2.0, 0.1, 0, YAW), "vx_max is limited to 100"),
-        ("moveToPosition", (50.0, 0.0, -2.0, -1.0, 0.1), "velocity is limited to 0.001"),
+        ("moveToPosition", (50.0, 0.0, -2.0, 1e3, 0.1), "velocity is limited to 100"),
         ("moveByRollPitchYawZ", (9.0, 0.0, 100.0, -2.0, 0.1), "roll is limited to 1.5708"),
         ("moveByMotorPWMs", (0.6, 0.6, 0.6, 1.6, 0.1), "rear_right is limited to 1"),
         ("moveByAngleRatesThrottle", (99.0, 0.0, 0.0, 0.6, 0.1), "roll_rate is limited to 62.8319"),
@@ -95,6 +95,14 @@ def test_values_beyond_limits_are_limited_with_one_log_line(start, caplog, metho
     for _ in range(3):
         assert client.call(method, *args) is (method != "moveToPosition")
     assert caplog.text.count(limited) == 1
+
+
+@pytest.mark.parametrize("speed", [0.0, -3.0])
+def test_a_movement_that_never_arrives_is_refused(start, speed):
+    _, client = start()
+    client.call("enableApiControl", True)
+    with pytest.raises(Exception, match="velocity=.* is invalid; give a speed above 0"):
+        client.call("moveToPosition", 1.0, 0.0, -3.0, speed, 3e38)
 
 
 def test_waiting_for_the_last_task_of_the_1_2_client(start):
