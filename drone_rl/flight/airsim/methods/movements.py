@@ -20,6 +20,7 @@ from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.flight.commands.path_following import AUTOMATIC
 from drone_rl.flight.commands.pilot import Sticks
 from drone_rl.sim.coordinates import GeoPoint
+from drone_rl.utils.errors import InputError
 
 _FASTEST = 100.0
 """Metres per second."""

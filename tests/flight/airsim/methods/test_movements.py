@@ -101,7 +101,7 @@ def test_values_beyond_limits_are_limited_with_one_log_line(start, caplog, metho
 def test_a_movement_that_never_arrives_is_refused(start, speed):
     _, client = start()
     client.call("enableApiControl", True)
-    with pytest.raises(Exception, match="velocity=.* is invalid; give a speed above 0"):
+    with pytest.raises(Exception, match=r"velocity=.* is invalid; give a speed above 0"):
         client.call("moveToPosition", 1.0, 0.0, -3.0, speed, 3e38)
 
 
