@@ -16,14 +16,17 @@ from typing import Any
 import hydra
 from hydra.core.config_store import ConfigStore
 from hydra.core.hydra_config import HydraConfig
+from hydra.core.utils import run_job
 from hydra.errors import HydraException
+from hydra.experimental.callback import Callback
+from hydra.types import HydraContext, RunMode
 from omegaconf import MISSING, DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
 from drone_rl.cli.hydra.help import next_steps, show_help
 from drone_rl.cli.hydra.messages import input_error, is_output_closed, one_line
-from drone_rl.cli.hydra.mistakes import OPTIONS, check_words, explain
+from drone_rl.cli.hydra.mistakes import OPTIONS, check_words, composed, explain
 from drone_rl.cli.hydra.resuming import spare_run
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.config import (
@@ -41,6 +44,7 @@ from drone_rl.config.learning import Collector, Objective, Optimizer, Returns, S
 from drone_rl.config.networks import Network
 from drone_rl.config.training import CloningSettings, Logger, TrainerSettings
 from drone_rl.config.transforms import Transform
+from drone_rl.sweeps.manifest import is_sweep
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import OUTPUT_CLOSED, USER_ERROR
 from drone_rl.utils.plugins import IMPORTED, failure, line_of
@@ -245,10 +249,26 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
     sys.argv = [f"drone-rl {name.replace('_', '-')}", *words]
     try:
         with _explained(name, words):
-            hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name=name)(job)()
+            if is_sweep(words) or not _run_once(name, job, words):
+                hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name=name)(job)()
     finally:
         sys.argv = argv
     return max(statuses, default=0)
+
+
+def _run_once(name: str, job: Callable[[DictConfig], object], words: Sequence[str]) -> bool:
+    """Run a job as `hydra.main` does, which composes its settings twice.
+
+    Return False, without a run, if the user's own files contain callbacks or select a sweep.
+    """
+    config = composed(name, conf_dir(), words)
+    if config.hydra.callbacks or config.hydra.mode not in (None, RunMode.RUN):
+        return False
+    unused: Any = Callback()  # a base class without actions
+    context = HydraContext(config_loader=unused, callbacks=unused)
+    done = run_job(job, config, "hydra.run.dir", None, context)
+    _ = done.return_value  # raises the job's error
+    return True
 
 
 @contextlib.contextmanager
