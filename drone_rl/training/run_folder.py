@@ -162,7 +162,7 @@ class RunFolder:
     def prepare(
         self, settings: TrainSettings, state: Mapping[str, Any] | None
     ) -> list[Demonstration]:
-        """Delete half-written files; return the demonstrations that a new run clones, if any.
+        """Check the checkpoint's settings; return the demonstrations that a new run clones, if any.
 
         Raises:
             InputError: The checkpoint has other settings, a demonstration is unusable, or there are
