@@ -211,8 +211,7 @@ class FlyPage:
 
     def wait(self) -> None:
         """Wait until the server ends; raise the error that ended the simulation, if one did."""
-        while self._threads[0].is_alive():
-            self._threads[0].join(0.5)  # so that Ctrl-C is noticed
+        self._is_stopping.wait()  # Ctrl-C during `Thread.join` would mark the thread as ended
         if self._failure is not None:
             raise self._failure
 
@@ -234,8 +233,10 @@ class FlyPage:
     # The server's thread
 
     def _serve(self) -> None:
-        self._server.run(sockets=[self._socket])
-        self._is_stopping.set()
+        try:
+            self._server.run(sockets=[self._socket])
+        finally:
+            self._is_stopping.set()
 
     def _make_app(self) -> Any:
         applications = extra("starlette.applications", "fly", _ASKED_BY)
