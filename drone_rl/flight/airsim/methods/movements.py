@@ -2,6 +2,7 @@
 
 import functools
 import math
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from drone_rl.flight.airsim.messages import (
@@ -41,7 +42,6 @@ _LIMITS = {
     "longitude": (-360.0, 360.0),
 }
 """Lowest and highest values of arguments, by name: metres, seconds, radians."""
-_SPEEDS = ("velocity", "vx_max", "vy_max")
 
 
 def _speed(value: Any, name: str) -> float:
@@ -51,10 +51,15 @@ def _speed(value: Any, name: str) -> float:
     return speed
 
 
+_READERS: Mapping[str, Callable[..., float]] = dict.fromkeys(
+    ("velocity", "vx_max", "vy_max"), _speed
+)
+"""Readers of arguments, by name, where not every number is one."""
+
+
 def _numbers(names: str) -> list[Argument]:
     return [
-        given(_speed, name) if name in _SPEEDS else given(number, name, *_LIMITS.get(name, ()))
-        for name in names.split()
+        given(_READERS.get(name, number), name, *_LIMITS.get(name, ())) for name in names.split()
     ]
 
 
