@@ -14,6 +14,7 @@ from torch import Tensor
 from torchrl.envs.utils import ExplorationType
 
 from drone_rl.acceleration import rollout_kernel
+from drone_rl.acceleration.activations import ActivationRecorder
 from drone_rl.acceleration.direct_collector import DirectCollector
 from drone_rl.acceleration.packed_layers import PackedNetwork, unsupported
 from drone_rl.envs.direct_renderer import DirectRenderer, Entries, Reasons
@@ -28,6 +29,8 @@ _MAX_STEPS = 64
 """Steps of one launch of the kernel; most episodes end within them."""
 _MAX_PIXELS = 2**23
 """Maximum number of pixels of all frames of one launch."""
+_MAX_ACTIVATIONS = 2**24
+"""Maximum number of recorded activations: 64 MiB."""
 
 
 class FusedCollector:
@@ -77,6 +80,10 @@ class FusedCollector:
                 "end_reason": torch.empty(rows, dtype=torch.int32),
             }
         )
+        size = network.num_activations
+        launches = _MAX_ACTIVATIONS // (rows * size)
+        self.activations = ActivationRecorder(launches * rows, size)
+        """Of the last batch, for a `FusedNetwork` that learns from it."""
         self._logits = torch.empty(0, num_actions)
         self._owner = getattr(self._actor.network, "owner", "the policy")
         self._kernel = rollout_kernel.make_kernel(*rules.functions)
@@ -106,6 +113,7 @@ class FusedCollector:
         self._renderer.env.start()
         state: Any = self._renderer.worlds.state
         self._rules.begin(state)
+        self.activations.recording = None
         self._network.update()
         env_of_step, logged = self._run(num_envs)
         for name in ("action", "end_reason"):
@@ -144,6 +152,8 @@ class FusedCollector:
         logged = self._buffer.read(rows, names)
         if is_observed and self._rows != slice(0, self._renderer.view.height):
             logged["pixels"] = logged["pixels"][..., self._rows, :].contiguous()
+        if is_observed:
+            self.activations.record(rows, self._network.weights, logged["pixels"])
         return envs, logged
 
     def _launch(self, num_envs: int, part: int, kept: tuple[str, ...]) -> None:
@@ -163,6 +173,8 @@ class FusedCollector:
         rollout.actions = wp.from_torch(opened["action"])
         rollout.rewards = wp.from_torch(opened["reward"])
         rollout.end_reasons = wp.from_torch(opened["end_reason"])
+        first, last = part * self._num_rows, (part + 1) * self._num_rows
+        rollout.outputs = wp.from_torch(self.activations.outputs[first:last])
 
         def run_span(member: int, first: int, last: int) -> None:
             inputs = [first, last, member, rollout, self._rules.arrays]

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any, Literal, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import torch
 import warp as wp
@@ -10,6 +10,7 @@ from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
 from drone_rl.acceleration import gradients_kernel
+from drone_rl.acceleration.activations import ActivationRecorder, Recording
 from drone_rl.acceleration.gradients_kernel import BLOCK, FrameBatch, PackedParams, Workspace
 from drone_rl.acceleration.layers_kernel import WIDTH
 from drone_rl.acceleration.packed_layers import (
@@ -40,18 +41,30 @@ class FusedNetwork(ImageNetwork):
     """
 
     def __init__(
-        self, network: PolicyNetwork, num_threads: int = 1, *, wrt: Wrt = "weights"
+        self,
+        network: PolicyNetwork,
+        num_threads: int = 1,
+        *,
+        wrt: Wrt = "weights",
+        activations: ActivationRecorder | None = None,
     ) -> None:
         super().__init__()
         self.network, self.in_shape, self.actions = network, network.in_shape, network.actions
-        self._num_threads = num_threads
+        self._num_threads, self._activations = num_threads, activations
         self._differentiates: Wrt = wrt
         self._engine: _Engine | None = None
         load_kernels(gradients_kernel)
+        if activations is not None:
+            activations.start()
 
     @classmethod
     def try_create(
-        cls, network: nn.Module, num_threads: int = 1, *, wrt: Wrt = "weights"
+        cls,
+        network: nn.Module,
+        num_threads: int = 1,
+        *,
+        wrt: Wrt = "weights",
+        activations: ActivationRecorder | None = None,
     ) -> Self | Reasons:
         """Return the fused network, or the reasons why the kernel does not support the network.
 
@@ -59,6 +72,7 @@ class FusedNetwork(ImageNetwork):
             network: Network from pixels to logits.
             num_threads: Threads that share the observations; it affects the rounding of sums.
             wrt: Differentiate with respect to the weights, or to the pixels with fixed weights.
+            activations: Those of a `FusedCollector`, which batches from it need not compute again.
         """
         reasons = unsupported(network)
         if not reasons and wrt == "pixels" and not packed_layers(network)[0].has_transpose:
@@ -68,17 +82,30 @@ class FusedNetwork(ImageNetwork):
             reasons.append(f"{num_weights} weights are more than {MAX_WEIGHTS}")
         if reasons or not isinstance(network, PolicyNetwork):
             return Reasons(reasons)
-        return cls(network, num_threads, wrt=wrt)
+        return cls(network, num_threads, wrt=wrt, activations=activations)
 
     def forward(self, pixels: Tensor) -> Tensor:
         """Return the logits of pixels (*, C, H, W)."""
         if self._engine is None:
             layers = packed_layers(self.network)
-            self._engine = _Engine(layers, self._num_threads, self._differentiates)
+            self._engine = _Engine(
+                layers, self._num_threads, self._differentiates, self._activations
+            )
         self.network.check(pixels)
         flat = pixels.reshape(-1, math.prod(self.in_shape)).contiguous()
         parameters = self._engine.parameters if self._differentiates == "weights" else ()
         return _Logits.apply(self._engine, flat, *parameters).reshape(*pixels.shape[:-3], -1)
+
+
+class _Outputs(NamedTuple):
+    """Outputs of all layers for some observations."""
+
+    values: Tensor
+    """Flat, row after row; the end may be unused."""
+    rows: Tensor
+    """Row of each observation."""
+    recording: Recording | None = None
+    """Where they come from, unless they were computed."""
 
 
 class _Logits(torch.autograd.Function):
@@ -87,7 +114,7 @@ class _Logits(torch.autograd.Function):
         ctx.engine, ctx.has_parameters = engine, bool(parameters)
         ctx.pixels = pixels.detach()  # Warp reads .grad, about which torch warns
         ctx.outputs = engine.compute(ctx.pixels)
-        return engine.logits(ctx.outputs, len(pixels))
+        return engine.logits(ctx.outputs)
 
     @staticmethod
     @once_differentiable
@@ -102,9 +129,16 @@ class _Logits(torch.autograd.Function):
 class _Engine:
     """Run both passes in threads, with packed layers and their buffers."""
 
-    def __init__(self, layers: Sequence[PackedLayer], num_threads: int, wrt: Wrt) -> None:
+    def __init__(
+        self,
+        layers: Sequence[PackedLayer],
+        num_threads: int,
+        wrt: Wrt,
+        activations: ActivationRecorder | None,
+    ) -> None:
         load_kernels(gradients_kernel).result()
-        self._layers, self._has_fixed_weights = layers, wrt == "pixels"
+        self._layers, self._activations = layers, activations
+        self._has_fixed_weights = wrt == "pixels"
         self._workers = WorkerPool(num_threads, num_threads)
         self._order = order = Order(layers)
         self._weights = torch.zeros(order.weight_offsets[-1])
@@ -145,10 +179,14 @@ class _Engine:
         """Weight and bias of each layer."""
         return [parameter for layer in self._layers for parameter in layer.parameters]
 
-    def compute(self, pixels: Tensor) -> Tensor:
-        """Return the outputs of all layers, flat, observation by observation; may be longer."""
+    def compute(self, pixels: Tensor) -> _Outputs:
+        """Return the outputs of all layers, those that were recorded if there are any."""
         if not self._has_fixed_weights:
             self._order.pack(self._weights, self._transposed)
+        recorder = self._activations
+        rows = None if recorder is None else recorder.find(pixels, self._weights)
+        if recorder is not None and rows is not None:
+            return _Outputs(recorder.outputs.view(-1), rows, recorder.recording)
         size, spare, self._spare = len(pixels) * self._size, self._spare, None
         outputs = torch.empty(size) if spare is None or len(spare) < size else spare
         batch: Any = FrameBatch()
@@ -160,20 +198,24 @@ class _Engine:
             wp.launch(gradients_kernel.forward, 1, inputs=inputs, device="cpu")
 
         self._workers.map_spans(0, len(pixels), run_span)
-        return outputs
+        return _Outputs(outputs, torch.arange(len(pixels), dtype=torch.int32))
 
-    def logits(self, outputs: Tensor, count: int) -> Tensor:
-        """Return the outputs of the last layer. Shape: (count, num_actions)."""
-        first, last = self._logits_offset, self._logits_offset + len(self._layers[-1].layer.weight)
-        return outputs[: count * self._size].view(count, -1)[:, first:last].clone()
+    def logits(self, outputs: _Outputs) -> Tensor:
+        """Return the outputs of the last layer. Shape: (num_observations, num_actions)."""
+        last = self._logits_offset + torch.arange(len(self._layers[-1].layer.weight))
+        return outputs.values.take(outputs.rows[:, None].long() * self._size + last)
 
-    def gradients(self, pixels: Tensor, outputs: Tensor, grad_output: Tensor) -> list[Tensor]:
+    def gradients(self, pixels: Tensor, outputs: _Outputs, grad_output: Tensor) -> list[Tensor]:
         """Return gradients of parameters or pixels; the next call of `compute` reuses `outputs`."""
+        values, rows, recording = outputs
+        recorder = self._activations
+        if recording and recorder and recorder.recording is not recording:
+            raise RuntimeError("a batch was collected between the forward and the backward pass")
         self._gradients.zero_()
         grad_pixels = torch.empty_like(pixels) if self._has_fixed_weights else torch.empty(0, 0)
         batch: Any = FrameBatch()
-        batch.frames, batch.outputs = wp.from_torch(pixels), wp.from_torch(outputs)
-        batch.grad_frames = wp.from_torch(grad_pixels)
+        batch.frames, batch.outputs = wp.from_torch(pixels), wp.from_torch(values)
+        batch.rows, batch.grad_frames = wp.from_torch(rows), wp.from_torch(grad_pixels)
         batch.grad_output = wp.from_torch(grad_output.contiguous())
 
         def run_span(member: int, first: int, last: int) -> None:
@@ -181,7 +223,8 @@ class _Engine:
             wp.launch(gradients_kernel.backward, 1, inputs=inputs, device="cpu")
 
         self._workers.map_spans(0, len(pixels), run_span)
-        self._spare = outputs
+        if recording is None:
+            self._spare = values
         return (
             [grad_pixels] if self._has_fixed_weights else self._order.unpack(self._gradients.sum(0))
         )

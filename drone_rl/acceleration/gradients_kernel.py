@@ -184,6 +184,8 @@ class FrameBatch:
     """Gray. Shape: (num_frames, pixels)."""
     outputs: wp.array[float]
     """Outputs of all layers, row after row, as `forward` writes them."""
+    rows: wp.array[int]
+    """Row in `outputs` of each frame."""
     grad_output: wp.array2d[float]
     """Gradient with respect to the logits. Shape: (num_frames, num_actions)."""
     grad_frames: wp.array2d[float]
@@ -269,7 +271,7 @@ def _begin(
     inputs_offset = params.kept_offsets[params.num_convolutions - 1]
     top = params.geometries.shape[0] - 1
     row = frame - block
-    source = frame * _size(params) + inputs_offset
+    source = batch.rows[frame] * _size(params) + inputs_offset
     size = params.output_offsets[top] - inputs_offset
     copy(batch.outputs, source, workspace.inputs, row * params.inputs_stride, size)
     at = BLOCK * params.output_offsets[top] + row * _stride(params, top)
@@ -319,7 +321,7 @@ def _convolution(
 ) -> None:
     """Compute the gradients with respect to a convolution's weights and input, for one frame."""
     row = frame - block
-    frame_at = frame * _size(params)
+    frame_at = batch.rows[frame] * _size(params)
     input_offset = int(0)
     if layer > 0:
         input_offset = frame_at + params.kept_offsets[layer - 1]

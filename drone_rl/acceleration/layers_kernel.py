@@ -203,6 +203,10 @@ class Layers:
     """Offset of the logits in a workspace."""
     logits_stride: int
     """Stride between the logits of two frames."""
+    output_offsets: wp.array[int]
+    """Offset of each layer in the saved outputs of a frame."""
+    kept_offsets: wp.array[int]
+    """The same of its outputs after pooling."""
 
 
 @wp.func
@@ -235,3 +239,26 @@ def run_linear(layers: Layers, workspace: wp.array[float], count: int) -> None:
         geometry = layers.geometries[layer]
         geometry.num_patches = count
         multiply(workspace, layers.weights, workspace, geometry)
+
+
+@wp.func
+def save_outputs(
+    layers: Layers,
+    first: int,
+    last: int,
+    workspace: wp.array[float],
+    row: int,
+    outputs: wp.array[float],
+) -> None:
+    """Copy the outputs of layers `first` to `last` - 1 of one frame out of the workspace."""
+    for layer in range(first, last):
+        geometry = layers.geometries[layer]
+        size = geometry.num_patches * geometry.num_outs
+        offset = geometry.output_offset
+        if geometry.pool_size > 0:
+            copy(workspace, offset, outputs, layers.output_offsets[layer], size)
+            size = num_kept(geometry)
+            offset = int(geometry.pooled_offset)
+        if layer >= layers.num_convolutions - 1:
+            offset += row * size
+        copy(workspace, offset, outputs, layers.kept_offsets[layer], size)

@@ -297,6 +297,11 @@ class PackedNetwork:
         layers.num_convolutions = sum(layer.is_convolution for layer in packed)
         layers.features_size = packed[layers.num_convolutions].num_inputs
         layers.logits_offset, layers.logits_stride = inputs, packed[-1].num_outs
+        offsets = OutputOffsets.of(packed)
+        self.num_activations = offsets.outputs[-1]
+        """Numbers of the outputs of all layers of a frame."""
+        layers.output_offsets = as_indices(offsets.outputs)
+        layers.kept_offsets = as_indices(offsets.kept)
         self.layers = layers
         """For kernels."""
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import warp as wp
 
-from drone_rl.acceleration.layers_kernel import Layers, run_convolutions, run_linear
+from drone_rl.acceleration.layers_kernel import Layers, run_convolutions, run_linear, save_outputs
 from drone_rl.sim.rendering.raytrace.plain_kernel import render_image
 from drone_rl.sim.rendering.raytrace.structs_kernel import (
     Geoms,
@@ -59,6 +59,8 @@ class Rollout:
     rewards: wp.array[float]
     end_reasons: wp.array[int]
     """0 while the episode goes on."""
+    outputs: wp.array2d[float]
+    """Outputs of all layers; of shape (0, 0) if they are not saved."""
 
 
 @wp.func_native("""
@@ -131,6 +133,9 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
                 standardise(frame, frame.shape[0], camera.mean, camera.deviation)
                 workspace = rollout.workspaces[worker]
                 run_convolutions(layers, frame, workspace, running)
+                if rollout.outputs.shape[0] > 0:
+                    end = layers.num_convolutions
+                    save_outputs(layers, 0, end, workspace, running, rollout.outputs[row])
                 running += 1
         return running
 
@@ -151,6 +156,9 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
                 rollout.actions[row] = action
                 rollout.rewards[row] = move(envs, env, action)
                 rollout.end_reasons[row] = envs.end_reasons[env]
+                if rollout.outputs.shape[0] > 0:
+                    linear, end = layers.num_convolutions, layers.geometries.shape[0]
+                    save_outputs(layers, linear, end, workspace, running, rollout.outputs[row])
                 at += layers.logits_stride
                 running += 1
 

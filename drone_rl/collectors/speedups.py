@@ -11,7 +11,13 @@ from tensordict.utils import NestedKey
 from torch import nn
 from torchrl.envs import EnvBase
 
-from drone_rl.acceleration import DirectCollector, DirectStepper, FusedCollector, FusedNetwork
+from drone_rl.acceleration import (
+    ActivationRecorder,
+    DirectCollector,
+    DirectStepper,
+    FusedCollector,
+    FusedNetwork,
+)
 from drone_rl.envs.direct_renderer import DirectRenderer, Reasons
 
 N = TypeVar("N", bound=nn.Module)
@@ -74,10 +80,11 @@ def accelerated_gradients(
     num_threads: int = 1,
     *,
     wrt: Literal["weights", "pixels"] = "weights",
+    activations: ActivationRecorder | None = None,
 ) -> N | FusedNetwork:
     """Return the network with fused forward and backward pass if that is supported, else itself.
 
     See `FusedNetwork.try_create` for the arguments.
     """
-    fused = FusedNetwork.try_create(network, num_threads, wrt=wrt)
+    fused = FusedNetwork.try_create(network, num_threads, wrt=wrt, activations=activations)
     return network if isinstance(fused, Reasons) else fused

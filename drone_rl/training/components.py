@@ -36,6 +36,8 @@ class Components(NamedTuple):
     network: ImageNetwork
     generators: dict[str, torch.Generator]
     """Random streams of this process, by name."""
+    activations: Any = None
+    """`FusedCollector.activations`, if a fused collector alone makes the batches."""
 
 
 def joined(collector: Any, groups: Sequence[EnvGroup]) -> Components:

@@ -6,6 +6,7 @@ script of the same components. A critic and Ray workers are in `variants.py`, fi
 """
 
 import contextlib
+import functools
 import logging
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -162,7 +163,10 @@ def threaded_collector(
     options = components.episode_options(settings, max(1, num_cores() // len(sizes)))
     collectors = [EpisodeCollector(group.env, group.actor, **options) for group in groups]
     _log.info("%s", collectors[0].source.name)
-    return components.joined(ThreadedCollector(collectors, postproc=estimator), groups)
+    made = components.joined(ThreadedCollector(collectors, postproc=estimator), groups)
+    if len(collectors) > 1:  # whose batches are copied
+        return made
+    return made._replace(activations=getattr(collectors[0].source, "activations", None))
 
 
 def make_groups(
@@ -201,7 +205,8 @@ def reinforce_learner(
     """Make the learner without a critic; its loss has the last two settings."""
     limits, network, actor = settings.trainer, parts.network, parts.collector.actor
     may_fuse = limits.compiled and not network.is_recurrent
-    learning = accelerated_gradients(network, limits.num_threads) if may_fuse else network
+    fused = functools.partial(accelerated_gradients, activations=parts.activations)
+    learning = fused(network, limits.num_threads) if may_fuse else network
     is_fused = learning is not network  # its kernel has `limits.num_threads` threads
     if is_fused:
         actor = make_actor(learning, actor.spec["action"])

@@ -10,6 +10,7 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 from drone_rl.acceleration import fused_collector
 from drone_rl.acceleration.direct_collector import DirectCollector
 from drone_rl.acceleration.fused_collector import FusedCollector, RolloutBuffer
+from drone_rl.acceleration.fused_network import FusedNetwork
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.collectors.episodes import SteppingCollector
 from drone_rl.config import (
@@ -32,6 +33,7 @@ from drone_rl.policies import MLP, OriginalCNN, SmallCNN, make_actor
 from drone_rl.sim.dynamics import Quadrotor
 from drone_rl.sim.dynamics.state import LOST
 from drone_rl.sim.tasks.collect_cubes import CubesEnd
+from tests.policies.halves import forward_backward, halves
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
 REASON = ("next", "info", "end_reason")
@@ -347,3 +349,65 @@ def test_buffer_grows_with_the_number_of_parts(num_parts):
         expected = [part + hundreds for part in range(num_parts) for hundreds in (0, 100, 200)]
         assert buffer.read(rows, ["action"])["action"].tolist() == expected
     assert where[0] == where[1]
+
+
+class TestRecordedActivations:
+    @pytest.fixture
+    def episodes(self):
+        """Collector whose kernel records, the fused network that reads, and torch's network."""
+        collector = make(num_envs=4)
+        assert isinstance(collector.source, FusedCollector)
+        network = collector.actor.network
+        activations = collector.source.activations
+        return collector, FusedNetwork.try_create(network, 1, activations=activations), network
+
+    @staticmethod
+    def recorded(episodes, pixels):
+        """Logits of the fused network after the recorded ones were replaced by 7."""
+        collector, fused, _ = episodes
+        collector.source.activations.outputs.fill_(7)
+        return fused(pixels).unique().tolist() == [7]
+
+    def test_gradients_of_a_batch_equal_torch(self, episodes):
+        collector, fused, network = episodes
+        for length in (None, 3):  # as a whole and in slices
+            batch = collector.collect()
+            for part in batch.split(length or len(batch)):
+                weights = halves(len(part), 3)
+                logits, expected = forward_backward(network, network, part["pixels"], weights)
+                found, gradients = forward_backward(network, fused, part["pixels"], weights)
+                torch.testing.assert_close(found, logits)
+                torch.testing.assert_close(gradients, expected)
+            with torch.no_grad():
+                network.layers.logits.weight.mul_(0.9)
+
+    def test_pixels_of_the_batch_and_slices_of_them_are_recorded(self, episodes):
+        pixels = episodes[0].collect()["pixels"]
+        assert self.recorded(episodes, pixels)
+        assert self.recorded(episodes, pixels[2:5])
+
+    def test_copies_other_pixels_and_other_weights_are_not(self, episodes):
+        collector, _, network = episodes
+        pixels = collector.collect()["pixels"]
+        others = [pixels.clone(), pixels[[1, 0]], pixels[::2], pixels.flip(-1)]
+        assert not any(self.recorded(episodes, other) for other in others)
+        with torch.no_grad():
+            network.layers.logits.bias.add_(1)
+        assert not self.recorded(episodes, pixels)
+
+    def test_pixels_changed_in_place_are_not(self, episodes):
+        pixels = episodes[0].collect()["pixels"]
+        pixels[3, 0, 0, 0] += 1
+        assert not self.recorded(episodes, pixels)
+
+    def test_pixels_of_the_batch_before_are_not(self, episodes):
+        collector = episodes[0]
+        before, _ = collector.collect()["pixels"], collector.collect()
+        assert not self.recorded(episodes, before)
+
+    def test_backward_after_another_batch_raises(self, episodes):
+        collector, fused, _ = episodes
+        total = fused(collector.collect()["pixels"]).sum()
+        collector.collect()
+        with pytest.raises(RuntimeError, match="between the forward and the backward pass"):
+            total.backward()
