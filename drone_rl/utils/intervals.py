@@ -6,6 +6,36 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from drone_rl.utils.models import Model
+
+
+class Share(Model):
+    """A rate with its exact (Clopper-Pearson) interval."""
+
+    share: float | None
+    """The rate; None without trials."""
+    lower95: float
+    """Lower end of the interval, 0 without trials; so named whatever the confidence is."""
+    upper95: float
+    """Upper end, 1 without trials."""
+    successes: int
+    """Trials that succeeded."""
+    trials: int
+    """All trials."""
+
+
+class Mean(Model):
+    """A mean of bounded values with an interval that is valid for any distribution."""
+
+    mean: float | None
+    """The mean; None without values."""
+    lower95: float
+    """Lower end of the interval; without values, the least possible one."""
+    upper95: float
+    """Upper end; without values, the greatest possible one."""
+    count: int
+    """Number of values."""
+
 
 def proportion(successes: int, trials: int, confidence: float = 0.95) -> dict[str, Any]:
     """Return a rate with its exact (Clopper-Pearson) interval.

@@ -1,0 +1,112 @@
+"""Frozen classes of plain data whose values are checked: settings and results."""
+
+import typing
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Self, cast
+
+import pydantic
+from pydantic_core import ErrorDetails
+
+from drone_rl.utils.errors import InputError, did_you_mean
+from drone_rl.utils.files import read_bytes
+from drone_rl.utils.limits import RESULT_BYTES
+from drone_rl.utils.schema import shown
+
+
+class _Checked(type(pydantic.BaseModel)):
+    def __call__(cls, *args: Any, **values: Any) -> Any:
+        """Make an instance; errors in nested ones have their place."""
+        try:
+            return super().__call__(*args, **values)
+        except pydantic.ValidationError as error:
+            raise input_error(error, cast(Any, cls)) from None
+
+
+class Model(pydantic.BaseModel, metaclass=_Checked):
+    """Base of frozen classes with typed fields; a docstring below a field describes it.
+
+    JSON files are read strictly: "3" is no number and 3.0 no whole one.
+
+    Raises:
+        InputError: A field is unknown, missing or invalid. The message begins with its name.
+    """
+
+    model_config = pydantic.ConfigDict(
+        frozen=True,
+        extra="forbid",
+        use_attribute_docstrings=True,
+        allow_inf_nan=False,
+        arbitrary_types_allowed=True,
+    )
+
+    @classmethod
+    def read(cls, data: object, where: str = "") -> Self:
+        """Return an instance from plain data.
+
+        Args:
+            data: A mapping from names to values; nested models are mappings, too.
+            where: Its name, for messages; empty at the root.
+
+        Raises:
+            InputError: See above.
+        """
+        try:
+            return cls.model_validate(data)
+        except pydantic.ValidationError as error:
+            raise input_error(error, cls, where) from None
+
+    @classmethod
+    def read_json(cls, path: Path, most: int = RESULT_BYTES) -> Self:
+        """Return an instance from a JSON file of at most `most` bytes; see `read` for errors."""
+        try:
+            return cls.model_validate_json(read_bytes(path, most), strict=True)
+        except pydantic.ValidationError as error:
+            raise input_error(error, cls, str(path)) from None
+
+    def write_json(self, path: Path) -> None:
+        """Write a JSON file that `read_json` reads."""
+        path.write_text(self.model_dump_json(indent=2), "utf-8")
+
+
+def input_error(
+    error: pydantic.ValidationError, cls: type[pydantic.BaseModel], where: str = ""
+) -> InputError:
+    """Return the first error of pydantic as a user's error, with the place, value and remedy."""
+    details = error.errors(include_url=False)[0]
+    place = _place(details, where)
+    if details["type"] == "extra_forbidden":
+        names = _names(cls, details["loc"][:-1])
+        meant = did_you_mean(details["loc"][-1], names)
+        return InputError(f"{place} is unknown; valid names: {', '.join(names) or '-'}{meant}")
+    if details["type"] == "json_invalid":
+        return InputError(f"{place} is damaged: {details['msg']}; write the file again")
+    if details["type"] == "missing":
+        return InputError(f"{place} is missing; give it")
+    if details["type"] == "value_error":  # raised by a validator of this project
+        text = str(details.get("ctx", {}).get("error", details["msg"]))
+        return InputError(f"{place}.{text}" if place else text)
+    reason = details["msg"].replace("Input should be", "must be")
+    return InputError(f"{place}={shown(details['input'])}: it {reason}")
+
+
+def _place(details: ErrorDetails, where: str) -> str:
+    """Return the dotted name of a value; pydantic's words for alternatives are left out."""
+    text = where
+    for part in details["loc"]:
+        if isinstance(part, int):
+            text += f"[{part}]"
+        elif part.isidentifier():
+            text += f".{part}" if text else part
+    return text
+
+
+def _names(hint: Any, loc: tuple[int | str, ...]) -> list[str]:
+    """Return the fields of the model at a place in a value of a type."""
+    if not hasattr(hint, "model_fields"):
+        return next(filter(None, (_names(of, loc) for of in typing.get_args(hint))), [])
+    fields: Mapping[str, Any] = hint.model_fields
+    for i, part in enumerate(loc):
+        if part in fields:
+            return _names(fields[str(part)].annotation, loc[i + 1 :])
+    return [*fields]
