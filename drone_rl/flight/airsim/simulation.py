@@ -201,7 +201,7 @@ class Simulation:
         self.teleport(vehicle, pose._replace(position=place), ignore_collision=ignore_collision)
 
     def teleport(self, vehicle: Vehicle, pose: Pose, *, ignore_collision: bool) -> None:
-        """Put a vehicle somewhere, see `Airframe.set_airsim_pose`; it touches cubes on its way."""
+        """Put a vehicle somewhere, see `Vehicle.set_airsim_pose`; it touches cubes on its way."""
         before = None if ignore_collision else vehicle.body.position[0].clone()
         others = (one for one in self._flying() if one is not vehicle)
         vehicle.set_airsim_pose(pose, ignore_collision=ignore_collision, others=others)

@@ -5,11 +5,9 @@ import torch
 from drone_rl.config import DynamicsSettings
 from drone_rl.flight.airsim.settings_file import VehicleChoice
 from drone_rl.flight.airsim.vehicle import Vehicle
-from drone_rl.flight.commands.path_following import YawMode
 from drone_rl.sim.coordinates import HOME
 from drone_rl.sim.dynamics import Obstacles
 
-FREE, KEEP = "max_degree_of_freedom", YawMode()
 BOX = Obstacles(torch.tensor([[[5.0, 0.0, 1.0]]], dtype=torch.float64), (1.0, 1.0, 1.0))
 
 

@@ -10,7 +10,6 @@ from drone_rl.flight.airsim.messages import Pose, nanoseconds
 from drone_rl.flight.airsim.settings_file import parse_settings
 from drone_rl.flight.airsim.simulation import Simulation, Wait
 from drone_rl.utils.errors import InputError
-from tests.flight.airsim.flying import FREE, KEEP
 
 
 @pytest.fixture
@@ -154,7 +153,7 @@ def test_reset_keeps_the_time_and_drops_api_control(make):
     simulation = make(clock="lockstep")
     vehicle = simulation.find("")
     vehicle.enable_api_control(True)
-    future, answers = vehicle.takeoff(20.0), []
+    future, answers = vehicle.take_off(), []
     simulation.wait_for(Wait(lambda: future.done, future.result), answers.append)
     simulation.advance(0.0, math.inf)
     before = simulation.time
@@ -168,7 +167,7 @@ def test_multirotors_collide_with_each_other(make):
     text = '{"Vehicles": {"A": {"Z": -3, "AllowAPIAlways": true}, "B": {"X": 3, "Z": -3}}}'
     simulation = make(text, clock="lockstep")
     a, b = simulation.find("A"), simulation.find("B")
-    future = a.move_velocity((2.0, 0.0, 0.0), 4.0, FREE, KEEP)
+    future = a.move_by_velocity(2.0, 0.0, 0.0, 4.0)
     simulation.wait_for(Wait(lambda: future.done, future.result), [].append)
     simulation.advance(60.0, math.inf)
     seen = a.collision(), b.collision()
