@@ -1,7 +1,6 @@
 """A vehicle of the server: a pilot with AirSim's frames, collisions and permissions."""
 
 import copy
-import dataclasses
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
@@ -21,7 +20,7 @@ from drone_rl.flight.airsim.collisions import (
 )
 from drone_rl.flight.airsim.messages import Map, Pose, nanoseconds, to_world
 from drone_rl.flight.airsim.sensors import SENSORS
-from drone_rl.flight.airsim.settings_file import POSING, Offset, VehicleChoice
+from drone_rl.flight.airsim.settings_file import POSING, VehicleChoice
 from drone_rl.flight.commands.command import Command, FlightFuture, PilotError
 from drone_rl.flight.commands.pilot import Pilot
 from drone_rl.flight.commands.state import LandedState, Sensors
@@ -68,6 +67,7 @@ class Vehicle(Pilot):
 
     def __init__(
         self,
+        name: str,
         choice: VehicleChoice,
         dynamics: DynamicsSettings,
         worlds: Worlds | None,
@@ -82,6 +82,7 @@ class Vehicle(Pilot):
         """Create a vehicle of the settings file.
 
         Args:
+            name: Its name for clients.
             choice: Its kind, start pose and cameras.
             dynamics: Vehicle and wind.
             worlds: A single world that the cameras render; None for nothing to see.
@@ -92,24 +93,24 @@ class Vehicle(Pilot):
             height: Height in metres at which Z is 0 in start poses.
             seed: Of gusts and sensor noise.
         """
-        self.choice, self.geo_home, self.names = choice, home, tuple(names)
+        self.name, self.choice, self.geo_home, self.names = name, choice, home, tuple(names)
         self._object_id = object_id
-        start = Offset(*messages.known(dataclasses.astuple(choice.start), (0.0,) * 6))
-        x, y, up = to_world((start.x, start.y, start.z))
-        posed = choice.kind == POSING
+        x, y, up = to_world(messages.known(choice.position, (0.0,) * 3))
+        roll, pitch, yaw = messages.known(choice.angles, (0.0,) * 3)
+        posed = choice.vehicle_type == POSING
         up = max(dynamics.radius, height + up)
         super().__init__(
             SingleQuadrotor(dynamics),
             mode="computer_vision" if posed else "simple_flight",
             start=(x, y, up) if posed else (x, y),
-            yaw=start.yaw,
+            yaw=yaw,
             seed=seed,
             obstacles=obstacles,
             worlds=worlds,
             sensors=None,
         )
-        if posed and (start.roll or start.pitch):
-            self.set_pose((x, y, up), roll=start.roll, pitch=start.pitch, yaw=start.yaw)
+        if posed and (roll or pitch):
+            self.set_pose((x, y, up), roll=roll, pitch=pitch, yaw=yaw)
         self.body = self.body.moved(self.body.position.new_tensor([[x, y, up]]))
         self.home = self.body.position[0].clone()
         self._home = self.home.tolist()
@@ -127,7 +128,8 @@ class Vehicle(Pilot):
         self._before = self.body
         self.came_from: torch.Tensor | None = None
         """Where the last step began, if it was faster than `_FAST`. Shape: (3,)."""
-        self._is_armed = self.choice.is_armed and not self.is_computer_vision
+        is_armed = self.choice.default_vehicle_state != "Disarmed"
+        self._is_armed = is_armed and not self.is_computer_vision
         self._hover()
         self._unseen: deque[tuple[FlightState, float]] = deque()
         """States that the sensors have not been updated to, and their seconds."""
@@ -401,8 +403,8 @@ class Vehicle(Pilot):
         if hit is not None:
             self.collide(hit[0], there, hit[1])
             for other in others:
-                if other.choice.name == hit[0]:
-                    other.collide(self.choice.name, other.body.position[0], hit[1])
+                if other.name == hit[0]:
+                    other.collide(self.name, other.body.position[0], hit[1])
 
     def collide(self, name: str, position: torch.Tensor, point: torch.Tensor) -> None:
         """Note a collision, at a position, with the nearest point of an object. Shapes: (3,)."""
@@ -420,7 +422,7 @@ class Vehicle(Pilot):
         depth = 2.0 * self.settings.radius - distance
         for one, met, way in ((self, other, normal), (other, self, -normal)):
             contact = (one.body.position[0].tolist(), point.tolist(), way.tolist())
-            one.collisions.add(VehicleCollision(met.choice.name, *contact, depth, one.time))
+            one.collisions.add(VehicleCollision(met.name, *contact, depth, one.time))
             one.body.position[0] += 0.5 * depth * way
             one.body.velocity[0] += push * way
 
@@ -432,6 +434,6 @@ class Vehicle(Pilot):
             rows += [(name, at, half, 0.0) for name, at in zip(self.names, centers, strict=False)]
         for other in others:
             at, radius = other.body.position[0].tolist(), other.settings.radius
-            rows.append((other.choice.name, at, (0.0, 0.0, 0.0), radius))
+            rows.append((other.name, at, (0.0, 0.0, 0.0), radius))
         names, *parts = zip(*rows, strict=True)
         return Solids(names, *(torch.tensor(part, dtype=torch.float64) for part in parts))

@@ -90,7 +90,7 @@ class Watched:
                 "wind_from": math.degrees(math.atan2(y, 0.0 - x)) % 360.0,
             },
             "note": "Time is paused." if simulation.is_paused else "",
-            "vehicle": vehicle.choice.name,
+            "vehicle": vehicle.name,
         }
 
     def _render(self) -> Tensor:

@@ -6,7 +6,6 @@ import pytest
 import torch
 
 from drone_rl.flight.airsim.messages import Pose
-from drone_rl.flight.airsim.settings_file import Offset
 from drone_rl.flight.commands.command import PilotError
 from drone_rl.sim.coordinates import HOME, GeoPoint, geo_from_world
 from drone_rl.sim.dynamics.state import LOST
@@ -17,7 +16,7 @@ SAME = (math.nan,) * 4
 
 
 def test_positions_are_relative_to_the_start():
-    vehicle = make(start=Offset(3.0, 4.0, 0.0, yaw=90.0))
+    vehicle = make(x=3.0, y=4.0, z=0.0, yaw=90.0)
     x, y, z = vehicle.body.position[0].tolist()
     assert (x, y) == (3.0, -4.0)  # 4 m east is 4 m to the right
     assert z == pytest.approx(vehicle.settings.radius)
@@ -91,7 +90,7 @@ def test_a_falling_or_lost_vehicle_says_so():
 
 
 def test_computer_vision_has_no_dynamics():
-    vehicle = make("ComputerVision", start=Offset(1.0, 0.0, 0.0))
+    vehicle = make("ComputerVision", x=1.0)
     with pytest.raises(PilotError, match="needs a vehicle with dynamics"):
         vehicle.take_off()
     assert vehicle.set_armed(True) is True
@@ -122,7 +121,7 @@ def test_ground_is_no_new_collision_at_rest_and_forgotten_at_takeoff():
 
 @pytest.mark.parametrize("kind", ["SimpleFlight", "ComputerVision"])
 def test_a_vehicle_starts_at_the_z_of_the_settings_and_stays_there(kind):
-    vehicle = make(kind, start=Offset(1.0, 2.0, -4.0))
+    vehicle = make(kind, x=1.0, y=2.0, z=-4.0)
     usual, lower = (vehicle.settings.radius,) * 2 if kind == "SimpleFlight" else (2.5, 1.5)
     assert vehicle.body.position[0].tolist() == pytest.approx([1.0, -2.0, usual + 4.0])
     for _ in range(2):
@@ -130,13 +129,13 @@ def test_a_vehicle_starts_at_the_z_of_the_settings_and_stays_there(kind):
             vehicle.run(vehicle.period)
         assert vehicle.pose.position == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
         vehicle.reset()
-    heights = [make(kind, start=Offset(z=z)).body.position[0, 2] for z in (0.0, 1.0, 9.0)]
+    heights = [make(kind, z=z).body.position[0, 2] for z in (0.0, 1.0, 9.0)]
     assert heights == [usual, lower, vehicle.settings.radius]
 
 
 def test_an_armed_vehicle_that_is_put_into_the_air_hovers():
-    for is_armed, height in ((True, -3.0), (False, 0.0)):
-        vehicle = make(is_armed=is_armed)
+    for state, height in (("Armed", -3.0), ("Disarmed", 0.0)):
+        vehicle = make(default_vehicle_state=state)
         vehicle.set_airsim_pose(Pose((5.0, 0.0, -3.0), SAME), ignore_collision=True)
         for _ in range(100):
             vehicle.run(vehicle.period)
