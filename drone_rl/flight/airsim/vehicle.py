@@ -23,7 +23,7 @@ from drone_rl.flight.airsim.sensors import SENSORS
 from drone_rl.flight.airsim.settings_file import POSING, VehicleChoice
 from drone_rl.flight.commands.command import Command, FlightFuture, PilotError
 from drone_rl.flight.commands.pilot import Pilot
-from drone_rl.flight.commands.state import LandedState, Sensors
+from drone_rl.flight.commands.state import LandedState
 from drone_rl.sim.coordinates import GeoPoint, geo_from_world, world_from_geo
 from drone_rl.sim.dynamics import FlightState, Obstacles, SingleQuadrotor
 from drone_rl.sim.dynamics.state import (
@@ -41,6 +41,7 @@ from drone_rl.sim.dynamics.state import (
     VELOCITY,
 )
 from drone_rl.sim.rendering.appearance import rotate
+from drone_rl.sim.sensors import Sensors
 from drone_rl.sim.tasks.common import first_contact
 from drone_rl.sim.worlds import Worlds
 

@@ -23,7 +23,7 @@ from drone_rl.flight.commands.command import (
     period_ticks,
 )
 from drone_rl.flight.commands.path_following import GoHomeCommand
-from drone_rl.flight.commands.state import LandedState, PilotState, Sensors, Trajectory
+from drone_rl.flight.commands.state import LandedState, PilotState, Trajectory
 from drone_rl.flight.image_types import ImageRequest, images
 from drone_rl.sim.coordinates import attitude_of
 from drone_rl.sim.dynamics import FlightGoals, FlightState, Obstacles, Quadrotor
@@ -31,6 +31,7 @@ from drone_rl.sim.dynamics import state as fs
 from drone_rl.sim.dynamics.state import twist_about_z
 from drone_rl.sim.entities import FRONT_CENTER, find_camera
 from drone_rl.sim.rendering.view import Modality
+from drone_rl.sim.sensors import Sensors
 from drone_rl.sim.tasks import State
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
