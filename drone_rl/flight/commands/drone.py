@@ -137,7 +137,7 @@ class Drone:
         """Remaining ticks of the period."""
         self._coasting = 0
         """Ticks for which the last goals hold after a command that set no position."""
-        self._place: Tensor | None = None
+        self._place: list[float] | None = None
         """Pose to hold without a command."""
 
     def __enter__(self) -> Self:
@@ -329,7 +329,7 @@ class Drone:
             self._place = None
             return None
         if self._place is None:
-            self._place = self.body.settled().reference.clone()
+            self._place = self.body.settled().reference[0].tolist()
         return hold(self._place)
 
     def _fly(self, goals: FlightGoals | None, ticks: int) -> None:
@@ -380,7 +380,7 @@ class Drone:
         command = future.command
         if self._is_lost:
             self._end(False)
-        elif bool(command.is_complete(self.body)[0]):
+        elif command.is_complete(self.body):
             self._end(True)
         elif future.elapsed >= command.limit - 1e-9:
             self._end(command.succeeds_at_limit)
@@ -399,6 +399,6 @@ class Drone:
         if success and isinstance(command, Land | GoHomeCommand):
             self._settle()
         if self._place is not None:
-            self.body.reference[:] = self._place
+            self.body.reference[0] = torch.tensor(self._place)
         if self._place is not None or not self._is_flying:
             self._coasting = 0
