@@ -24,7 +24,6 @@ const SHOWN_KEYS = { ArrowUp: "↑", ArrowDown: "↓", ArrowLeft: "←", ArrowRi
 const SLIDERS = {
   speed: ["Speed", "m/s", .5], wind: ["Wind", "m/s", .5], wind_from: ["Wind from", "°", 5], light: ["Light", "×", .05],
 };
-const MODES = { actions: "the policy's actions", computer_vision: "computer vision", simple_flight: "simple flight" };
 const TRAIL = 1000;
 const DEAD = .12;
 const CHARTS_MS = 66; // between two drawings of map, attitude and bars
@@ -100,54 +99,25 @@ function take(next) {
   if (!before || JSON.stringify(shownOf(before)) !== JSON.stringify(shownOf(next))) describe();
 }
 
-const shownOf = s => [s.pilot, s.mode, s.camera, s.end, s.goals, s.recording, s.saliency, s.settings, s.note];
+const shownOf = s => [s.pilot, s.mode, s.camera, s.recording, s.saliency, s.settings, s.texts];
 
 function describe() {
-  if (hello.watch) {
-    $("camera").value = state.camera;
-    set("flyer", `A program flies ${state.vehicle}`);
-    set("note", state.note);
-    return;
-  }
-  const s = state, isPerson = s.pilot === "person", c = words(s);
+  const s = state, isPerson = s.pilot === "person";
+  write(s.texts);
+  $("camera").value = s.camera;
+  if (hello.watch) return;
   $("person").setAttribute("aria-pressed", isPerson);
   $("policy").setAttribute("aria-pressed", !isPerson);
   $("mode").value = s.mode;
-  $("camera").value = s.camera;
   $("record").setAttribute("aria-pressed", s.recording.on);
-  set("flyer", isPerson ? `You fly: ${MODES[s.mode]}` : `The policy ${hello.policy} flies`);
-  set("score", c.score);
-  set("end", c.end);
-  $("end").hidden = !c.end;
-  set("note", s.note);
-  set("recording", c.recording);
+  $("end").hidden = !s.texts.end;
   if (s.recording.problem) set("problem", s.recording.problem);
-  set("method", c.saliency);
-  $("saliency").checked = s.saliency.on;
+  $("saliency").checked = s.saliency;
   for (const name of Object.keys(SLIDERS)) slider(name);
   pad();
 }
 
-function words(s) {
-  const [reached, missed] = s.goals || [null, null];
-  const of = hello.total === null ? "" : ` of ${hello.total}`;
-  const goals = (hello.total === null ? reached : hello.total) === 1 ? hello.goal : `${hello.goal}s`;
-  const isFree = s.pilot === "person" && s.mode !== "actions";
-  const end = s.end === null || isFree ? "" : `Episode over, ${s.end}. ` +
-    (s.pilot === "person" ? "New episode, or N, starts the next." : "The next one begins.");
-  const score = s.goals ? `${reached}${of} ${goals} ${hello.reached}` + (missed ? `, ${missed} missed` : "") : `return ${s.reward}`;
-  const saved = `${s.recording.saved} saved in ${hello.demonstrations}`;
-  const recording = s.recording.on ? `Recording: ${saved}.` : s.recording.saved ? `Recorded flights: ${saved}.` :
-    "Record writes what you fly by the policy's actions, or what the policy flies, as demonstrations.";
-  const method = (s.saliency.method || "").replaceAll("_", " ");
-  const saliency = {
-    off: "tested when it is switched on", testing: "testing methods on this policy; this takes a minute or so",
-    shown: `bright pixels affect the most probable action; method ${method}, which passed the tests on this policy`,
-    none: "no method passes the tests on this policy, so none is shown",
-    failed: `the methods can't be tested: ${s.saliency.problem}`,
-  }[s.saliency.state];
-  return { end, score, recording, saliency };
-}
+function write(texts) { for (const [id, words] of Object.entries(texts)) set(id, words); }
 
 function set(place, words) {
   const element = typeof place === "string" ? $(place) : place;
@@ -170,7 +140,7 @@ function handOver() { send({ type: "pilot", pilot: state && state.pilot === "per
 function toggleRecord() { send({ type: "record", on: !(state && state.recording.on) }); }
 function following(list, now) { return list[(list.indexOf(now) + 1) % list.length]; }
 function nextCamera() { send({ type: "camera", camera: following(hello.cameras, state.camera) }); }
-function nextMode() { send({ type: "mode", mode: following(Object.keys(MODES), state.mode) }); }
+function nextMode() { send({ type: "mode", mode: following(["actions", "computer_vision", "simple_flight"], state.mode) }); }
 
 function usable(control) {
   if (!state || state.pilot === "policy") return false;
@@ -225,14 +195,10 @@ $("saliency").addEventListener("change", () => send({ type: "saliency", on: $("s
 function begin() {
   state = null; // the next frame updates what is built here, also after a lost connection
   set("legend", `Seen from above, ahead is up. Triangle: drone. Line: trail. Squares: ${hello.object}s, dashed where one has gone.`);
-  if (hello.watch) {
-    document.body.classList.add("watching");
-    document.querySelector("h1").textContent = document.title = "Watch a program fly";
-    set("task", `AirSim's server: ${hello.watch}.`);
-    return;
-  }
-  set("name", hello.policy);
-  set("task", `Task: ${hello.task.replaceAll("_", " ")}. The policy's actions: ${hello.actions.join(", ")}.`);
+  write(hello.texts);
+  document.title = $("title").textContent;
+  document.body.classList.toggle("watching", Boolean(hello.watch));
+  if (hello.watch) return;
   build();
   document.querySelector("details").open = matchMedia("(min-width: 34rem)").matches;
   $("deck").focus({ preventScroll: true });
