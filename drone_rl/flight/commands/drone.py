@@ -236,7 +236,7 @@ class Drone:
         height: int | None = None,
         width: int | None = None,
     ) -> list[Tensor]:
-        """Render AirSim's images, any of five cameras and seven types, all of one size.
+        """Render AirSim's images, any of five cameras and eight types, all of one size.
 
         The size, in pixels, is the worlds' by default. A drone without worlds raises `PilotError`.
 
