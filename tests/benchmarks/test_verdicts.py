@@ -24,7 +24,7 @@ KINDS = {
     "not certain": ["all or nothing, nine in ten"],
 }
 PHRASES = {
-    "dithers at the third cube": "third cube: in 400 of 400 episodes (100%); 100% of all end at the step",
+    "dithers at the third cube": "in 400 of 400 episodes (100%); 100% of all end at the step",
     "sees 4 m sideways": "with cubes 4 to 6 m to its side: in 221 of 221 episodes",
     "blind on its left": "can't be trusted with cubes on its left",
     "loses one episode in 50": "second cube: in 9 of 400",
