@@ -39,9 +39,14 @@ def _environment(package: str) -> "jinja2.Environment":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    filters = (percent, interval, rate, listed, plural, ordinal, setting)
+    filters = (percent, interval, rate, listed, plural, count, setting)
     environment.filters |= {function.__name__: function for function in filters}
     return environment
+
+
+def count(number: int) -> str:
+    """Return a count with commas at thousands."""
+    return f"{number:,}"
 
 
 def setting(value: Any) -> str:

@@ -118,8 +118,8 @@ def test_a_column_of_bodies(program, monkeypatch):
     flights = done.in_the_loop["good"]
     assert flights.success.trials == len(flights.flights) == 1
     assert str(done).splitlines()[1].endswith("to 100%)")
-    texts = chart(done).axes[0].texts
-    words = [text.get_text().replace("\n", " ") for text in texts]
+    cells = chart(done).axes[0].tables[0].get_celld().values()
+    words = [cell.get_text().get_text().replace("\n", " ") for cell in cells]
     assert "software in the loop" in words
     assert any(word.startswith("no verdict: 1 of 1") for word in words)
 

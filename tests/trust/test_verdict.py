@@ -139,8 +139,8 @@ def test_task_that_a_baseline_solves_is_trivial(
     episodes = make_episodes(sides, [[1, 1]] * 400)
     verdict = apply_rule(episodes, make_baselines(episodes))
     assert (verdict.kind, verdict.certain, verdict.exit_code) == (kind, certain, status)
-    trivial = "Flying straight on is good by this rule, too: it collects every cube in 100% of"
-    assert verdict.sentence.startswith(trivial) == (solved == 400)
+    trivial = 'task is trivial: the baseline "always forward" collects every cube in 100% of'
+    assert (trivial in verdict.sentence) == (solved == 400)
 
 
 def test_baselines_have_the_dynamics_of_the_environment(monkeypatch):
