@@ -192,10 +192,6 @@ def fixed_seed(name: str, what: str = "environments") -> Sentence:
     return Sentence(name, "the seed was known before the analysis", is_fixed, text)
 
 
-BODIES = (fixed_seed("bodies.fixed_seed"),)
-"""Evidence: `bodies.json`."""
-LOOPED = (fixed_seed("looped.fixed_seed"),)
-"""Evidence: see `drone_rl.flight.sitl_evaluation.SitlEvaluation.as_dict`."""
 CHANCES = (fixed_seed("chances.fixed_seed", "placements"),)
 """Evidence: `chances.json` of held-out placements; those that a user gives have no seed."""
 CHECK = (fixed_seed("check.fixed_seed", "placements"),)
