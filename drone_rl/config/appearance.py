@@ -1,13 +1,15 @@
 """Settings of appearance; each value is fixed or a range that is sampled at every reset."""
 
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
+import pydantic
 import yaml
+from pydantic_core import PydanticCustomError
 
 from drone_rl.config.camera import FRONT, CameraSettings
 from drone_rl.config.task import Color, ObjectRegion
 from drone_rl.utils.errors import InputError, did_you_mean
-from drone_rl.utils.schema import Listed, Real, Several, Span, Whole, shown
+from drone_rl.utils.schema import Listed, Real, Several, Span, Whole
 from drone_rl.utils.settings import Settings, conf_dir
 
 NumberOrRange = float | tuple[float, float]
@@ -86,22 +88,21 @@ class AppearanceSettings(Settings):
     exposure: Annotated[NumberOrRange, Span(Real(0.01, 100.0))] = 1.0
     """Factor by which the camera multiplies all colors."""
 
+    @pydantic.model_validator(mode="before")
     @classmethod
-    def from_name(cls, name: str, where: str) -> Self:
-        """Return the appearance of a file in conf/appearance, such as "fog".
-
-        Raises:
-            InputError: There is no such file; the message begins with `where`.
-        """
+    def _preset(cls, data: Any) -> Any:
+        """Read a name as that of a file in conf/appearance, such as "fog"; minimal is no file."""
+        if not isinstance(data, str):
+            return data
         files = {path.stem: path for path in sorted((conf_dir() / "appearance").glob("*.yaml"))}
-        if name not in files:
-            raise InputError(
-                f"{where}={shown(name)} is unknown; give one of: {', '.join(files)}"
-                f"{did_you_mean(name, files)}"
-            )
-        values = yaml.safe_load(files[name].read_text("utf-8"))
-        base = values.pop("defaults")[0]
-        return (cls.from_name(base, where) if base in files else cls()).replace(**values)
+        if data == "minimal":
+            return {}
+        if data not in files:
+            names = ("minimal", *files)
+            reason = f"must be one of {', '.join(names)}{did_you_mean(data, names)}"
+            raise PydanticCustomError("name", "{reason}", {"reason": reason})
+        values = yaml.safe_load(files[data].read_text("utf-8"))
+        return {**cls._preset(values.pop("defaults")[0]), **values}
 
     @property
     def is_minimal(self) -> bool:

@@ -183,7 +183,7 @@ def _every_axis(e: Evidence) -> str:
     return listed(names) if len(names) <= MAX_NAMED else f"all {len(names)} axes of the table"
 
 
-_FAULTS = frozenset(fault.registered_name() for fault in Fault.__subclasses__())
+_FAULTS = frozenset(fault.name for fault in Fault.__subclasses__())
 
 
 def _own_faults(e: Evidence) -> list[str]:

@@ -1,5 +1,6 @@
 """Frozen classes of plain data whose values are checked: settings and results."""
 
+import re
 import typing
 from collections.abc import Mapping
 from pathlib import Path
@@ -8,10 +9,9 @@ from typing import Any, Self, cast
 import pydantic
 from pydantic_core import ErrorDetails
 
-from drone_rl.utils.errors import InputError, did_you_mean
+from drone_rl.utils.errors import InputError, did_you_mean, shown
 from drone_rl.utils.files import read_bytes
 from drone_rl.utils.limits import RESULT_BYTES
-from drone_rl.utils.schema import shown
 
 
 class _Checked(type(pydantic.BaseModel)):
@@ -70,7 +70,7 @@ class Model(pydantic.BaseModel, metaclass=_Checked):
 
 
 def input_error(
-    error: pydantic.ValidationError, cls: type[pydantic.BaseModel], where: str = ""
+    error: pydantic.ValidationError, cls: type[pydantic.BaseModel] | None = None, where: str = ""
 ) -> InputError:
     """Return the first error of pydantic as a user's error, with the place, value and remedy."""
     details = error.errors(include_url=False)[0]
@@ -86,7 +86,10 @@ def input_error(
     if details["type"] == "value_error":  # raised by a validator of this project
         text = str(details.get("ctx", {}).get("error", details["msg"]))
         return InputError(f"{place}.{text}" if place else text)
-    reason = details["msg"].replace("Input should be", "must be")
+    _, _, rest = details["msg"].partition(" should ")
+    reason = f"must {rest}" if rest else details["msg"][:1].lower() + details["msg"][1:]
+    if details["type"] == "literal_error":
+        reason += did_you_mean(details["input"], re.findall(r"'([^']+)'", reason))
     return InputError(f"{place}={shown(details['input'])}: it {reason}")
 
 
