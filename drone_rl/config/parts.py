@@ -82,8 +82,7 @@ class Part(Named):
     `drone_rl.config.registry` connects a variant with the class or function that builds it.
 
     In Hydra's configs the name is "_target_". It may also be the dotted name of a class of another
-    package, which is imported when it is built, and values that a variant does not declare are
-    passed on.
+    package, which is imported when it is built and gets all values, declared or not.
     """
 
     target: ClassVar[str]
@@ -127,7 +126,7 @@ class Part(Named):
         of = variants.get(target)
         if of is None and not (isinstance(target, str) and "." in target):
             of = cls.named(target, "_target_")
-        if of is not None and values.keys() <= of.model_fields.keys():
+        if of is not None and ("." not in of.target or values.keys() <= of.model_fields.keys()):
             return of.read(values)
 
         class Unregistered(of or cls, extra="allow"):
@@ -137,6 +136,7 @@ class Part(Named):
                 return {name: plain(v) for name, v in self if name in self.model_fields_set}
 
         Unregistered.target, Unregistered.factory = target, of.factory if of else None
+        Unregistered.name = of.name if of else target
         return Unregistered.read(values)
 
 

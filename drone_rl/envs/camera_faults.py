@@ -204,7 +204,7 @@ class Shift(_BuiltInFault):
 class Blur(PixelTransform):
     """Blur images (*, C, H, W) by a Gaussian; it has no memory and samples nothing."""
 
-    def __init__(self, width: float = settings.Blur.width) -> None:
+    def __init__(self, width: float = settings.Blur().width) -> None:
         """See `drone_rl.config.transforms.Blur`."""
         super().__init__()
         self.values = settings.Blur(width=width)

@@ -87,10 +87,15 @@ def input_error(
         text = str(details.get("ctx", {}).get("error", details["msg"]))
         return InputError(f"{place}.{text}" if place else text)
     _, _, rest = details["msg"].partition(" should ")
-    reason = f"must {rest}" if rest else details["msg"][:1].lower() + details["msg"][1:]
+    reason = (
+        f"must {rest.replace(' after validation', '')}"
+        if rest
+        else details["msg"][:1].lower() + details["msg"][1:]
+    )
     if details["type"] == "literal_error":
         reason += did_you_mean(details["input"], re.findall(r"'([^']+)'", reason))
-    return InputError(f"{place}={shown(details['input'])}: it {reason}")
+    value = f"{place}={shown(details['input'])}" if place else shown(details["input"])
+    return InputError(f"{value}: it {reason}")
 
 
 def _place(details: ErrorDetails, where: str) -> str:

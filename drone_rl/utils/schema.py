@@ -8,12 +8,23 @@ import dataclasses
 import functools
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Protocol
 
-import pydantic
-from annotated_types import MaxLen, MinLen
-from pydantic_core import CoreSchema, PydanticCustomError
+from annotated_types import MaxLen, MinLen, Predicate
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    GetCoreSchemaHandler,
+    Strict,
+    Tag,
+    TypeAdapter,
+    ValidationError,
+)
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.errors import shown as shown
@@ -37,35 +48,29 @@ class Annotation:
     hint: Any
     unit: str = ""
     """Unit, for documentation."""
+    reason: str = ""
+    """Why a value is refused, as in "must be true or false"; "" for pydantic's reasons."""
 
     def read(self, value: Any, where: str) -> Any:
         """See `Kind`."""
         try:
             return self._adapter.validate_python(as_plain(value))
-        except pydantic.ValidationError as error:
+        except ValidationError as error:
             raise input_error(error, where=where) from None
 
     @functools.cached_property
-    def _adapter(self) -> pydantic.TypeAdapter[Any]:
-        config = pydantic.ConfigDict(arbitrary_types_allowed=True, allow_inf_nan=False)
+    def _adapter(self) -> TypeAdapter[Any]:
+        config = ConfigDict(arbitrary_types_allowed=True, allow_inf_nan=False)
         hint = Annotated[Any, self]
-        return pydantic.TypeAdapter(hint, config=config)
+        return TypeAdapter(hint, config=config)
 
     def __get_pydantic_core_schema__(
-        self, source: Any, handler: pydantic.GetCoreSchemaHandler
+        self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        return handler.generate_schema(self.hint)
-
-
-def check_by(test: Callable[[Any], bool], reason: str) -> pydantic.AfterValidator:
-    """Return a validator that refuses values for which a test fails, with a reason, "must ..."."""
-
-    def check(value: Any) -> Any:
-        if not test(value):
-            raise PydanticCustomError("refused", "{reason}", {"reason": reason})
-        return value
-
-    return pydantic.AfterValidator(check)
+        schema = handler.generate_schema(self.hint)
+        if not self.reason:
+            return schema
+        return core_schema.custom_error_schema(schema, "kind", custom_error_message=self.reason)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -80,7 +85,12 @@ class Whole(Annotation):
     def hint(self) -> Any:
         """See `Annotation`."""
         high = None if self.high == math.inf else int(self.high)
-        return Annotated[int, pydantic.Field(strict=True, ge=self.low, le=high)]
+        return Annotated[int, Field(strict=True, ge=self.low, le=high)]
+
+    @property
+    def reason(self) -> str:
+        """See `Annotation`."""
+        return f"must be {self.words}"
 
     @property
     def words(self) -> str:
@@ -110,7 +120,12 @@ class Real(Annotation):
             "lt" if self.is_below else "le": self.high,
         }
         bounds = {name: bound for name, bound in bounds.items() if abs(bound) != math.inf}
-        return Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False, **bounds)]
+        return Annotated[float, Field(strict=True, allow_inf_nan=False, **bounds)]
+
+    @property
+    def reason(self) -> str:
+        """See `Annotation`."""
+        return f"must be {self.words}"
 
     @property
     def words(self) -> str:
@@ -130,8 +145,9 @@ class Real(Annotation):
 class Flag(Annotation):
     """True or false."""
 
-    hint = Annotated[bool, pydantic.Field(strict=True)]
+    hint = Annotated[bool, Strict()]
     words = "true or false"
+    reason = "must be true or false"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -170,8 +186,12 @@ class Text(Annotation):
     @property
     def hint(self) -> Any:
         """See `Annotation`."""
-        printable = check_by(str.isprintable, "must be one line of printable characters")
-        return Annotated[str, pydantic.Field(strict=True, max_length=self.longest), printable]
+        return Annotated[str, Strict(), MaxLen(self.longest), Predicate(str.isprintable)]
+
+    @property
+    def reason(self) -> str:
+        """See `Annotation`."""
+        return f"must be one line of at most {self.longest} printable characters"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -184,11 +204,15 @@ class FileName(Annotation):
     @property
     def hint(self) -> Any:
         """See `Annotation`."""
-        reason = (
+        return Annotated[Text().hint, Predicate(self._is_name)]
+
+    @property
+    def reason(self) -> str:
+        """See `Annotation`."""
+        return (
             f"must be a name of at most {self.longest} bytes without / and \\, not beginning with "
             "a dot, ~, - or a space"
         )
-        return Annotated[Text().hint, check_by(self._is_name, reason)]
 
     def _is_name(self, text: str) -> bool:
         is_short = 0 < len(text.encode(errors="replace")) <= self.longest
@@ -232,11 +256,10 @@ class Span(Annotation):
     def hint(self) -> Any:
         """See `Annotation`."""
         value = Annotated[Any, self.kind]
-        ordered = check_by(_is_rising, "must have the lower value first")
+        ends = Annotated[tuple[value, value], AfterValidator(_rising)]
         return Annotated[
-            Annotated[value, pydantic.Tag("(value)")]
-            | Annotated[tuple[value, value], ordered, pydantic.Tag("(range)")],
-            pydantic.Discriminator(self._tag),
+            Annotated[value, Tag("(value)")] | Annotated[ends, Tag("(range)")],
+            Discriminator(self._tag),
         ]
 
     def _tag(self, value: Any) -> str:
@@ -245,9 +268,11 @@ class Span(Annotation):
         return "(range)" if is_pair and is_nested == isinstance(self.kind, Several) else "(value)"
 
 
-def _is_rising(ends: tuple[Any, Any]) -> bool:
+def _rising(ends: tuple[Any, Any]) -> tuple[Any, Any]:
     low, high = (end if isinstance(end, tuple) else (end,) for end in ends)
-    return all(least <= most for least, most in zip(low, high, strict=True))
+    if any(least > most for least, most in zip(low, high, strict=True)):
+        raise PydanticCustomError("order", "must have the lower value first")
+    return ends
 
 
 @dataclasses.dataclass(frozen=True)
@@ -262,13 +287,15 @@ class Listed(Annotation):
     def hint(self) -> Any:
         """See `Annotation`."""
         return Annotated[
-            tuple[Annotated[str, Text()], ...],
-            pydantic.BeforeValidator(lambda v: (v,) if isinstance(v, str) else v),
-            check_by(
-                lambda names: 0 < len(names) == len({*names}) <= self.most,
-                f"must name {self.words}, each once, at most {self.most}",
-            ),
+            tuple[Text().hint, ...],
+            BeforeValidator(lambda names: (names,) if isinstance(names, str) else names),
+            Predicate(lambda names: 0 < len(names) == len({*names}) <= self.most),
         ]
+
+    @property
+    def reason(self) -> str:
+        """See `Annotation`."""
+        return f"must name {self.words}, each once, at most {self.most}"
 
     @property
     def words(self) -> str:

@@ -23,6 +23,7 @@ from drone_rl.utils.models import Model
 from drone_rl.utils.schema import as_plain
 
 S = TypeVar("S", bound="Settings")
+_NUMBERS = (int, float, int | None, float | None)
 
 
 class Settings(Model):
@@ -41,6 +42,7 @@ class Settings(Model):
         use_attribute_docstrings=False,  # reading the source is slow; see `meanings`
         coerce_numbers_to_str=True,  # folder=2024 on the command line is a number for Hydra
         str_max_length=4000,
+        validate_default=True,
     )
 
     @classmethod
@@ -48,7 +50,7 @@ class Settings(Model):
         """Let numbers without a kind be strict, too: "3" is none, and true is no 1."""
         super().__pydantic_init_subclass__(**kwargs)
         for field in cls.model_fields.values():
-            if {field.annotation} & {int, float, int | None, float | None}:
+            if not field.metadata and field.annotation in _NUMBERS:
                 field.metadata.append(pydantic.Strict())
 
     @pydantic.field_validator("*", mode="before")
@@ -121,6 +123,13 @@ def inner_types(hint: Any) -> tuple[Any, ...]:
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
         return tuple(t for of in arguments if of is not types.NoneType for t in inner_types(of))
     return (hint,)
+
+
+def unit_of(hint: Any) -> str:
+    """Return the unit of an annotation, or kind, or of the values inside it; "" for none."""
+    kind, *_ = inner_types(hint)
+    inner = getattr(kind, "kind", None)
+    return getattr(kind, "unit", "") or ("" if inner is None else unit_of(inner))
 
 
 @functools.cache

@@ -274,9 +274,9 @@ def _check_support(settings: TrainSettings) -> None:
     """Raise the InputError with which a proof would refuse the trained policy."""
     described = describe(settings)
     require_cubes(described, "proofs")
-    network, gap = described.build_network(torch.Generator()), ProveSettings.logit_gap
+    network, gap = described.build_network(torch.Generator()), ProveSettings().logit_gap
     with closing(make_policy_spec(described, network, gap, settings.renderer)) as spec:
-        partition_placements(spec, ProveSettings.most_combinations)
+        partition_placements(spec, ProveSettings().most_combinations)
 
 
 def _learn(

@@ -248,8 +248,8 @@ def test_domain_files_are_valid_requirements(read):
             "fog: {low: 60, high: 40, unit: m of sight}",
             r"\[60.0, 40.0\] must be one or two",
         ),
-        ("fog: {low: sixty, unit: m of sight}", "fog.low='sixty' is out of range"),
-        ("fog: {high: .inf, unit: m of sight}", "fog.high=inf is out of range"),
+        ("fog: {low: sixty, unit: m of sight}", "fog.low='sixty'"),
+        ("fog: {high: .inf, unit: m of sight}", "fog.high=inf"),
         (
             "camera_yaw: {low: -5, high: 5, unit: degrees}",
             r"camera_yaw: \[-5.0, 5.0\] must be one or two rising numbers of 0 or more",

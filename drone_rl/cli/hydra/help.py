@@ -24,6 +24,7 @@ from drone_rl.utils.settings import (
     hints_of,
     inner_types,
     meanings,
+    unit_of,
 )
 
 _NOT_SHOWN = ("hydra", "paths")
@@ -130,10 +131,11 @@ def _described(
     `values` are composed ones, which name the variants of parts.
     """
     for name, hint in hints_of(cls).items():
-        kinds, key, inside = inner_types(hint), prefix + name, values.get(name)
-        units = (getattr(getattr(kind, "kind", kind), "unit", "") for kind in kinds)
-        yield key, meanings(cls).get(name, ""), next(filter(None, units), "")
-        for of, part, below in _inner(kinds[0], inside if isinstance(inside, Mapping) else {}):
+        key, inside = prefix + name, values.get(name)
+        yield key, meanings(cls).get(name, ""), unit_of(hint)
+        for of, part, below in _inner(
+            inner_types(hint)[0], inside if isinstance(inside, Mapping) else {}
+        ):
             yield f"{key}{part}", about(of) if part else meanings(cls).get(name, ""), ""
             yield from _described(of, below, f"{key}{part}.")
 

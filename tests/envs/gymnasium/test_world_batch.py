@@ -46,8 +46,8 @@ def test_options_set_task_and_camera(task):
             r"unexpected keyword argument 'num_cube'; valid names: .*observations, .*"
             r"; did you mean num_cubes\?$",
         ),
-        ({"num_cubes": 0}, "num_cubes=0 is out of range"),
-        ({"render_mode": "human"}, "render_mode='human' is unknown; give rgb_array"),
+        ({"num_cubes": 0}, "num_cubes=0"),
+        ({"render_mode": "human"}, "render_mode='human': it must be 'rgb_array'"),
         ({"camera": {"fov": 3}}, "camera.fov is unknown; valid names: width"),
         ({"camera": 64}, "camera=64 is no CameraSettings"),
         ({"device": "tpu"}, "device=tpu is unknown"),

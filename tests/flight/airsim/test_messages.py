@@ -46,7 +46,7 @@ def test_frames_by_hand():
         (lambda v: messages.number(v, "x"), math.nan, "x=nan is not a number"),
         (lambda v: messages.whole(v, "n", 0, 9), 1.5, "n=1.5 is out of range; give 0 to 9"),
         (lambda v: messages.whole(v, "n", 0, 9), 10, "n=10 is out of range; give 0 to 9"),
-        (lambda v: messages.flag(v, "b"), "yes", "b='yes' is neither true nor false"),
+        (lambda v: messages.flag(v, "b"), "yes", "b='yes': it must be true or false"),
         (lambda v: messages.text(v, "t"), 7, "t=7 is not a text"),
         (lambda v: messages.text(v, "t"), "x" * 10_001, "is not a text"),
         (messages.read_pose, 7, "pose=7 is not a map"),

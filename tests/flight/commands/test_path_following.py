@@ -113,7 +113,7 @@ def test_forward_only_looks_where_it_goes_and_else_where_it_looked(body):
 def test_what_does_not_go_together(body):
     with pytest.raises(InputError, match="direction of travel; give is_rate=False"):
         YawControl(body, "forward_only", YawMode(True, 10.0))
-    with pytest.raises(InputError, match="drivetrain='sideways' is unknown; give forward_only, "):
+    with pytest.raises(InputError, match="drivetrain='sideways': it must be 'forward_only'"):
         YawControl(body, "sideways")
     with pytest.raises(InputError, match=r"yaw_mode=\(False, 9\) is not a YawMode"):
         YawControl(body, "forward_only", (False, 9))
@@ -122,7 +122,7 @@ def test_what_does_not_go_together(body):
 
 
 def test_whether_it_is_a_rate_is_true_or_false():
-    with pytest.raises(InputError, match="is_rate='no' is neither true nor false"):
+    with pytest.raises(InputError, match="is_rate='no': it must be true or false"):
         YawMode(is_rate="no", yaw_or_rate=45)
 
 

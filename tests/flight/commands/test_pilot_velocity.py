@@ -33,7 +33,7 @@ def test_the_body_frame_turns_with_the_drone(hovering_pilot):
 def test_a_body_frame_and_forward_only_are_incompatible(hovering_pilot):
     with pytest.raises(InputError, match="frame=body turns with the drone"):
         hovering_pilot.move_by_velocity(1, 0, frame="body", drivetrain="forward_only")
-    with pytest.raises(InputError, match="frame='moon' is unknown; give world, body"):
+    with pytest.raises(InputError, match="frame='moon': it must be 'world' or 'body'"):
         hovering_pilot.move_by_velocity(1, 0, frame="moon")
 
 
