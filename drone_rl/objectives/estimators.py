@@ -75,7 +75,7 @@ class ReturnEstimator(Transform, abc.ABC):
         """
         read, written = [reward_key, done_key], [out_key]
         super().__init__(in_keys=read, out_keys=written, in_keys_inv=read, out_keys_inv=written)
-        self.scale = self.Settings.scale if scale is None else scale
+        self.scale = self.Settings().scale if scale is None else scale
         self._is_contained = False
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:

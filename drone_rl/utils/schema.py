@@ -230,6 +230,10 @@ class Maybe(Annotation):
         """See `Annotation`."""
         return Annotated[Any, self.kind] | None
 
+    def read(self, value: Any, where: str) -> Any:
+        """See `Kind`."""
+        return None if value is None else self.kind.read(value, where)
+
 
 @dataclasses.dataclass(frozen=True)
 class Several(Annotation):
@@ -244,6 +248,13 @@ class Several(Annotation):
         """See `Annotation`."""
         values = tuple[Annotated[Any, self.kind], ...]
         return Annotated[values, MinLen(self.least), MaxLen(self.most)]
+
+    def read(self, value: Any, where: str) -> tuple[Any, ...]:
+        """See `Kind`."""
+        if isinstance(self.kind, Annotation):
+            return super().read(value, where)
+        items = Several(Instance(object), self.least, self.most).read(value, where)
+        return tuple(self.kind.read(item, f"{where}[{i}]") for i, item in enumerate(items))
 
 
 @dataclasses.dataclass(frozen=True)

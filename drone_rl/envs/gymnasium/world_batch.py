@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.config import (
-    ActionSettings,
     BaseTaskSettings,
     CameraSettings,
-    DynamicsSettings,
     TaskSettings,
 )
 from drone_rl.config.commands import GymnasiumSettings
@@ -88,17 +86,6 @@ METADATA: dict[str, Any] = {
     "render_fps": round(1 / CONTROL_TIMESTEP_S),
 }
 """Metadata of every environment; the frame rate is that of the default control step."""
-_PARTS: dict[str, type[Settings]] = {
-    "camera": CameraSettings,
-    "dynamics": DynamicsSettings,
-    "actions": ActionSettings,
-}
-"""Options that accept a mapping with some of their settings."""
-FILM_HEIGHT, FILM_WIDTH = 360, 640
-"""Size in pixels of the images of `render`, which show the drone from behind."""
-END = "end_reason"
-Chosen = str | BaseTaskSettings | Task[Any] | None
-"""A task, its settings or its registered name; cube collection by default."""
 
 
 class KeywordError(InputError, TypeError):

@@ -114,7 +114,7 @@ def test_invalid_settings_raise():
     assert as_task(task) is task
     assert isinstance(as_task("pillars"), Pillars)
     assert as_task("collect_cubes").settings == TaskSettings()
-    with pytest.raises(InputError, match="task='pillar' is unknown; valid names: collect_cubes, p"):
+    with pytest.raises(InputError, match="task='pillar': it must be one of collect_cubes, p"):
         as_task("pillar")
     with pytest.raises(InputError, match=r"task=\(dict\) is no task; give one of collect_cubes"):
         as_task({"num_cubes": 1})
@@ -144,19 +144,8 @@ class WithText(BaseTaskSettings):
     cost: float = "0.005"
 
 
-class WithUnion(BaseTaskSettings):
-    name: ClassVar[str] = "mine"
-    cost: int | str = 3
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        (WithText, r"^WithText\.cost='0\.005': it must be a valid number$"),
-        (WithUnion, r"^WithUnion\.cost is of type int \| str; annotate it with a kind"),
-    ],
-)
-def test_mistakes_in_settings_are_named_when_their_task_is_registered(settings, message):
+def test_mistakes_in_settings_are_named_when_their_task_is_registered():
+    settings, message = WithText, r"^WithText\.cost='0\.005': it must be a valid number$"
     with pytest.raises(InputError, match=message):
         register_task(settings, lambda _: Posts())
     assert "mine" not in TASKS
