@@ -118,7 +118,7 @@ def _may_be(hint: Any) -> str:
     """The allowed values of an annotation, or of a kind, in words."""
     (kind, *_) = inner_types(hint)
     if isinstance(kind, Maybe) or type(None) in typing.get_args(hint):
-        return f"{_may_be(getattr(kind, 'kind', kind))}; or null"
+        return f"{_may_be(kind.kind if isinstance(kind, Maybe) else kind)}; or null"
     of = getattr(kind, "of", kind)
     if isinstance(kind, Changes):
         return f"changes to the policy's {_link(kind.of or BaseTaskSettings)}"

@@ -128,7 +128,7 @@ def _names(name: str, conf: Path, words: Sequence[str]) -> list[str]:
 def _meant(name: str, conf: Path, keys: Collection[str]) -> str:
     """Return a hint at the setting that is like a name, or the choice of a group that has it."""
     group = name.partition(".")[0]
-    is_choice = group in keys and name not in keys
+    is_choice = group in keys and name not in keys and group != "hydra"
     for choice in choices(conf, group) if is_choice else ():
         with contextlib.suppress(OSError):  # a file
             values: Any = ConfigStore.instance().load(f"{group}/{choice}.yaml").node

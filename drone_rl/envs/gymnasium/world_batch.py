@@ -87,6 +87,12 @@ METADATA: dict[str, Any] = {
 }
 """Metadata of every environment; the frame rate is that of the default control step."""
 
+FILM_HEIGHT, FILM_WIDTH = 360, 640
+"""Size in pixels of the images of `render`, which show the drone from behind."""
+END = "end_reason"
+Chosen = str | BaseTaskSettings | Task[Any] | None
+"""A task, its settings or its registered name; cube collection by default."""
+
 
 class KeywordError(InputError, TypeError):
     """An option that does not exist; a `TypeError`, by which TorchRL's `GymEnv` probes options."""

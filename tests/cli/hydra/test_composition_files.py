@@ -96,7 +96,7 @@ def test_unknown_names_are_refused_by_hydra(override, config):
     [
         ("task.num_cubes=three", "task.num_cubes='three': it must be a whole number from 1 to 100"),
         ("transforms.standardize.mean=x", "transforms.standardize.mean='x': it must be a number"),
-        ("network._target_=mpl", "network._target_='mpl': .*did you mean mlp"),
+        ("network._target_=small", "network._target_='small': it must be one of small_cnn"),
         ("+network.rows=3", "network.rows is unknown; valid names: patch"),
         ("+task.cubes=3", r"task.cubes is unknown; .*did you mean num_cubes\?"),
     ],
