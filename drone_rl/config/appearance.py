@@ -32,6 +32,19 @@ _Place = Span(Several(Real(-10.0, 10.0, unit="m"), 3, 3))
 _Turn = Span(Several(Real(-90.0, 90.0, unit="degrees"), 3, 3))
 
 
+def _read_preset(name: str) -> dict[str, Any]:
+    """Return the values of a file in conf/appearance; minimal are the defaults, without a file."""
+    files = {path.stem: path for path in sorted((conf_dir() / "appearance").glob("*.yaml"))}
+    if name == "minimal":
+        return {}
+    if name not in files:
+        names = ("minimal", *files)
+        reason = f"must be one of {', '.join(names)}{did_you_mean(name, names)}"
+        raise PydanticCustomError("name", "{reason}", {"reason": reason})
+    values = yaml.safe_load(files[name].read_text("utf-8"))
+    return {**_read_preset(values.pop("defaults")[0]), **values}
+
+
 class AppearanceSettings(Settings):
     """Sun, sky, fog, colors, textures, distractors, and the mounting of the policy's camera.
 
@@ -90,19 +103,8 @@ class AppearanceSettings(Settings):
 
     @pydantic.model_validator(mode="before")
     @classmethod
-    def _preset(cls, data: Any) -> Any:
-        """Read a name as that of a file in conf/appearance, such as "fog"; minimal is no file."""
-        if not isinstance(data, str):
-            return data
-        files = {path.stem: path for path in sorted((conf_dir() / "appearance").glob("*.yaml"))}
-        if data == "minimal":
-            return {}
-        if data not in files:
-            names = ("minimal", *files)
-            reason = f"must be one of {', '.join(names)}{did_you_mean(data, names)}"
-            raise PydanticCustomError("name", "{reason}", {"reason": reason})
-        values = yaml.safe_load(files[data].read_text("utf-8"))
-        return {**cls._preset(values.pop("defaults")[0]), **values}
+    def _from_name(cls, data: Any) -> Any:
+        return _read_preset(data) if isinstance(data, str) else data
 
     @property
     def is_minimal(self) -> bool:

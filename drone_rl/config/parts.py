@@ -129,7 +129,10 @@ class Part(Named):
         if of is not None and ("." not in of.target or values.keys() <= of.model_fields.keys()):
             return of.read(values)
 
-        class Unregistered(of or cls, extra="allow"):
+        base: Any = of or cls
+
+        class Unregistered(base):
+            model_config = pydantic.ConfigDict(extra="allow")
             is_known: ClassVar[bool] = False
 
             def values(self) -> dict[str, Any]:

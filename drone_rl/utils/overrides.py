@@ -42,7 +42,10 @@ _TAKEN_OVER = (
 
 class _Command(Annotation):
     hint = Annotated[Text(20_000).hint, Predicate(lambda text: _is_safe_command(text))]
-    reason = "must be a training command: drone-rl train and settings, each quoted for a shell"
+
+    @property
+    def reason(self) -> str:
+        return "must be a training command: drone-rl train and settings, each quoted for a shell"
 
 
 def _is_safe_command(text: str) -> bool:

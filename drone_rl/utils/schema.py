@@ -48,8 +48,11 @@ class Annotation:
     hint: Any
     unit: str = ""
     """Unit, for documentation."""
-    reason: str = ""
-    """Why a value is refused, as in "must be true or false"; "" for pydantic's reasons."""
+
+    @property
+    def reason(self) -> str:
+        """Why a value is refused, as in "must be true or false"; "" for pydantic's reasons."""
+        return ""
 
     def read(self, value: Any, where: str) -> Any:
         """See `Kind`."""
@@ -147,7 +150,11 @@ class Flag(Annotation):
 
     hint = Annotated[bool, Strict()]
     words = "true or false"
-    reason = "must be true or false"
+
+    @property
+    def reason(self) -> str:
+        """See `Annotation`."""
+        return f"must be {self.words}"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -228,7 +235,8 @@ class Maybe(Annotation):
     @property
     def hint(self) -> Any:
         """See `Annotation`."""
-        return Annotated[Any, self.kind] | None
+        value: Any = Annotated[Any, self.kind]
+        return value | None
 
     def read(self, value: Any, where: str) -> Any:
         """See `Kind`."""
@@ -268,10 +276,8 @@ class Span(Annotation):
         """See `Annotation`."""
         value = Annotated[Any, self.kind]
         ends = Annotated[tuple[value, value], AfterValidator(_rising)]
-        return Annotated[
-            Annotated[value, Tag("(value)")] | Annotated[ends, Tag("(range)")],
-            Discriminator(self._tag),
-        ]
+        tagged: Any = Annotated[value, Tag("(value)")]
+        return Annotated[tagged | Annotated[ends, Tag("(range)")], Discriminator(self._tag)]
 
     def _tag(self, value: Any) -> str:
         is_pair = isinstance(value, list | tuple) and len(value) == 2

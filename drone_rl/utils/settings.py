@@ -5,7 +5,6 @@ A setting is defined in one such field, which checks files, Hydra's values and P
 
 import ast
 import contextlib
-import functools
 import inspect
 import itertools
 import re
@@ -108,7 +107,6 @@ def conf_dir() -> Path:
     return checkout if (checkout / "train.yaml").is_file() else package / "conf"
 
 
-@functools.cache
 def hints_of(cls: type[Settings]) -> Mapping[str, Any]:
     """Return the annotation of each field, in order."""
     hints = typing.get_type_hints(cls, include_extras=True)
@@ -132,7 +130,6 @@ def unit_of(hint: Any) -> str:
     return getattr(kind, "unit", "") or ("" if inner is None else unit_of(inner))
 
 
-@functools.cache
 def meanings(cls: type[Settings]) -> Mapping[str, str]:
     """Return the docstring of each field of a class, inherited fields included."""
     texts: dict[str, str] = {}
@@ -145,9 +142,9 @@ def meanings(cls: type[Settings]) -> Mapping[str, str]:
 
 def _docstrings(body: list[Any]) -> Iterator[tuple[str, str]]:
     for field, below in itertools.pairwise(body):
-        is_text = isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
-        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and is_text:
-            yield field.target.id, " ".join(str(below.value.value).split())
+        match field, below:
+            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=text)):
+                yield name, " ".join(str(text).split())
 
 
 def about(cls: type) -> str:

@@ -18,7 +18,6 @@ from drone_rl.config import TASKS
 from drone_rl.explanations import report
 from drone_rl.explanations.report import page as report_page
 from drone_rl.sim.tasks.task import MAKERS
-from drone_rl.utils.settings import hints_of
 from tests.docs.commands import check_commands
 from tests.explanations.quick import few_sections, quick_figures
 from tools.docs import session
@@ -121,7 +120,6 @@ def workplace(tmp_path, monkeypatch):
     for name in set(sys.modules) - known:
         if str(tmp_path) in str(getattr(sys.modules[name], "__file__", "")):
             del sys.modules[name]
-    hints_of.cache_clear()
     gc.collect()
     gc.unfreeze()
 

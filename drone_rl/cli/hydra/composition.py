@@ -104,7 +104,8 @@ def store_defaults(commands: Mapping[str, type[CommandSettings]]) -> None:
 
 def _defaults_of(command: type[CommandSettings]) -> tuple[dict[str, str | None], dict[str, Any]]:
     """Return the choice of each group of a command, and its other values."""
-    groups, values = {}, {"plugins": []}
+    groups: dict[str, str | None] = {}
+    values: dict[str, Any] = {"plugins": []}
     for name, value in command():
         (kind, *_) = inner_types(hints_of(command)[name])
         if name in GROUPS:

@@ -130,13 +130,14 @@ def _described(
 
     `values` are composed ones, which name the variants of parts.
     """
+    texts = meanings(cls)
     for name, hint in hints_of(cls).items():
         key, inside = prefix + name, values.get(name)
-        yield key, meanings(cls).get(name, ""), unit_of(hint)
+        yield key, texts.get(name, ""), unit_of(hint)
         for of, part, below in _inner(
             inner_types(hint)[0], inside if isinstance(inside, Mapping) else {}
         ):
-            yield f"{key}{part}", about(of) if part else meanings(cls).get(name, ""), ""
+            yield f"{key}{part}", about(of) if part else texts.get(name, ""), ""
             yield from _described(of, below, f"{key}{part}.")
 
 
