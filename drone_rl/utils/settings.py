@@ -65,10 +65,6 @@ class Settings(Model):
     def check(self) -> None:
         """Raise an `InputError` if valid values don't go together."""
 
-    def replace(self, **changes: Any) -> Self:
-        """Return a copy with other values; raise an `InputError` for unknown or invalid ones."""
-        return type(self)(**{**dict(self), **changes})
-
     def as_base(self, cls: type[S]) -> S:
         """Return these settings as an instance of a base class, without the fields it lacks."""
         return cls(**{name: getattr(self, name) for name in cls.model_fields})
