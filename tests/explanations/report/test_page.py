@@ -174,7 +174,9 @@ def with_intervals(value):
 def test_a_robustness_evaluation_is_shown(changed, tmp_path):
     arrays = {f"shifts_{name}": np.zeros((6, 5, 16, 3), np.uint8) for name in SHIFTS["axes"]}
     with quick_figures():
-        text = write_report([changed(arrays, shifts=with_intervals(SAVED_SHIFTS))], tmp_path).read_text()
+        text = write_report(
+            [changed(arrays, shifts=with_intervals(SAVED_SHIFTS))], tmp_path
+        ).read_text()
     part = text[text.index('<section id="shifts">') :].split("</section>")[0]
     assert "the sun at 21.1 to 60 degrees" in part and part.count("data:image/svg") == 3 + 1
     assert "not measured again here" in part and "<td>elevation of the sun</td>" in part

@@ -161,7 +161,9 @@ def test_the_summary_says_no_more_than_was_measured():
     assert "2 of 3 perturbations" in line("robustness", shifts)
     same = changed(SAVED_SHIFTS, {"shifts.axes.blur.levels.1.modes.constant.unchanged": True})
     assert "1 of 2 perturbations" in line("robustness", {**shifts, "shifts": same})
-    assert "another task" in line("robustness", {"shifts": {"path": "a", "refused": "it is of another task"}})
+    assert "another task" in line(
+        "robustness", {"shifts": {"path": "a", "refused": "it is of another task"}}
+    )
     assert "Not measured" in line("robustness")
     assert "1,000 rollouts" in line("certificate", {"verdict.proof": PROOF})
     unchecked = {"verdict.proof": {**PROOF, "wrong_at_most": None}}
