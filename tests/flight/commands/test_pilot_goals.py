@@ -86,5 +86,5 @@ def test_sticks(pilot):
         assert goals(pilot)[1] == pytest.approx(expected)
     pilot.body.position[0, 2], pilot.sticks = 1.0, Sticks(throttle=-1.0)
     assert goals(pilot)[1][3] == 0.0
-    with pytest.raises(InputError, match=r"roll=1\.1 is out of range"):
+    with pytest.raises(InputError, match=r"roll=1\.1: it must be"):
         Sticks(roll=1.1)
