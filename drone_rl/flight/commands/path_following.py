@@ -77,7 +77,7 @@ class YawControl:
         By default the drone holds its heading or, with `Drivetrain.FORWARD_ONLY`, faces its
         direction of travel; the latter can't be combined with a rate.
         """
-        drivetrain = OneOf(tuple(Drivetrain)).read(drivetrain, "drivetrain")
+        drivetrain = OneOf(tuple(kind.value for kind in Drivetrain)).read(drivetrain, "drivetrain")
         self.is_forward = drivetrain == Drivetrain.FORWARD_ONLY
         self.yaw_mode = yaw_mode or YawMode()
         if not isinstance(self.yaw_mode, YawMode):
