@@ -19,11 +19,11 @@ from drone_rl.policies import MLP
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import RootSeed
+from tests.evidence import VERDICT
 from tests.explanations.quick import ALL_SECTIONS, quick
 from tests.second_task import NUM_POSTS, Posts
 
 SEED = RootSeed(6, is_fixed=False)
-from tests.evidence import VERDICT
 
 
 def test_policies_of_the_same_name_are_named_by_their_files():
