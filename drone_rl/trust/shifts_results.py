@@ -199,7 +199,7 @@ class NetworkIdentity(Stored):
     @property
     def camera_faults(self) -> list[str]:
         """Camera faults that the policy's transforms simulate."""
-        faults = {fault.registered_name() for fault in Fault.__subclasses__()}
+        faults = {fault.name for fault in Fault.__subclasses__()}
         names = [step["name"] for step in self.description.get("transforms", ())]
         return [name for name in names if name in faults]
 

@@ -17,12 +17,10 @@ from benchmarks.robust_comparison import (
     untouched_kinds,
 )
 from drone_rl.config import AppearanceSettings, CameraSettings, TaskSettings
-from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainSettings
 from drone_rl.config.transforms import Blur, Fault, Gray, LateFrames, Noise, Shift, Standardize
 from drone_rl.trust.axes import AXES, GROUPS
 from drone_rl.trust.paired_evaluation import PairedEvaluator
-from drone_rl.utils.settings import snake_case
 from tests.trust.making import shifts_of
 from tests.trust.subjects import Blind, subject
 
@@ -54,7 +52,7 @@ def test_gains_and_costs_by_hand(setup, monkeypatch):
         exposure=(0.5, 2.0), fog_visibility=(40.0, 100.0), ground_color=((0, 0, 0), (1, 1, 1))
     )
     steps = (Gray(), Noise(), Shift(), Standardize())
-    config = as_config(TrainSettings(appearance=appearance, transforms=steps))
+    config = TrainSettings(appearance=appearance, transforms=steps).config()
     monkeypatch.setattr(robust, "train", lambda run, seed, *_: (1.0, {"frames": int(seed[5:])}))
     monkeypatch.setattr(robust, "read_checkpoint", lambda path: {"config": config})
     monkeypatch.setattr(robust, "success_rates", success_rates)
@@ -92,8 +90,9 @@ def test_a_training_is_exposed_to_the_axes_of_its_settings(settings, axes):
 
 def test_every_setting_of_appearance_and_every_fault_belongs_to_an_axis():
     named = {name for names in TOUCHED_BY.values() for name in names}
-    appearance = {f"appearance.{field.name}" for field in dataclasses.fields(AppearanceSettings)}
-    assert appearance | {f"transforms.{snake_case(f)}" for f in (Blur, *Fault.variants())} <= named
+    appearance = {f"appearance.{name}" for name in AppearanceSettings.model_fields}
+    faults = {f"transforms.{fault.name}" for fault in (Blur, *Fault.__subclasses__())}
+    assert appearance | faults <= named
 
 
 def test_impossible_strengths_are_left_out():

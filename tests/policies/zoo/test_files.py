@@ -107,7 +107,7 @@ def test_checkpoint_is_read_by_its_description(tmp_path):
         (exported() + b"1", "weights are damaged"),
         (exported(format="drone_rl checkpoint"), "not a drone_rl policy"),
         (exported(about={"extra": 1}), "'extra' is unknown"),
-        (exported(about={"command": "drone-rl train; rm -rf /"}), "not a training command"),
+        (exported(about={"command": "drone-rl train; rm -rf /"}), "must be a training command"),
         (exported(about={"progress": {**PROGRESS, "frames": -1}}), "frames=-1"),
         (exported(about={"verdict": {"a": "b\nc"}}), "a text in"),
         (exported(about={"seed": 0.5}), r"seed=0\.5"),

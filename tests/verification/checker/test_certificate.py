@@ -73,7 +73,7 @@ def test_check_same_policy_and_task(parsed, policy):
         (["outcomes", 0, "collected"], [True, True], "has 2 values; give 1"),
         (["outcomes", 0, "share"], 1.5, r"outcomes\[0\]\.share=1\.5"),
         (["outcomes", 0, "steps"], {"007": 0.1}, "'007' is not a number of steps"),
-        (["outcomes", 0, "steps"], {"12": 0.0}, r"steps\.12=0\.0 is out of range"),
+        (["outcomes", 0, "steps"], {"12": 0.0}, r"steps\.12=0\.0: it must be"),
         (["outcomes", 0, "boxes"], [[[1.0, 2.0, 3.0]]], "the wrong shape"),
         (["outcomes", 0, "boxes"], [[[1.0, 2.0]], [[1.0]]], "the wrong shape"),
         (["outcomes", 0, "boxes"], [[["1.0", 2.0]]], "values other than numbers"),
