@@ -49,12 +49,6 @@ def test_origin_of_a_run_of_a_sweep(checkpoint):
     assert chosen == {"runs": 3, "episodes": 200}
 
 
-def test_origin_of_a_run_without_a_current_verdict(checkpoint):
-    assert choice_in_sweep(checkpoint)[1] == {"runs": 3, "episodes": None}
-    judged(checkpoint, rule="of yore")
-    assert choice_in_sweep(checkpoint)[1] == {"runs": 3, "episodes": None}
-
-
 def test_origin_of_a_single_run(checkpoint):
     (checkpoint.parents[2] / "sweep.json").unlink()
     assert choice_in_sweep(checkpoint) is None
