@@ -353,7 +353,7 @@ class Robustness(Seeded, Provenance):
             if of.positions is not None and self.axes[name].is_tested
         }
 
-    def rows(self) -> list[list[str]]:
+    def table(self) -> list[list[str]]:
         """Return the success rates as a table: a header, then a row for each axis."""
         table = [["success, constant", "1", "2", "3", "4", "5", "area", ""]]
         for name, along in self.axes.items():

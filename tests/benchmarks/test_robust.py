@@ -1,7 +1,6 @@
 """Gains of randomized training, and operating domains on every axis."""
 
 import dataclasses
-import json
 
 import pytest
 
@@ -22,7 +21,6 @@ from drone_rl.config.training import TrainSettings
 from drone_rl.config.transforms import Blur, Fault, Gray, LateFrames, Noise, Shift, Standardize
 from drone_rl.trust.axes import AXES, GROUPS
 from drone_rl.trust.paired_evaluation import PairedEvaluator
-from drone_rl.trust.shifts import ranges_of
 from tests.trust.making import shifts_of
 from tests.trust.subjects import Blind, subject
 
@@ -113,29 +111,19 @@ def test_means_by_kind_of_shift():
     assert by_kind(rates, ["light", "fog", "sensor"]) == {"light": 0.75, "fog": 0.25}
 
 
-class FakeShifts:
-    """A result of `drone_rl.shifts` for a policy that is good up to the third strength."""
-
-    def __init__(self, axes):
-        self.numbers = shifts_of(drone_rl.load_policy(domain_axes.POLICY), axes=axes)
-
-    def save(self, folder):
-        (folder / "shifts.json").write_text(json.dumps(self.numbers))
-        (folder / "domain.yaml").write_text(json.dumps(ranges_of(self.numbers)))
-
-
 @pytest.mark.parametrize("is_reversed", [False, True])
 def test_required_ranges_are_enforced_in_their_direction(setup, monkeypatch, is_reversed):
     """Reversed, for example, a largest visibility in fog is required instead of a smallest one."""
     contradictions = type("Recheck", (), {"contradictions": ()})
     axes = ("fog", "blur") if is_reversed else tuple(AXES)
-    measured = FakeShifts(axes)
+    made = shifts_of(drone_rl.load_policy(domain_axes.POLICY), axes=axes)
+    measured = drone_rl.Shifts(**dict(made.replace(image_size=(25, 64))))
     monkeypatch.setattr(domain_axes, "shifts", lambda *args, **options: measured)
     monkeypatch.setattr(domain_axes, "recheck_domain", lambda *args: contradictions)
     if is_reversed:
         monkeypatch.setattr(
             "drone_rl.trust.coverage.lacking",
-            lambda numbers, name, need: None if need["low"] is None else "reversed",
+            lambda numbers, name, need: None if need.low is None else "reversed",
         )
     figures = domain_axes.bench_domain_axes(setup)
     assert figures["domain_axes"] == len(axes)

@@ -296,7 +296,7 @@ def test_untested_axes_cover_nothing():
             r"line 2 of .* is no YAML \(fog occurs twice\); correct it",
         ),
         ("a: !!python/object/apply:os.getcwd []", "is no YAML"),
-        ("wind: {low: 1, unit: m/s}", "axis='wind' is unknown; give object_color"),
+        ("wind: {low: 1, unit: m/s}", "axis='wind': it must be 'object_color'"),
         ("fog: 60", "fog=60: .*; give low, high or both, and unit: m of sight"),
         ("fog: {low: 60, unit: km}", "fog.unit=km must be m of sight"),
         ("fog: {low: 60}", "fog.unit is missing"),

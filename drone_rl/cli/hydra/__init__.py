@@ -1,1 +1,1 @@
-"""How the command line uses Hydra: defaults, composition, launchers, sweepers, mistakes, help."""
+"""How the command line uses Hydra: defaults, composition, launchers, sweepers and messages."""
