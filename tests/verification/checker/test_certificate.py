@@ -69,7 +69,7 @@ def test_check_same_policy_and_task(parsed, policy):
         (["policy", "description", "task", "vertical_bound"], 1.0, r"vertical_bound=1\.0"),
         (["policy", "description", "task", "lateral_bound"], 0.0, r"lateral_bound=0\.0"),
         (["policy", "description", "task", "num_cubes"], 9, "num_cubes=9 is out of range"),
-        (["outcomes", 0, "end"], "running", "end='running' is unknown"),
+        (["outcomes", 0, "end"], "running", "end='running': it must be 'all_cubes'"),
         (["outcomes", 0, "collected"], [True, True], "has 2 values; give 1"),
         (["outcomes", 0, "share"], 1.5, r"outcomes\[0\]\.share=1\.5"),
         (["outcomes", 0, "steps"], {"007": 0.1}, "'007' is not a number of steps"),
