@@ -6,11 +6,49 @@ the JSON files, so that a test can change the evidence and see the sentence chan
 
 import dataclasses
 import functools
+import json
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import jinja2
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
 _ENDINGS = {1: "st", 2: "nd", 3: "rd"}
+
+
+def render(package: str, template: str, **values: Any) -> str:
+    """Return the text of a template in a package's folder `templates`.
+
+    Spaces and line breaks of templates of sentences (.j2) are one space each; those of Markdown
+    (.md.j2) stay. Templates have the functions of this module as filters.
+    """
+    text = _environment(package).get_template(template).render(**values)
+    return text if template.endswith(".md.j2") else " ".join(text.split())
+
+
+@functools.cache
+def _environment(package: str) -> "jinja2.Environment":
+    import jinja2  # most users of this module need no template
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader(package),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    filters = (percent, interval, rate, listed, plural, ordinal, setting)
+    environment.filters |= {function.__name__: function for function in filters}
+    return environment
+
+
+def setting(value: Any) -> str:
+    """Return a value as one types it in a setting."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(setting, value))}]"
+    if isinstance(value, float):
+        return f"{value:.12g}"  # without ".0"
+    return value if isinstance(value, str) else json.dumps(value)
 
 
 def bounds(interval: Mapping[str, Any], show: Callable[[float], str] = "{:.2f}".format) -> str:

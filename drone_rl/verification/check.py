@@ -19,7 +19,7 @@ from drone_rl.utils.files import as_path, newest
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.text import CHECK, say, seed_line
+from drone_rl.utils.text import CHECK, exact_percent, say, seed_line
 from drone_rl.verification.checker.certificate import (
     Certificate,
     check_same_policy,
@@ -78,8 +78,8 @@ class Check(Result):
             f"{self.policy.name}{' with ' if changed else ''}{', '.join(changed)}, "
             f"{sum(map(len, stated.groups))} boxes, {sum(self.findings.flights.values())} flights, "
             f"{self.findings.contradicted} of them ended otherwise than stated",
-            *(f"stated: {outcome.share:.9g} {outcome}" for outcome in stated.outcomes),
-            f"stated: {stated.undecided_share:.3g} undecided",
+            *(f"stated: {exact_percent(of.share)} {of}" for of in stated.outcomes),
+            f"stated: {exact_percent(stated.undecided.share)} undecided",
             *(f"refused: {line}" for line in self.findings.lines()),
             *(f"note: {line}" for line in filter(None, [say(CHECK, seed)])),
             seed_line(seed, "placements"),
@@ -122,16 +122,16 @@ def check(
     settings, seed = with_seed(from_arguments(CheckSettings, settings, changes, check))
     path = _find(certificate, outputs)
     stated = read_certificate(path)
-    if policy is None and stated.name not in policy_names():
+    if policy is None and stated.policy.name not in policy_names():
         raise InputError(
-            f"the certificate is of policy {stated.name!r}, which is none of "
+            f"the certificate is of policy {stated.policy.name!r}, which is none of "
             f"{', '.join(policy_names())}; give policy= its file"
         )
-    policy = load_policy(stated.name if policy is None else policy, outputs=outputs)
+    policy = load_policy(stated.policy.name if policy is None else policy, outputs=outputs)
     weights = policy.state["policy"]
     required = policy.in_task(**as_changes(task, "task")).task if task else None
     check_same_policy(stated, policy.description, weights, required)
-    policy = dataclasses.replace(policy, description=stated.description)
+    policy = dataclasses.replace(policy, description=stated.policy.description)
     findings = check_certificate(
         stated,
         weights,

@@ -76,16 +76,12 @@ class Claim:
             return {"refused": f"{count} ended otherwise than it states"}
         if rounding is not None and rounding.is_excessive:
             return {"refused": "decisions of the policy depend on rounding"}
-        won, lost = (
-            [o for o in stated.outcomes if len(o.boxes) and (o.end == CubesEnd.ALL_CUBES) == wins]
-            for wins in (True, False)
-        )
         return {
             "refused": None,
-            "every": not lost and not len(stated.undecided),
-            "share": sum(outcome.share for outcome in won),
-            "lost": sum(outcome.share for outcome in lost),
-            "undecided": stated.undecided_share,
+            "every": stated.is_proved,
+            "share": stated.success,
+            "lost": stated.lost,
+            "undecided": stated.undecided.share,
             "finished": stated.finished,
             "checked": self.flights,
             "wrong_at_most": self.wrong_at_most,
@@ -157,7 +153,8 @@ def _ends_as_stated(stated: Certificate, greedy: CompleteEpisodes) -> list[bool]
     outcome = _outcomes_of(stated, greedy)
     ended = zip(outcome, greedy.end_reason.tolist(), greedy.goals.reached.tolist(), strict=True)
     return [
-        (end, tuple(reached)) == (stated.outcomes[i].end, stated.outcomes[i].collected)
+        (CubesEnd(end).name.lower(), tuple(reached))
+        == (stated.outcomes[i].end, stated.outcomes[i].collected)
         for i, end, reached in ended
         if i < len(stated.outcomes)
     ]

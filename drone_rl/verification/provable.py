@@ -319,7 +319,7 @@ def _search(journal: Journal, progress: Progress) -> None:
         failures=len(places),
         losing=None if proof is None else proof.lost,
         undecided=None if proof is None else proof.undecided,
-        proof_s=None if proof is None else proof.certificate["found"]["seconds"],
+        proof_s=None if proof is None else proof.certificate.found.seconds,
         boxes=len(boxes),
     )
     journal.add(search, inflated(boxes, how.margin, journal.task.lateral_bound))
@@ -342,5 +342,5 @@ def _fly(policy: Policy, journal: Journal) -> tuple[NDArray[np.float64], int]:
 
 def _doubtful(proof: Proof) -> NDArray[np.float64]:
     """Return boxes of possible failure; of a stopped proof, only those of certain failure."""
-    is_whole = proof.certificate["finished"]
+    is_whole = proof.certificate.finished
     return np.concatenate([proof.losing(), proof.open()]) if is_whole else proof.losing()

@@ -15,7 +15,7 @@ from drone_rl.sim.tasks.collect_cubes import CubeGoals, CubesEnd
 from drone_rl.trust.rounding_sensitivity import Rounding
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import RootSeed
-from drone_rl.verification.checker.certificate import parse_certificate
+from drone_rl.verification.checker.certificate import Certificate
 from drone_rl.verification.claim import Claim, find_claim
 from tests.verification.checker.making import of_every_place, of_one_cube
 from tests.verification.checker.tampering import tampered
@@ -45,7 +45,7 @@ def good():
 
 
 def claim(policy, **how):
-    return Claim(PATH, parse_certificate(of_every_place(policy, **how)))
+    return Claim(PATH, Certificate.read(of_every_place(policy, **how)))
 
 
 ALL, BEHIND = CubesEnd.ALL_CUBES.value, CubesEnd.FRONT_BOUNDARY.value
@@ -183,7 +183,7 @@ def test_invalid_certificate_next_to_a_policy_is_refused(poor, truth, tmp_path):
     other = find_claim(poor.in_task(num_cubes=2))
     assert other.certificate is None and "another task: num_cubes=1, not 2" in other.refused
     path.write_text("{")
-    assert "no plain JSON" in find_claim(poor).refused
+    assert "is damaged" in find_claim(poor).refused
 
 
 def test_given_certificate_must_be_valid(poor, truth, tmp_path):

@@ -22,6 +22,7 @@ from drone_rl.verification.checker.certificate import (
     Certificate,
     Outcome,
     check_same_policy,
+    ending_text,
     read_certificate,
 )
 from drone_rl.verification.checker.consistency import (
@@ -95,6 +96,10 @@ class EpisodeEnds:
     collected: NDArray[np.bool_]  # (k, cubes); whether each cube was collected
     steps: NDArray[np.int64]  # (k,); number of steps
     repeats: NDArray[np.int64]  # (k,); final steps whose state equals that of two steps before
+
+    def name(self, i: int) -> str:
+        """Return the name of the end of one episode, as in certificates."""
+        return CubesEnd(self.end[i]).name.lower()
 
 
 class Simulator:
@@ -197,7 +202,7 @@ def check_certificate(
     sample = sample_placements(certificate, flights, np.random.default_rng(seed))
     stated = sample.outcome < len(certificate.outcomes)
     points, why = sample.points[stated], sample.why[stated]
-    with closing(Simulator(certificate.description, weights, device, renderer)) as simulator:
+    with closing(Simulator(certificate.policy.description, weights, device, renderer)) as simulator:
         rollouts = simulator.fly(points, report)
         some = np.arange(len(rollouts.end))[:: max(1, len(rollouts.end) // MAX_EXACT)]
         simulator.compute_in(torch.float64)
@@ -236,9 +241,9 @@ def read_validated(
 
 def ends_as_stated(outcome: Outcome, rollouts: EpisodeEnds, i: int) -> bool:
     """Return whether episode i ended as stated, after a stated number of steps."""
-    if rollouts.end[i] != outcome.end or tuple(rollouts.collected[i]) != outcome.collected:
+    if (rollouts.name(i), tuple(rollouts.collected[i])) != (outcome.end, outcome.collected):
         return False
-    if outcome.end == CubesEnd.STEP_LIMIT:
+    if outcome.end == "step_limit":
         loops = rollouts.repeats[i] > (0 if outcome.loops else _SHORT_LOOP)
         if loops != outcome.loops:
             return False
@@ -264,7 +269,6 @@ def _stated(outcome: Outcome) -> str:
 
 
 def _found(rollouts: EpisodeEnds, i: int) -> str:
-    end, collected = CubesEnd(rollouts.end[i]), tuple(map(bool, rollouts.collected[i]))
-    loops = end == CubesEnd.STEP_LIMIT and bool(rollouts.repeats[i])
-    as_outcome = Outcome(end, collected, loops, 0.0, {}, np.zeros((0, len(collected), 2)))
-    return f"{as_outcome}, steps: {rollouts.steps[i]}"
+    collected = rollouts.collected[i].tolist()
+    loops = rollouts.end[i] == CubesEnd.STEP_LIMIT and bool(rollouts.repeats[i])
+    return f"{ending_text(rollouts.name(i), collected, loops)}, steps: {rollouts.steps[i]}"
