@@ -82,7 +82,8 @@ def test_cells():
 
 def begun(folder):
     folder.mkdir(parents=True)
-    Sweep(folder, "drone-rl train -m seed=0", {}, [Run(0, ("seed=0",), folder / "0")]).save()
+    runs = (Run(0, ("seed=0",), folder / "0"),)
+    Sweep(folder=folder, command="drone-rl train -m seed=0", settings={}, runs=runs).save()
     return folder
 
 
