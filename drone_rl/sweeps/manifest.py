@@ -15,9 +15,8 @@ from drone_rl.config.configuration import check_same_config
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import last_of, read_json, refuse_links
 from drone_rl.utils.limits import SWEEP_BYTES
-from drone_rl.utils.models import Model
 from drone_rl.utils.overrides import COMMAND, check_harmless
-from drone_rl.utils.provenance import provenance
+from drone_rl.utils.provenance import Provenance, provenance
 from drone_rl.utils.schema import as_mapping, shown
 
 MAY_CHANGE = ("resume", "logger", "paths", "trainer.checkpoint_interval_s", "renderer")
@@ -87,7 +86,7 @@ def path_argument(path: Path) -> str:
     return text if re.fullmatch(r"[\w./+-]+", text) else quoted(text)
 
 
-class Sweep(Model):
+class Sweep(Provenance, extra="forbid"):
     """A sweep: the content of `sweep.json`."""
 
     format: Literal["drone_rl sweep, version 2"] = "drone_rl sweep, version 2"
@@ -97,9 +96,6 @@ class Sweep(Model):
     """The common settings of all runs, with interpolations unresolved."""
     runs: tuple[Run, ...]
     """The runs in the order of their numbers; in the file, folders are relative."""
-    versions: dict[str, str] | None = None
-    git_revision: str | None = None
-    machine: dict[str, str | int | None] | None = None
     folder: Annotated[Path, Field(exclude=True)] = Path()
     """Folder of the sweep."""
 

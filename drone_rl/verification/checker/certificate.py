@@ -15,6 +15,7 @@ from drone_rl.policies.zoo import PolicyDescription, fingerprint, parse
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.limits import CERTIFICATE_BYTES
 from drone_rl.utils.models import Model
+from drone_rl.utils.provenance import Provenance
 from drone_rl.verification.requirements import require_cubes
 
 MAX_CORNERS = 2**20  # corners of all boxes together
@@ -129,7 +130,7 @@ class Effort(Model):
     """The setting that stopped the proof early."""
 
 
-class Certificate(Model):
+class Certificate(Provenance, extra="forbid"):
     """Statements about a policy in a task.
 
     It can be checked without the prover: the boxes of all outcomes and the undecided ones partition
@@ -146,9 +147,6 @@ class Certificate(Model):
     """Whether the proof was completed."""
     stated: Stated
     found: Effort
-    versions: dict[str, str] | None = None
-    git_revision: str | None = None
-    machine: dict[str, str | int | None] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
