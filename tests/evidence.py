@@ -7,6 +7,7 @@ import copy
 from collections.abc import Mapping
 from typing import Any
 
+from drone_rl.config.commands import ShiftSettings
 from drone_rl.sim.vocabulary import CUBES
 
 Plain = dict[str, Any]
@@ -30,7 +31,7 @@ def changed(evidence: Mapping[str, Any], changes: Mapping[str, Any]) -> Plain:
 
 
 def _mean(mean: float, lower: float, upper: float) -> Plain:
-    return {"mean": mean, "lower95": lower, "upper95": upper}
+    return {"mean": mean, "lower95": lower, "upper95": upper, "count": 300}
 
 
 def _share(successes: int, trials: int, lower: float, upper: float) -> Plain:
@@ -43,8 +44,8 @@ def _episodes(success: float, left: float, ahead: float, right: float) -> Plain:
     shares = {"all": every, "left": left, "ahead": ahead, "right": right}
     return {
         "episodes": 400,
-        "success": {"share": success, "lower95": success - 0.02, "upper95": success + 0.02},
-        "shares": {name: {"mean": mean, "count": 300} for name, mean in shares.items()},
+        "success": _share(round(400 * success), 400, success - 0.02, success + 0.02),
+        "shares": {name: _mean(mean, mean - 0.02, mean + 0.02) for name, mean in shares.items()},
     }
 
 
@@ -72,7 +73,6 @@ VERDICT: Plain = {
         "bound": True,
         "frames": 16000,
         "fragile": 8,
-        "fragile_rate": 0.0005,
         "episodes": 400,
         "fragile_episodes": 7,
         "compared": "PyTorch",
@@ -244,48 +244,6 @@ EXPLANATION: Plain = {
 }
 """Content of `explanation.json` of the same policy."""
 
-_OF_SIX = {"certain": 4, **_share(6, 6, 0.5, 1.0)}
-GROUP: Plain = {
-    "ended": 6,
-    "failed": 0,
-    "damaged": 0,
-    "unfinished": 1,
-    "judged": 5,
-    "solved": _share(5, 6, 0.4, 1.0),
-    "frames_to_solve": {"more_than": None},
-    "verdicts": {"good": {**_OF_SIX, "successes": 5}},
-}
-"""Results of one setting of a sweep."""
-_RUN = {"state": "finished", "verdict": "good", "certain": True, "entropy": 0.5}
-SWEEP: Plain = {
-    "finished": 6,
-    "failed": 1,
-    "damaged": 1,
-    "unfinished": 1,
-    "judged": 5,
-    "certain": 4,
-    "judged_by_older_rule": 1,
-    "never_judged": 1,
-    "judge_command": "drone-rl sweep-report",
-    "error_rates": [0.05],
-    "episodes": [200],
-    "sides_not_offered": 1,
-    "best": {
-        "run": 3, "verdict": "good", "certain": True, "share": 0.99, "episodes": 200,
-        "report_command": "drone-rl verdict",
-    },
-    "groups": [
-        GROUP,
-        {**GROUP, "ended": 3, "solved": {"successes": 0}, "frames_to_solve": {"more_than": 9e4}},
-    ],
-    "runs": [
-        {**_RUN, "verdict": "one-sided (left)"}, {**_RUN, "verdict": "one-sided (right)"},
-        {**_RUN, "entropy": 0.001}, _RUN, _RUN, _RUN, {**_RUN, "state": "failed", "certain": None},
-        {**_RUN, "state": "damaged", "certain": None}, {**_RUN, "state": "unfinished"},
-    ],
-}  # fmt: skip
-"""Content of `summary.json` of a small sweep with runs in every state."""
-
 
 def _level(number: int, value: float, position: float, successes: int, oracle: int) -> Plain:
     success = _share(successes, 200, successes / 200 - 0.05, successes / 200 + 0.05)
@@ -316,10 +274,11 @@ _DARK = {
     "oracle": _share(400, 400, 0.99, 1.0),
 }  # fmt: skip
 SHIFTS: Plain = {
+    "policy": "made up",
+    "network": None,
     "terms": CUBES.as_dict(),
     **FIXED_SEED,
-    "settings": {"domain_episodes": 400, "episodes": 200, "seed": 0, "good_share": 0.9},
-    "file": {"path": "shifts.json", "dated": "2026-01-31 12:00"},
+    "settings": ShiftSettings(domain_episodes=400, episodes=200, seed=0).values(),
     "plain": {"success": _share(200, 200, 0.98, 1.0), "oracle": _share(200, 200, 0.98, 1.0)},
     "axes": {
         "sun": _along(
@@ -340,3 +299,5 @@ SHIFTS: Plain = {
         },
     },
 }
+SAVED_SHIFTS: Plain = {"path": "shifts.json", "dated": "2026-01-31 12:00", "shifts": SHIFTS}
+"""The same, as it is quoted."""

@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw, ImageFont
 from drone_rl.trust.axes_table import NAMES
 from drone_rl.trust.plots.images import enlarge, gridded, stacked, titled
 from drone_rl.trust.plots.saving import new_chart
-from drone_rl.trust.shifts_results import MODES, ModeFigures, Shifts, number
+from drone_rl.trust.shifts_results import MODES, ModeFigures, Robustness, number
 from drone_rl.utils.palette import BAD, FAINT, GOOD, INK, MUTED, PAPER, css
 from drone_rl.utils.text import percent
 
@@ -26,7 +26,7 @@ _TILES, _GAP, _HEADING = 3, 8, 28
 """Images in a row of a strip, pixels between them, and height of its heading."""
 
 
-def chart(shifts: Shifts) -> Figure:
+def chart(shifts: Robustness) -> Figure:
     """Plot success rate over strength by axis, with 95% intervals, the oracle and the range."""
     axes = shifts.axes
     rows = -(-(len(axes) + 1) // _COLUMNS)
@@ -40,7 +40,7 @@ def chart(shifts: Shifts) -> Figure:
     return figure
 
 
-def curves(shifts: Shifts) -> dict[str, Figure]:
+def curves(shifts: Robustness) -> dict[str, Figure]:
     """Return a chart of one panel for each axis, by its label, and their legend; see `chart`."""
     charts = {NAMES[name]: new_chart(height=2.9) for name in shifts.axes}
     for (_, axis), name in zip(charts.values(), shifts.axes, strict=True):
@@ -59,7 +59,7 @@ def _add_legend(axis: Axes, panels: Iterable[Axes]) -> None:
     axis.legend(handles.values(), handles.keys(), loc="center", frameon=False)
 
 
-def _curve(axis: Axes, name: str, shifts: Shifts) -> None:
+def _curve(axis: Axes, name: str, shifts: Robustness) -> None:
     along, plain = shifts.axes[name], shifts.plain
     levels = along.allowed
     ticks = [(0.0, along.neutral), *((level.position, level.value) for level in levels)]
@@ -101,17 +101,17 @@ def _line(axis: Axes, points: Sequence[tuple[float, ModeFigures]], mode: str) ->
     axis.plot(where, shares, "o-", color=_POLICY, ms=3.5, label="success rate of the policy")
 
 
-def strips(shifts: Shifts) -> Image.Image:
+def strips(shifts: Robustness) -> Image.Image:
     """Arrange camera images at each strength with success rates, one axis below the other."""
     return stacked([_strip(shifts, name) for name in shifts.pictures], gap=0)
 
 
 def conditions(
-    shifts: Shifts, name: str, frames: Sequence[NDArray | None]
+    shifts: Robustness, name: str, frames: Sequence[NDArray | None]
 ) -> dict[str, Image.Image]:
     """Return camera images of one axis by caption, which has the strength and the success rate.
 
-    `frames` are as from `Shifts.frames`.
+    `frames` are as from `Robustness.frames`.
     """
     images: dict[str, Image.Image] = {}
     if frames[0] is not None:
@@ -127,7 +127,7 @@ def _success(figures: ModeFigures) -> str:
     return f"{percent(figures.success.share or 0.0)} succeed"
 
 
-def _strip(shifts: Shifts, name: str) -> Image.Image:
+def _strip(shifts: Robustness, name: str) -> Image.Image:
     images = conditions(shifts, name, shifts.frames(name))
     tiles = [titled(image, text) for text, image in images.items()]
     grid = gridded(tiles, _TILES, gap=_GAP)

@@ -24,8 +24,8 @@ from drone_rl.trust.shifts_results import (
     DomainRecheck,
     Need,
     Probe,
+    Robustness,
     SavedShifts,
-    Shifts,
 )
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path, parse_json, read_bytes
@@ -159,7 +159,7 @@ def compare_with_required(
 def recheck_domain(
     policy: BasePolicy,
     needs: Mapping[str, Need],
-    measured: Shifts,
+    measured: Robustness,
     settings: JudgeSettings,
     seed: RootSeed,
 ) -> DomainRecheck:
@@ -201,7 +201,7 @@ def _strengths(
     axis: Axis,
     subject: EvaluatedPolicy,
     need: Need,
-    measured: Shifts,
+    measured: Robustness,
     rng: np.random.Generator,
 ) -> Iterator[float]:
     """The ends other than no perturbation, and random strengths between them, each once."""
@@ -250,7 +250,7 @@ def contradicted(name: str | None, value: float, unit: str, probe: Probe) -> str
     )
 
 
-def lacking(shifts: Shifts, name: str, need: Need) -> str | None:
+def lacking(shifts: Robustness, name: str, need: Need) -> str | None:
     """Return what an operating domain lacks of a required range of an axis, or None."""
     found, along = shifts.ranges.get(name), shifts.axes.get(name)
     if found is None or along is None:

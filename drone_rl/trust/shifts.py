@@ -7,6 +7,9 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, Unpack
 
+import yaml
+from matplotlib.figure import Figure
+
 from drone_rl.config import MINIMAL, BaseTaskSettings
 from drone_rl.config.commands import ShiftSettings
 from drone_rl.config.configuration import from_arguments
@@ -21,15 +24,42 @@ from drone_rl.policies.zoo import fingerprint
 from drone_rl.sim.tasks import as_task
 from drone_rl.trust.agents import OracleAgent
 from drone_rl.trust.axes import Axis, check_axes, find_axes
+from drone_rl.trust.charts import chart, strips
 from drone_rl.trust.domain import Prober
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
 from drone_rl.trust.perturbations import Condition, PerturbationMode
 from drone_rl.trust.rounding_sensitivity import require_function
-from drone_rl.trust.shifts_results import Domain, NetworkIdentity, Range, Shifts, packed
+from drone_rl.trust.shifts_results import Domain, NetworkIdentity, Range, Robustness, packed
 from drone_rl.trust.suite import Suite, make_strip
+from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
+from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
+
+
+class Shifts(TableResult, Robustness):
+    """Success rates of a policy under perturbations, and its operating domain, with charts."""
+
+    def save(self, folder: Path) -> None:
+        """Write `shifts.json`, which verdicts, cards and reports quote, and the charts.
+
+        `domain.yaml` has the ranges, if any, in the format of `drone-rl verdict
+        require_domain=FILE`; `shifts.png` has curves, `strips.png` camera images.
+        """
+        self.replace(**provenance()).write_json(folder / "shifts.json")
+        if self.domain is not None:
+            (folder / "domain.yaml").write_text(yaml.safe_dump(self.requirements()))
+        self.figure().savefig(folder / "shifts.png", dpi=110)
+        strips(self).save(folder / "strips.png")
+
+    def figure(self) -> Figure:
+        """Return the curves."""
+        return chart(self)
+
+    def notes(self) -> tuple[str, str]:
+        """Return the operating domain, what differs from the training, and the seed."""
+        return self.sentence, self.seed_line()
 
 
 def shifts(

@@ -11,7 +11,7 @@ import torch
 
 from drone_rl.policies.zoo import PolicyDescription, fingerprint, parse
 from drone_rl.sim.tasks import as_task
-from drone_rl.trust.shifts_results import SavedShifts, Shifts
+from drone_rl.trust.shifts_results import Robustness, SavedShifts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.limits import SHIFTS_BYTES
 
@@ -27,7 +27,7 @@ def read_shifts(
         InputError: It is missing, damaged, or of another network, camera or task.
     """
     try:
-        shifts = Shifts.read_json(path, SHIFTS_BYTES)
+        shifts = Robustness.read_json(path, SHIFTS_BYTES)
         _refuse_another(shifts, described, weights)
         size = (described.camera.height, described.camera.width)
         terms = as_task(described.task).vocabulary  # the file's own could say anything
@@ -41,7 +41,7 @@ def read_shifts(
 
 
 def _refuse_another(
-    shifts: Shifts, described: PolicyDescription, weights: Mapping[str, torch.Tensor]
+    shifts: Robustness, described: PolicyDescription, weights: Mapping[str, torch.Tensor]
 ) -> None:
     if shifts.network is None:
         raise InputError("it is of a third-party policy")

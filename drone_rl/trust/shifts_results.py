@@ -4,12 +4,10 @@ import base64
 import math
 import zlib
 from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pydantic
-import yaml
 from numpy.typing import NDArray
 
 from drone_rl.config.commands import ShiftSettings
@@ -17,15 +15,12 @@ from drone_rl.config.transforms import Fault
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.trust.axes_table import NAMES, TABLE
 from drone_rl.trust.results import Difference, Verdict
-from drone_rl.utils.display import Result, TableResult
+from drone_rl.utils.display import Result
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import Mean, Share
 from drone_rl.utils.models import Seeded, Stored
-from drone_rl.utils.provenance import Provenance, provenance
+from drone_rl.utils.provenance import Provenance
 from drone_rl.utils.text import listed, percent, render
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 FORMAT_VERSION = 2
 Mode = Literal["constant", "drifting", "onset"]
@@ -209,7 +204,7 @@ class NetworkIdentity(Stored):
         return [name for name in names if name in faults]
 
 
-class Shifts(TableResult, Seeded, Provenance):
+class Robustness(Seeded, Provenance):
     """Success rates of a policy under perturbations, and its operating domain."""
 
     format: Literal["drone_rl shifts"] = "drone_rl shifts"
@@ -358,20 +353,6 @@ class Shifts(TableResult, Seeded, Provenance):
             if of.positions is not None and self.axes[name].is_tested
         }
 
-    def save(self, folder: Path) -> None:
-        """Write `shifts.json`, which verdicts, cards and reports quote, and the charts.
-
-        `domain.yaml` has the ranges, if any, in the format of `drone-rl verdict
-        require_domain=FILE`; `shifts.png` has curves, `strips.png` camera images.
-        """
-        from drone_rl.trust.charts import strips
-
-        self.replace(**provenance()).write_json(folder / "shifts.json")
-        if self.domain is not None:
-            (folder / "domain.yaml").write_text(yaml.safe_dump(self.requirements()))
-        self.figure().savefig(folder / "shifts.png", dpi=110)
-        strips(self).save(folder / "strips.png")
-
     def rows(self) -> list[list[str]]:
         """Return the success rates as a table: a header, then a row for each axis."""
         table = [["success, constant", "1", "2", "3", "4", "5", "area", ""]]
@@ -381,16 +362,6 @@ class Shifts(TableResult, Seeded, Provenance):
             shares = [cells.get(number, "") for number in range(1, 6)]
             table.append([NAMES[name], *shares, "" if area is None else f"{area:.2f}", along.unit])
         return table
-
-    def figure(self) -> "Figure":
-        """Return the curves."""
-        from drone_rl.trust.charts import chart
-
-        return chart(self)
-
-    def notes(self) -> tuple[str, str]:
-        """Return the operating domain, what differs from the training, and the seed."""
-        return self.sentence, self.seed_line()
 
 
 class SavedShifts(Stored):
@@ -402,7 +373,7 @@ class SavedShifts(Stored):
     """When it was written."""
     refused: str | None = None
     """The reason, in one line."""
-    shifts: Shifts | None = None
+    shifts: Robustness | None = None
     """None if refused."""
 
     @property
@@ -436,7 +407,7 @@ class SavedShifts(Stored):
         return not_evaluated(None if self.why_not(verdict) else self.shifts)
 
 
-def not_evaluated(shifts: Shifts | None) -> list[str]:
+def not_evaluated(shifts: Robustness | None) -> list[str]:
     """Return which of colors, light and sizes a robustness evaluation leaves out."""
     tested = {along.group for along in shifts.axes.values()} if shifts else set()
     names = {"color": "colors", "light": "light", "object size": "sizes"}

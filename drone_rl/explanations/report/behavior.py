@@ -8,7 +8,7 @@ from drone_rl.trust import charts
 from drone_rl.trust.axes_table import NAMES
 from drone_rl.trust.plots import images
 from drone_rl.trust.results import Verdict
-from drone_rl.trust.shifts_results import SavedShifts, Shifts, not_evaluated
+from drone_rl.trust.shifts_results import Robustness, SavedShifts, not_evaluated
 from drone_rl.utils.text import (
     Claims,
     Evidence,
@@ -82,7 +82,7 @@ def say_seed(evidence: Evidence) -> Claims:
     }
 
 
-def quoted_shifts(evidence: Evidence) -> Shifts | None:
+def quoted_shifts(evidence: Evidence) -> Robustness | None:
     """Return the robustness evaluation, unless there is none or it is refused."""
     if not evidence.get("shifts"):
         return None
@@ -92,6 +92,8 @@ def quoted_shifts(evidence: Evidence) -> Shifts | None:
 
 def say_shifts(evidence: Evidence) -> Claims:
     """Say the operating domain, or why it is not shown."""
+    if not evidence.get("shifts"):
+        return {}
     measured = SavedShifts.read(evidence["shifts"])
     return {"domain": measured.text(Verdict.read(evidence["verdict"]))}
 
