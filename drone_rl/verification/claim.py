@@ -13,9 +13,8 @@ from drone_rl.policies.zoo import certificate_path
 from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.trust.results import Proof, Rounding
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import as_path
 from drone_rl.utils.seeding import RootSeed, root_seed
-from drone_rl.verification.checker.certificate import Certificate
+from drone_rl.verification.checker.certificate import Certificate, certificate_file
 from drone_rl.verification.checker.checker import check_certificate, read_validated
 from drone_rl.verification.checker.sampling import ANYWHERE, find
 
@@ -108,16 +107,13 @@ def find_claim(
         return None
     seed = seed or root_seed(None)
     if certificate is not None:
-        path = as_path(certificate, "certificate")
-        path = path / "certificate.json" if path.is_dir() else path
+        path = certificate_file(certificate)
         return _read_and_check(policy, path, flights, seed, device, renderer)
     path = certificate_path(policy.path)
+    if not path.is_file():
+        return None
     try:
-        return (
-            _read_and_check(policy, path, flights, seed, device, renderer)
-            if path.is_file()
-            else None
-        )
+        return _read_and_check(policy, path, flights, seed, device, renderer)
     except InputError as error:
         return Claim(path, None, refused=str(error))
 

@@ -22,7 +22,11 @@ from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.utils.text import exact_percent, plural, render
 from drone_rl.utils.threads import torch_threads
-from drone_rl.verification.checker.certificate import Certificate, read_certificate
+from drone_rl.verification.checker.certificate import (
+    Certificate,
+    certificate_file,
+    read_certificate,
+)
 from drone_rl.verification.prover.policy_spec import (
     PolicySpec,
     make_policy_spec,
@@ -187,6 +191,5 @@ def load_proof(path: str | Path) -> Proof:
     Raises:
         InputError: There is none, or it is damaged or too large.
     """
-    path = as_path(path, "path")
-    path = path / _CERTIFICATE_NAME if path.is_dir() else path
+    path = certificate_file(path)
     return Proof(read_certificate(path), path.parent)

@@ -114,7 +114,7 @@ def test_tasks_that_take_days_are_refused():
             {"won": 0.75, "cubes": 1},
             "the cube from 75.00% of all placements; from 25.00% it does not.",
         ),
-        ({"won": 1 - 1e-12, "undecided": 1e-12}, "from more than 99.99% of all placements"),
+        ({"won": 1 - 1e-12, "undecided": 1e-12}, "from >99.99% of all placements"),
         ({"won": 0.0}, "from 0% of all placements; from 100% it does not."),
         ({"won": 0.5, "undecided": 0.5}, "and 50.00% are undecided."),
         (
@@ -137,5 +137,5 @@ def test_line_of_a_round():
 
     assert line() == "at frame 20,000: 3 of 4,000 episodes failed"
     assert line(losing=0.25, undecided=1e-7, proof_s=61.6).endswith(
-        "failed; proof in 62 s: fails from 25.00% of all placements, less than 0.01% undecided"
+        "failed; proof in 62 s: fails from 25.00% of all placements, <0.01% undecided"
     )

@@ -13,6 +13,7 @@ from pydantic import Field, PlainSerializer, PlainValidator, model_validator
 from drone_rl.config import BaseTaskSettings, TaskSettings
 from drone_rl.policies.zoo import PolicyDescription, fingerprint, parse
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import as_path
 from drone_rl.utils.limits import CERTIFICATE_BYTES
 from drone_rl.utils.models import Model
 from drone_rl.utils.provenance import Provenance
@@ -208,6 +209,12 @@ def ending_text(end: str, collected: Sequence[bool], loops: bool) -> str:
     """Return the end of an episode in words."""
     which = ", ".join(str(i + 1) for i, is_collected in enumerate(collected) if is_collected)
     return f"{end}{', to and fro' if loops else ''}, cubes collected: {which or 'none'}"
+
+
+def certificate_file(path: str | Path) -> Path:
+    """Return the file of a certificate: a path, or certificate.json in a folder."""
+    path = as_path(path, "certificate")
+    return path / "certificate.json" if path.is_dir() else path
 
 
 def read_certificate(path: Path) -> Certificate:

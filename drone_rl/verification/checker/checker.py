@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from pydantic import computed_field
 from tensordict import TensorDict
 from torch import Tensor
 from torchrl.envs import Transform
@@ -18,6 +19,7 @@ from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.tasks import State
 from drone_rl.sim.tasks.collect_cubes import CubesEnd, WorldState
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.models import Stored
 from drone_rl.verification.checker.certificate import (
     Certificate,
     Outcome,
@@ -41,12 +43,13 @@ _SHORT_LOOP = 2  # up to so many repetitions, a loop need not be stated as one
 ProgressCallback = Callable[[int, int], None]  # called with the number done, and of all
 
 
-@dataclasses.dataclass(frozen=True)
-class Contradiction:
+class Contradiction(Stored):
     """An episode that ended otherwise than stated."""
 
-    where: str  # why it was simulated: "inside" a box, at a "border", or "anywhere"
-    placement: tuple[float, ...]  # metres to the left of each cube
+    where: str
+    """Why it was simulated: "inside" a box, at a "border", or "anywhere"."""
+    placement: tuple[float, ...]
+    """Metres to the left of each cube."""
     stated: str
     found: str
 
@@ -57,35 +60,29 @@ class Contradiction:
         )
 
 
-@dataclasses.dataclass(frozen=True)
-class CheckFindings:
+class CheckFindings(Stored):
     """The result of a check."""
 
-    inconsistencies: tuple[str, ...]  # impossible or refuted statements, without single episodes
-    contradictions: tuple[Contradiction, ...]  # the first episodes that ended otherwise than stated
-    contradicted: int  # number of such episodes
-    flights: Mapping[str, int]  # number of episodes, by why they were simulated
+    findings: tuple[str, ...]
+    """Impossible or refuted statements, without single episodes."""
+    contradictions: tuple[Contradiction, ...] = ()
+    """The first episodes that ended otherwise than stated."""
+    contradicted: int = 0
+    """Number of such episodes."""
+    flights: dict[str, int] = {}
+    """Number of episodes, by why they were simulated."""
 
+    @computed_field
     @property
     def accepted(self) -> bool:
         """Whether nothing contradicts the certificate."""
-        return not self.inconsistencies and not self.contradicted
+        return not self.findings and not self.contradicted
 
     def lines(self) -> list[str]:
         """Return each finding in one line."""
-        lines = [*self.inconsistencies, *map(str, self.contradictions)]
+        lines = [*self.findings, *map(str, self.contradictions)]
         more = self.contradicted - len(self.contradictions)
         return [*lines, f"and {more} flights more ended otherwise than stated"] if more else lines
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values, as in `check.json`."""
-        return {
-            "accepted": self.accepted,
-            "findings": list(self.inconsistencies),
-            "contradicted": self.contradicted,
-            "contradictions": [dataclasses.asdict(c) for c in self.contradictions],
-            "flights": dict(self.flights),
-        }
 
 
 @dataclasses.dataclass(frozen=True)
@@ -198,7 +195,7 @@ def check_certificate(
         InputError: There is no such device.
     """
     if inconsistencies := tuple(find_inconsistencies(certificate)):
-        return CheckFindings(inconsistencies, (), 0, {})
+        return CheckFindings(findings=inconsistencies)
     sample = sample_placements(certificate, flights, np.random.default_rng(seed))
     stated = sample.outcome < len(certificate.outcomes)
     points, why = sample.points[stated], sample.why[stated]
@@ -216,12 +213,20 @@ def check_certificate(
     counts = find_wrong_step_counts(certificate.outcomes, sample.outcome[anywhere], steps[anywhere])
     kept = [
         Contradiction(
-            str(why[i]), tuple(points[i].tolist()), _stated(outcomes[i]), _found(rollouts, i)
+            where=str(why[i]),
+            placement=tuple(points[i].tolist()),
+            stated=_stated(outcomes[i]),
+            found=_found(rollouts, i),
         )
         for i in wrong[:MAX_KEPT]
     ]
     count = {kind: int((why == kind).sum()) for kind in (INSIDE, BORDER, ANYWHERE)}
-    return CheckFindings((*rounded, *counts), tuple(kept), len(wrong), count)
+    return CheckFindings(
+        findings=(*rounded, *counts),
+        contradictions=tuple(kept),
+        contradicted=len(wrong),
+        flights=count,
+    )
 
 
 def read_validated(
