@@ -1,4 +1,4 @@
-"""Seven of AirSim's image types, computed from rendered modalities, and its segmentation ids."""
+"""Eight of AirSim's image types, computed from rendered modalities, and its segmentation ids."""
 
 import dataclasses
 import enum
@@ -72,6 +72,8 @@ class ImageType(enum.IntEnum):
     SEGMENTATION = 5
     """Color of the object's id, see `palette`."""
     SURFACE_NORMALS = 6
+    INFRARED = 7
+    """The object's id in gray."""
 
     @property
     def modality(self) -> Modality:
@@ -80,7 +82,10 @@ class ImageType(enum.IntEnum):
 
 
 _DISTANCES: tuple[Modality, ...] = ("depth", "distance", "depth", "depth")
-_MODALITIES: tuple[Modality, ...] = ("rgb", *_DISTANCES, "segmentation", "normals")
+_MODALITIES: tuple[Modality, ...] = (
+    *("rgb", *_DISTANCES),
+    *("segmentation", "normals", "segmentation"),
+)
 """By number of the image type."""
 
 
@@ -183,9 +188,11 @@ def pixels(
     """
     if image_type is ImageType.SCENE:
         return _color(values, as_float)
-    if image_type is ImageType.SEGMENTATION:
+    if image_type.modality == "segmentation":
         geoms = values.long()
         numbers = geoms.clamp(min=0) if ids is None else ids.to(geoms.device)[geoms]
+        if image_type is ImageType.INFRARED:
+            return _gray(numbers.float() / 255.0, as_float, 255.0)
         colors = palette().to(geoms.device)[numbers]
         return _color(colors, as_float)
     if image_type is ImageType.SURFACE_NORMALS:

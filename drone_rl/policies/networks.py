@@ -169,8 +169,8 @@ class OriginalCNN(PolicyNetwork):
         in_shape: Sequence[int],
         num_actions: int,
         *,
-        channels: Sequence[int] = OriginalCnn.channels,
-        hidden: Sequence[int] = OriginalCnn.hidden,
+        channels: Sequence[int] = OriginalCnn().channels,
+        hidden: Sequence[int] = OriginalCnn().hidden,
         generator: torch.Generator | None = None,
     ) -> None:
         convolutions: OrderedDict[str, nn.Module] = OrderedDict()
@@ -203,9 +203,9 @@ class SmallCNN(PolicyNetwork):
         in_shape: Sequence[int],
         num_actions: int,
         *,
-        patch: int = SmallCnn.patch,
-        channels: Sequence[int] = SmallCnn.channels,
-        hidden: Sequence[int] = SmallCnn.hidden,
+        patch: int = SmallCnn().patch,
+        channels: Sequence[int] = SmallCnn().channels,
+        hidden: Sequence[int] = SmallCnn().hidden,
         generator: torch.Generator | None = None,
     ) -> None:
         convolutions: OrderedDict[str, nn.Module] = OrderedDict()
@@ -281,7 +281,7 @@ class MLP(PolicyNetwork):
         in_shape: Sequence[int],
         num_actions: int,
         *,
-        hidden: Sequence[int] = Mlp.hidden,
+        hidden: Sequence[int] = Mlp().hidden,
         generator: torch.Generator | None = None,
     ) -> None:
         layers = _with_head(OrderedDict(), in_shape, hidden, num_actions)

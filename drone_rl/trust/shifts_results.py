@@ -199,7 +199,7 @@ class NetworkIdentity(Stored):
     @property
     def camera_faults(self) -> list[str]:
         """Camera faults that the policy's transforms simulate."""
-        faults = {fault.registered_name() for fault in Fault.__subclasses__()}
+        faults = {fault.name for fault in Fault.__subclasses__()}
         names = [step["name"] for step in self.description.get("transforms", ())]
         return [name for name in names if name in faults]
 
@@ -353,7 +353,7 @@ class Robustness(Seeded, Provenance):
             if of.positions is not None and self.axes[name].is_tested
         }
 
-    def rows(self) -> list[list[str]]:
+    def table(self) -> list[list[str]]:
         """Return the success rates as a table: a header, then a row for each axis."""
         table = [["success, constant", "1", "2", "3", "4", "5", "area", ""]]
         for name, along in self.axes.items():

@@ -242,7 +242,7 @@ def _bounded(
     policy: Policy, placed: Tensor, settings: ChanceSettings, progress: Progress
 ) -> tuple[SuccessBounds, ...]:
     """Bound the success probability over a box around each placement, within the lateral bound."""
-    network, gap = policy.make_network(), ProveSettings.logit_gap
+    network, gap = policy.make_network(), ProveSettings().logit_gap
     bounds: list[SuccessBounds] = []
     spec = make_policy_spec(policy.description, network, gap, settings.renderer)
     with closing(spec):

@@ -83,7 +83,7 @@ def find_claim(
     policy: BasePolicy,
     certificate: str | Path | None = None,
     *,
-    flights: int = JudgeSettings.certificate_flights,
+    flights: int = JudgeSettings().certificate_flights,
     seed: RootSeed | None = None,
     device: str = "cpu",
     renderer: str = "raytrace",

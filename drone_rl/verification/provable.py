@@ -17,7 +17,7 @@ from torchrl.envs import EnvBase
 from drone_rl.collectors.complete_episodes import episode_batches
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ProvableSettings, ProveSettings
-from drone_rl.config.configuration import as_config, check_same_config, from_arguments
+from drone_rl.config.configuration import check_same_config, from_arguments
 from drone_rl.config.options import TrainOptions
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.policy import Policy, load_policy
@@ -99,7 +99,8 @@ class Journal(Callback):
         settings = from_arguments(TrainSettings, settings, changes, train_until_proved)
         if saved is not None:
             how = how or ProvableSettings.read(saved["how"], "how")
-            check_same_config(saved["settings"], as_config(settings), MAY_CHANGE)
+            before = TrainSettings.read(saved["settings"])
+            check_same_config(before.config(), settings.config(), MAY_CHANGE)
             check_same_config(saved["how"], how.values(), HOW_MAY_CHANGE)
             rounds = [Round.read(row, "rounds") for row in saved["rounds"]]
         how = how or ProvableSettings(rounds=10)
@@ -168,7 +169,7 @@ class Journal(Callback):
     def save(self) -> None:
         """Write the file."""
         content = {
-            "settings": as_config(self.settings),
+            "settings": self.settings.config(),
             "how": self.how.values(),
             "rounds": [search.values() for search in self.rounds],
         }
@@ -273,9 +274,9 @@ def _check_support(settings: TrainSettings) -> None:
     """Raise the InputError with which a proof would refuse the trained policy."""
     described = describe(settings)
     require_cubes(described, "proofs")
-    network, gap = described.build_network(torch.Generator()), ProveSettings.logit_gap
+    network, gap = described.build_network(torch.Generator()), ProveSettings().logit_gap
     with closing(make_policy_spec(described, network, gap, settings.renderer)) as spec:
-        partition_placements(spec, ProveSettings.most_combinations)
+        partition_placements(spec, ProveSettings().most_combinations)
 
 
 def _learn(

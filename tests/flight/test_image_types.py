@@ -11,9 +11,7 @@ from drone_rl.flight.image_types import (
     images,
     palette,
     pixels,
-    segmentation_ids,
 )
-from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state
@@ -152,13 +150,3 @@ def test_palette_is_airsims():
     assert colors[255].tolist() == [255, 255, 255]
     digest = hashlib.sha256(bytes(colors.flatten().tolist())).hexdigest()
     assert digest == "b7217dcebb91d590f6174c4ee7395e3fab3e7edde839d004789fd146a1f5de5e"
-
-
-def test_ids_follow_from_names():
-    """G, r, o, u, n, d: 103 + 114 + 111 + 117 + 110 + 100 = 655; 660 - 512 = 148."""
-    scene = Worlds(1).scene
-    ids = segmentation_ids(scene)
-    assert len(ids) == scene.model.ngeom + 1 and ids[-1] == 0  # of the sky
-    grounds = scene.geoms(SemanticClass.GROUND)
-    assert ids[grounds].tolist() == [148] * len(grounds)
-    assert len(set(ids[scene.geoms(SemanticClass.TARGET)].tolist())) == 1

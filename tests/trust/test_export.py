@@ -18,7 +18,6 @@ from drone_rl.verification.claim import find_claim
 from tests.evidence import SAVED_SHIFTS, VERDICT, changed
 from tests.sweeps.conftest import _verdict
 from tests.trust.making import shifts_of
-from tests.verification.checker.making import of_every_place
 
 METRICS = "frames,seconds,train/running_reward\n100,1.0,1.5\n"
 FIGURES = {"frames": 100, "episodes": 9, "seconds": 1.0, "running_reward": 1.5, "largest_reward": 3}
@@ -89,28 +88,6 @@ def test_card_quotes_and_copies_a_certificate(tmp_path):
     assert find_claim(again, flights=20).flights == 20
 
 
-def test_card_refuses_a_certificate_that_rollouts_contradict(tmp_path):
-    policy, made = drone_rl.load_policy("poor").in_task(**ONE), tmp_path / "made.json"
-    made.write_text(json.dumps(of_every_place(policy)))
-    target = tmp_path / "mine.safetensors"
-    with pytest.raises(InputError, match="ended otherwise than stated"):
-        export(policy, target, FEW, certificate=made, find_claim=find_claim)
-    assert not target.exists()
-
-
-def test_card_refuses_a_certificate_of_another_policy(tmp_path):
-    poor, good = (drone_rl.load_policy(name).in_task(**ONE) for name in ("poor", "good"))
-    policy, target = poor, tmp_path / "mine.safetensors"
-    beside = tmp_path / "mine.certificate.json"
-    beside.write_text(json.dumps(of_every_place(good)))
-    with pytest.raises(InputError, match="network with hash"):
-        export(policy, target, FEW, certificate=beside, find_claim=find_claim)
-    export(policy, target, FEW)
-    export(drone_rl.load_policy(target), tmp_path / "again.safetensors", FEW)
-    assert "ertificate" not in (tmp_path / "again.md").read_text()
-    assert not (tmp_path / "again.certificate.json").exists()
-
-
 @pytest.mark.parametrize(("name", "is_good"), [("good", True), ("right_and_forward", False)])
 def test_card_quotes_and_copies_a_robustness_evaluation(tmp_path, name, is_good):
     """Those of one whom the card's verdict surely finds to be something else are not believed."""
@@ -128,12 +105,6 @@ def test_card_quotes_and_copies_a_robustness_evaluation(tmp_path, name, is_good)
         again = drone_rl.load_policy(tmp_path / "mine.safetensors")
         assert find_domain(again).path == str(beside)
         assert "Read from mine.shifts.json, dated" in card  # and no path of this machine
-
-
-def test_origin_of_a_run_from_python_is_unknown(checkpoint):
-    (checkpoint.parents[2] / "sweep.json").unlink()
-    (checkpoint.parents[1] / ".hydra" / "overrides.yaml").unlink()
-    assert recorded_origin(checkpoint, {}) == (None, None)
 
 
 def test_origin_in_a_checkpoint_is_ignored(checkpoint):

@@ -11,7 +11,6 @@ import drone_rl
 from benchmarks.gamed_certificates import certificate_of
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ProvableSettings
-from drone_rl.config.configuration import as_config
 from drone_rl.config.learning import Episodes
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.envs import DroneEnv
@@ -200,7 +199,7 @@ def test_later_searches_are_forgotten(whole, tmp_path, prover):
 SETTINGS = TrainSettings(trainer=TrainerSettings(total_frames=1000))
 
 
-STATE = {"config": as_config(SETTINGS)}
+STATE = {"config": SETTINGS.config()}
 
 
 LIMITS = ProvableSettings(rounds=2)

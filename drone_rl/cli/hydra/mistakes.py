@@ -8,7 +8,6 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
 from hydra import compose, initialize_config_dir
 from hydra.core.config_store import ConfigStore
 from hydra.core.global_hydra import GlobalHydra
@@ -21,8 +20,6 @@ from drone_rl.sweeps.manifest import is_sweep
 from drone_rl.utils.errors import InputError, did_you_mean
 
 OTHER_NAMES = read_other_names()
-SCHEMA = "base_"
-"""Prefix of schemas' names, see `drone_rl.cli.hydra.composition`."""
 OPTIONS = {"-m", "--multirun", "-h", "--help"}
 """Options of Hydra that are documented; all others are refused."""
 _OVERRIDE = re.compile(r"\+{0,2}[A-Za-z][\w./@-]*=.*|~[A-Za-z][\w./@-]*(=.*)?", re.DOTALL)
@@ -46,8 +43,7 @@ def choices(conf: Path, group: str) -> list[str]:
     names = [path.name for path in (conf / group).glob("*.yaml")]
     with contextlib.suppress(OSError):  # nothing is stored in the group
         names += ConfigStore.instance().list(group)
-    names = {n.removesuffix(".yaml") for n in names if n.endswith(".yaml")}
-    return sorted(name for name in names if not name.startswith(SCHEMA))
+    return sorted({name.removesuffix(".yaml") for name in names if name.endswith(".yaml")})
 
 
 def flattened(values: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
@@ -113,7 +109,7 @@ def _has_own_folders(words: Sequence[str]) -> bool:
 
 
 def _is_group(conf: Path, name: str) -> bool:
-    return bool(name) and not name.startswith((".", "/")) and (conf / name).is_dir()
+    return bool(name) and not name.startswith((".", "/")) and bool(choices(conf, name))
 
 
 def _names(name: str, conf: Path, words: Sequence[str]) -> list[str]:
@@ -132,10 +128,12 @@ def _names(name: str, conf: Path, words: Sequence[str]) -> list[str]:
 def _meant(name: str, conf: Path, keys: Collection[str]) -> str:
     """Return a hint at the setting that is like a name, or the choice of a group that has it."""
     group = name.partition(".")[0]
-    is_choice = group in keys and name not in keys
-    for path in sorted((conf / group).glob("*.yaml")) if is_choice else ():
-        if name in flattened({group: yaml.safe_load(path.read_text()) or {}}):
-            return f"; {group}={path.stem} has it"
+    is_choice = group in keys and name not in keys and group != "hydra"
+    for choice in choices(conf, group) if is_choice else ():
+        with contextlib.suppress(OSError):  # a file
+            values: Any = ConfigStore.instance().load(f"{group}/{choice}.yaml").node
+            if name in flattened({group: values}):
+                return f"; {group}={choice} has it"
     return next((f"; did you mean {meant}?" for meant in similar(name, keys)), "")
 
 

@@ -36,7 +36,7 @@ def message(line):
         ("train task.num_cube=1", "did you mean task.num_cubes?"),
         ("verdict camera=large", "drone-rl verdict --help all lists the settings"),
         ("train objective.epochs=3", "objective=ppo has it"),
-        ("train task=base_task", "task is one of collect_cubes, collect_one, pillars, or your own"),
+        ("train task=cubes", "task is one of collect_cubes, collect_one, pillars, or your own"),
         ("train optimizer=adm", "optimizer is one of adam, sgd; did you mean adam?"),
         ("train hydra.run.dir=", "it has no value"),
         ("train hydra/launcher=slurm", "no effect on a single run; add -m"),
@@ -48,10 +48,9 @@ def test_a_mistake_has_a_remedy(line, remedy):
     assert remedy in message(line)
 
 
-def test_a_value_of_a_wrong_type_is_named_with_the_help_of_its_setting(in_process):
+def test_a_value_of_a_wrong_type_is_named(in_process):
     line = error_line(in_process("train", "optimizer.lr=abc"))
-    assert line.startswith("error: optimizer.lr=abc: Value 'abc'")
-    assert line.endswith("; drone-rl train --help optimizer.lr shows what it takes")
+    assert line.startswith("error: optimizer.lr='abc': it must be a number above 0")
 
 
 def test_correct_words_pass_the_check():
