@@ -51,7 +51,9 @@ def test_held_out_placements_are_those_of_an_evaluation(good):
     with good.in_task(**ONE).flying(2, seed=done.seed) as (env, _):
         env.reset()
         placed = [p.cubes for p in done.placements]
-        assert torch.equal(torch.tensor(placed).double(), env.base_env.worlds.state.cubes)
+        assert torch.equal(
+            torch.tensor(placed, dtype=torch.float64), env.base_env.worlds.state.cubes
+        )
     fixed = drone_rl.chances(good, placements=1, seed=0, task=ONE, progress=silent)
     assert fixed.placements[0].cubes != placed[0] and fixed.seed == 0
     assert "Fixed seed 0" in str(fixed)

@@ -47,7 +47,9 @@ class Region(Model):
     share: Share
     """Their fraction of the volume of all placements."""
     boxes: Annotated[
-        NDArray[np.float64], PlainValidator(_as_array), PlainSerializer(np.ndarray.tolist)
+        NDArray[np.float64],
+        PlainValidator(_as_array),
+        PlainSerializer(np.ndarray.tolist, return_type=list),
     ]
     """Metres to the left of each cube, lowest and highest. Shape: (boxes, cubes, 2)."""
 
@@ -99,7 +101,7 @@ class Subject(Model):
     description: Annotated[
         PolicyDescription,
         PlainValidator(_as_description),
-        PlainSerializer(PolicyDescription.as_dict),
+        PlainSerializer(PolicyDescription.as_dict, return_type=dict),
     ]
     """Its description, with the task of the certificate."""
 
