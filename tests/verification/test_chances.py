@@ -4,7 +4,6 @@ import pytest
 import torch
 
 import drone_rl
-from drone_rl.config import AppearanceSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.verification.chances import Chances, _row
@@ -80,21 +79,6 @@ def test_row_of_small_probabilities():
 def test_unusable_arguments_are_refused(good, cubes, change):
     with pytest.raises(InputError, match=r"cubes=|placements=0|num_cubes=20|count is unknown"):
         drone_rl.chances(good, cubes, progress=silent, **change)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"appearance": {"fog_visibility": (5.0, 1000.0)}}, "appearances without ranges"),
-        ({"dynamics": {"mode": "simple_flight"}}, "support only dynamics"),
-        ({"appearance": {"fog_visibility": 50.0}, "within": 0.05}, "only appearance=minimal"),
-    ],
-)
-def test_unsupported_policies_are_refused(good, change, message):
-    policy = good.in_appearance(AppearanceSettings(**change.get("appearance", {})))
-    policy = policy.in_dynamics(**change.get("dynamics", {}))
-    with pytest.raises(InputError, match=message):
-        drone_rl.chances(policy, [6.0], task=ONE, within=change.get("within", 0.0), progress=silent)
 
 
 def test_tables_and_bounds(good):

@@ -116,14 +116,6 @@ def test_another_description_is_refused(one_sided, policy, part, value, message)
         check_same_policy(Certificate.read(one_sided), policy.description, policy.state["policy"])
 
 
-def test_another_network_or_dynamics_is_refused(parsed, policy):
-    with pytest.raises(InputError, match="certificate is for a network with hash"):
-        check_same_policy(parsed, policy.description, drone_rl.load_policy("good").state["policy"])
-    moved = policy.in_dynamics(mode="simple_flight")
-    with pytest.raises(InputError, match="only dynamics=computer_vision"):
-        check_same_policy(parsed, moved.description, policy.state["policy"])
-
-
 def test_read_validated_requires_consistency(write):
     policy = drone_rl.load_policy("good").in_task(num_cubes=2)
     data = of_every_place(policy, undecided=True)
