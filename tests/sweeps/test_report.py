@@ -102,7 +102,7 @@ def test_no_sweep(tmp_path):
 
 def test_terminal_lines(sweep):
     lines = terminal_lines(write_sweep_report(sweep)[1]).splitlines()
-    assert lines[0].startswith("4 runs: 3 finished, 1 failed, 0 damaged, 0 unfinished. All figures")
+    assert lines[0].startswith("4 runs: 3 finished, 1 failed, 0 damaged, 0 unfinished. Failed")
     low, high = (line.split(maxsplit=1) for line in lines[2:4])
     assert low == ["optimizer.lr=1e-3", "solved 2 of 2; verdicts: good 2"]
     assert high[1] == "solved 0 of 2; verdicts: one-sided 1 (0 certain), failed 1"
@@ -125,9 +125,9 @@ def six(begin_sweep, make_verdict):
     [
         ("runs", "count as not solved", {"failed": 1}),
         ("runs", "can't be read", {"damaged": 2}),
-        ("runs", "not ended yet", {"unfinished": 1}),
-        ("runs", "1 of 1 settings with fewer than 6", {"groups": {"ended": 5}}),
-        ("runs", "1 of 1 settings with fewer than 6", {"groups": {"damaged": 1}}),
+        ("runs", "are left out of every", {"unfinished": 1}),
+        ("runs", "1 of 1 settings have fewer than 6", {"groups": {"ended": 5}}),
+        ("runs", "1 of 1 settings have fewer than 6", {"groups": {"damaged": 1}}),
         ("runs", "at least half", {"groups": {"frames_to_solve": median_of_runs([INF], [9.0])}}),
         ("verdicts", "2 of 6 verdicts are not certain", {"certain": 4}),
         ("verdicts", "older rule", {"judged_by_older_rule": 2}),
@@ -135,7 +135,7 @@ def six(begin_sweep, make_verdict):
         ("best", "No run has been judged", {"best": None}),
         ("curves", "Thin lines", {"groups": {"ended": 3}}),
         ("sides", "without a dot", {"sides_not_offered": 1}),
-        ("costs", "open triangle", {"failed": 1}),
+        ("costs", "Open triangles", {"failed": 1}),
     ],
 )
 def test_what_makes_a_sentence(six, part, text, change):
@@ -145,9 +145,8 @@ def test_what_makes_a_sentence(six, part, text, change):
 @pytest.mark.parametrize(
     ("part", "text", "change"),
     [
-        ("runs", "read from files", {"unfinished": 6}),
         ("verdicts", "Verdicts are on the last policies", {"judged": 0}),
-        ("verdicts", "All of them are certain", {"certain": 5}),
+        ("verdicts", "All are certain", {"certain": 5}),
         ("best", "reaches 100% of its goals", {"best": None}),
         ("best", "optimistic", {"judged": 1}),
         ("curves", "Thick line", {"groups": {"ended": 5}}),
