@@ -70,7 +70,8 @@ class Model(pydantic.BaseModel, metaclass=_Checked):
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with other values of some fields; see above for errors."""
-        return type(self)(**{**dict(self), **changes})
+        fields = {name: getattr(self, name) for name in type(self).model_fields}
+        return type(self)(**{**fields, **changes})
 
 
 class Stored(Model):

@@ -28,7 +28,8 @@ def checkpoint(tmp_path):
     runs = [
         Run(i, (f"seed={i}", "sweep=seeds", "trial=4"), tmp_path / f"run_{i}") for i in range(3)
     ]
-    Sweep(tmp_path, "drone-rl train sweep=seeds", {}, runs).save()
+    sweep = Sweep(folder=tmp_path, command="drone-rl train sweep=seeds", settings={}, runs=runs)
+    sweep.save()
     folder = runs[1].folder
     (folder / ".hydra").mkdir(parents=True)
     (folder / ".hydra" / "overrides.yaml").write_text("[seed=1]")
@@ -46,12 +47,6 @@ def test_origin_of_a_run_of_a_sweep(checkpoint):
     command, chosen = choice_in_sweep(checkpoint)
     assert command == "drone-rl train seed=1 sweep=seeds hydra.mode=RUN"
     assert chosen == {"runs": 3, "episodes": 200}
-
-
-def test_origin_of_a_run_without_a_current_verdict(checkpoint):
-    assert choice_in_sweep(checkpoint)[1] == {"runs": 3, "episodes": None}
-    judged(checkpoint, rule="of yore")
-    assert choice_in_sweep(checkpoint)[1] == {"runs": 3, "episodes": None}
 
 
 def test_origin_of_a_single_run(checkpoint):
