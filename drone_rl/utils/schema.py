@@ -48,8 +48,11 @@ class Annotation:
     hint: Any
     unit: str = ""
     """Unit, for documentation."""
-    words: str = ""
-    """The allowed values in words."""
+
+    @property
+    def words(self) -> str:
+        """The allowed values in words."""
+        return ""
 
     @property
     def reason(self) -> str:
@@ -141,7 +144,11 @@ class Flag(Annotation):
     """True or false."""
 
     hint = Annotated[bool, Strict()]
-    words = "true or false"
+
+    @property
+    def words(self) -> str:
+        """The allowed values in words."""
+        return "true or false"
 
 
 @dataclasses.dataclass(frozen=True)

@@ -76,7 +76,7 @@ def test_a_policy_of_registered_parts_is_evaluated(folder):
 
 def test_without_the_plug_in_one_line_names_the_part_and_the_remedy(folder):
     line = error_line(drone_rl("evaluate", "policy=run", *FEW, cwd=folder))
-    assert "transforms[3].name='mirror' is not registered" in line
+    assert "transforms[3].name='mirror': it must be one of" in line
     assert "plugins=[MODULE]" in line
 
 

@@ -41,7 +41,7 @@ def test_a_worker_imports_the_modules_that_register_its_parts(tmp_path, monkeypa
     settings = TrainSettings(task=TASK, network="ray_cells", collector=Ray(num_envs=2))
     sent = (settings.config(), sorted(modules_of(settings)))
     del sys.modules["ray_plugin"], plugin.Cells.Settings.target  # as in a new process
-    with pytest.raises(InputError, match="is not registered"):
+    with pytest.raises(InputError, match="it must be one of"):
         Network.read("ray_cells", "network")
     collector, network, _ = _remote_collector(*sent, [2], 0, None)
     collector.shutdown()
