@@ -7,16 +7,24 @@ from pathlib import Path
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
+from drone_rl.sweeps.manifest import Sweep
+from drone_rl.sweeps.summary import Summary
 from drone_rl.trust.bodies import Bodies
 from drone_rl.trust.evaluate import Evaluation
 from drone_rl.trust.judge import Judgement
 from drone_rl.trust.shifts import Shifts
 from drone_rl.utils.models import Model
+from drone_rl.verification.chances import Chances
+from drone_rl.verification.checker.certificate import Certificate
 
 RESULTS: dict[str, type[Model]] = {
     "bodies": Bodies,
+    "certificate": Certificate,
+    "chances": Chances,
     "evaluation": Evaluation,
     "shifts": Shifts,
+    "summary": Summary,
+    "sweep": Sweep,
     "verdict": Judgement,
 }
 """Classes of result files by the file's name without its suffix."""

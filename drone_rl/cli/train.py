@@ -17,7 +17,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import bar_or_lines
 from drone_rl.utils.readers import read_result
 from drone_rl.utils.schema import Whole
-from drone_rl.verification.text import describe_round
+from drone_rl.utils.text import render
 
 if TYPE_CHECKING:
     from drone_rl.training import Callback
@@ -81,7 +81,7 @@ class TrainCommand(CommandSettings, TrainSettings):
             training = vars(stop)["training"]
         _log.info("%s", training)
         for row in training.result.get("rounds", ()):
-            _log.info(describe_round(row))
+            _log.info(render("drone_rl.verification", "round.j2", **row))
         if not training.reason.startswith("SIG"):
             if before is not None and before.get("frames") == training.result["frames"]:
                 _log.info(

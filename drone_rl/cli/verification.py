@@ -30,7 +30,7 @@ class ProveCommand(PolicyCommandSettings, ProveSettings):
         proof = drone_rl.prove(self.policy, settings, folder=folder, **self.shared())
         print(proof)
         _log.info("written: %s", folder / "certificate.json")
-        if proof.certificate["found"]["stopped_by"] == "limit_s":
+        if proof.certificate.found.stopped_by == "limit_s":
             _log.info("resume with the same command and hydra.run.dir=%s", folder)
         return 0 if proof.is_proved else NOT_PROVED, proof.success
 

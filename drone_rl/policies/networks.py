@@ -134,11 +134,6 @@ class PolicyNetwork(ImageNetwork):
         return logits.reshape(*pixels.shape[:-3], logits.shape[-1])
 
 
-def has_own_weights(layer: nn.Module) -> bool:
-    """Return whether weight and bias are a layer's parameters, not computed from others."""
-    return {name for name, _ in layer.named_parameters(recurse=False)} == {"weight", "bias"}
-
-
 class Trunk(nn.Module):
     """A policy network without its last layer: frames (*, C, H, W) to features (*, F)."""
 

@@ -70,7 +70,8 @@ class Model(pydantic.BaseModel, metaclass=_Checked):
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with other values of some fields; see above for errors."""
-        return type(self)(**{**dict(self), **changes})
+        fields = {name: getattr(self, name) for name in type(self).model_fields}
+        return type(self)(**{**fields, **changes})
 
 
 class Stored(Model):
@@ -124,6 +125,7 @@ def input_error(
         else details["msg"][:1].lower() + details["msg"][1:]
     )
     if details["type"] == "literal_error":
+        reason = re.sub(r"<[\w.]+: ('[^']*')>", r"\1", reason)  # a member of an enum
         reason += did_you_mean(details["input"], re.findall(r"'([^']+)'", reason))
     value = f"{place}={shown(details['input'])}" if place else shown(details["input"])
     return InputError(f"{value}: it {reason}")

@@ -252,7 +252,7 @@ def test_untested_axes_cover_nothing():
     [
         ("", "is empty; the file was damaged"),
         ("{}", "is empty; give axes"),
-        ("wind: {low: 1, unit: m/s}", "axis='wind' is unknown; give object_color"),
+        ("wind: {low: 1, unit: m/s}", "axis='wind': it must be 'object_color'"),
         ("fog: 60", "fog=60: .*; give low, high or both, and unit: m of sight"),
         ("fog: {low: 60, unit: km}", "fog.unit=km must be m of sight"),
         ("fog: {unit: m of sight}", r"fog: \[\] must be one or two rising numbers"),

@@ -28,7 +28,8 @@ def checkpoint(tmp_path):
     runs = [
         Run(i, (f"seed={i}", "sweep=seeds", "trial=4"), tmp_path / f"run_{i}") for i in range(3)
     ]
-    Sweep(tmp_path, "drone-rl train sweep=seeds", {}, runs).save()
+    sweep = Sweep(folder=tmp_path, command="drone-rl train sweep=seeds", settings={}, runs=runs)
+    sweep.save()
     folder = runs[1].folder
     (folder / ".hydra").mkdir(parents=True)
     (folder / ".hydra" / "overrides.yaml").write_text("[seed=1]")
