@@ -1,7 +1,7 @@
 import pytest
 
+from drone_rl.utils.models import Seeded
 from drone_rl.utils.text import (
-    CHECK,
     Sentence,
     exact,
     listed,
@@ -63,10 +63,9 @@ def test_sentences_have_conditions():
     assert say(lambda e: {"loops.a": "A.", "loops.b": "B."}, {}) == "A. B."
 
 
-def test_fixed_seeds_are_reported():
-    fixed = said(CHECK, {"seed": 5, "seed_is_fixed": True})
-    assert [*fixed] == ["check.fixed_seed"]
-    assert all("Fixed seed 5" in text for text in fixed.values())
-    assert said(CHECK, {"seed": 9, "seed_is_fixed": False}) == {}
+def test_seeds_are_reported():
     assert seed_line({"seed": 9, "seed_is_fixed": False}) == "environments: seed 9 (fresh)"
-    assert seed_line({"seed": 0}, "placements") == "placements: seed 0 (fixed)"
+    fixed = Seeded(seed=5)
+    assert fixed.seed_line("placements") == "placements: seed 5 (fixed)"
+    assert fixed.seed_warning().startswith("Fixed seed 5: a policy could have been fitted")
+    assert fixed.replace(seed_is_fixed=False).seed_warning() == ""
