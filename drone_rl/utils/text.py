@@ -89,12 +89,6 @@ def ordinal(number: int) -> str:
     return f"{place}{'th' if is_teen else _ENDINGS.get(place % 10, 'th')}"
 
 
-def exact(share: float, is_all: bool = False) -> str:
-    """Return a rate in percent with nine digits; "100%" only with `is_all`."""
-    text = f"{100 * share:.9g}%"
-    return text if is_all or text != "100%" else "more than 99.9999999%"
-
-
 Evidence = Mapping[str, Any]
 """Plain numbers, texts, lists and mappings."""
 

@@ -3,7 +3,6 @@ import pytest
 from drone_rl.utils.models import Seeded
 from drone_rl.utils.text import (
     Sentence,
-    exact,
     listed,
     ordinal,
     percent,
@@ -21,15 +20,6 @@ def test_lists_and_counts():
     assert plural(2, "axis", "axes") == "2 axes"
     assert [ordinal(i) for i in (0, 8, 9, 10)] == ["first", "ninth", "10th", "11th"]
     assert [ordinal(i) for i in (20, 21, 22, 110)] == ["21st", "22nd", "23rd", "111th"]
-
-
-def test_exact_rates_are_never_rounded_to_all():
-    shares = (0.0, 1e-12, 0.25, 1 / 3, 1 - 1e-9)
-    texts = ["0%", "1e-10%", "25%", "33.3333333%", "99.9999999%"]
-    assert [exact(share) for share in shares] == texts
-    for share in (1 - 1e-10, 1 - 1e-16, 1.0):  # which too few digits, or a sum's errors, make 1
-        assert exact(share) == "more than 99.9999999%"
-    assert exact(1 - 1e-16, is_all=True) == "100%"
 
 
 def test_percentages_are_never_rounded_to_none_or_all():
