@@ -89,17 +89,6 @@ def ordinal(number: int) -> str:
     return f"{place}{'th' if is_teen else _ENDINGS.get(place % 10, 'th')}"
 
 
-def all_cubes(count: int) -> str:
-    """Return all cubes of a task in words."""
-    return "the cube" if count == 1 else f"all {count} cubes"
-
-
-def exact(share: float, is_all: bool = False) -> str:
-    """Return a rate in percent with nine digits; "100%" only with `is_all`."""
-    text = f"{100 * share:.9g}%"
-    return text if is_all or text != "100%" else "more than 99.9999999%"
-
-
 Evidence = Mapping[str, Any]
 """Plain numbers, texts, lists and mappings."""
 
@@ -179,20 +168,3 @@ def seed_line(evidence: Evidence, what: str = "environments") -> str:
     """Return the seed of a result and its origin; `what` is sampled from its streams."""
     seed, kind = evidence.get("seed"), "fixed" if is_fixed(evidence) else "fresh"
     return f"{what}: seed {'not recorded' if seed is None else seed} ({kind})"
-
-
-def fixed_seed(name: str, what: str = "environments") -> Sentence:
-    """Return the warning about a seed that was known before; `what` is sampled from its streams."""
-
-    def text(evidence: Evidence) -> str:
-        seed = evidence.get("seed")
-        label = f"Fixed {what}" if seed is None else f"Fixed seed {seed}"
-        return f"{label}: a policy could have been fitted to these {what}."
-
-    return Sentence(name, "the seed was known before the analysis", is_fixed, text)
-
-
-CHANCES = (fixed_seed("chances.fixed_seed", "placements"),)
-"""Evidence: `chances.json` of held-out placements; those that a user gives have no seed."""
-CHECK = (fixed_seed("check.fixed_seed", "placements"),)
-"""Evidence: `check.json`."""

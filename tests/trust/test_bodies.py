@@ -64,7 +64,7 @@ def test_text_and_files(done, tmp_path):
         ("nobody", {}, "nobody"),
         ([], {}, r"policies=\[\] is empty"),
         (["good", "good"], {}, "two policies are called good"),
-        ("good", {"bodies": ["submarine"]}, "submarine.* is unknown"),
+        ("good", {"bodies": ["submarine"]}, "bodies.*submarine"),
     ],
 )
 def test_mistakes(policies, told, message):

@@ -1,9 +1,8 @@
 import pytest
 
+from drone_rl.utils.models import Seeded
 from drone_rl.utils.text import (
-    CHECK,
     Sentence,
-    exact,
     listed,
     ordinal,
     percent,
@@ -21,15 +20,6 @@ def test_lists_and_counts():
     assert plural(2, "axis", "axes") == "2 axes"
     assert [ordinal(i) for i in (0, 8, 9, 10)] == ["first", "ninth", "10th", "11th"]
     assert [ordinal(i) for i in (20, 21, 22, 110)] == ["21st", "22nd", "23rd", "111th"]
-
-
-def test_exact_rates_are_never_rounded_to_all():
-    shares = (0.0, 1e-12, 0.25, 1 / 3, 1 - 1e-9)
-    texts = ["0%", "1e-10%", "25%", "33.3333333%", "99.9999999%"]
-    assert [exact(share) for share in shares] == texts
-    for share in (1 - 1e-10, 1 - 1e-16, 1.0):  # which too few digits, or a sum's errors, make 1
-        assert exact(share) == "more than 99.9999999%"
-    assert exact(1 - 1e-16, is_all=True) == "100%"
 
 
 def test_percentages_are_never_rounded_to_none_or_all():
@@ -63,10 +53,9 @@ def test_sentences_have_conditions():
     assert say(lambda e: {"loops.a": "A.", "loops.b": "B."}, {}) == "A. B."
 
 
-def test_fixed_seeds_are_reported():
-    fixed = said(CHECK, {"seed": 5, "seed_is_fixed": True})
-    assert [*fixed] == ["check.fixed_seed"]
-    assert all("Fixed seed 5" in text for text in fixed.values())
-    assert said(CHECK, {"seed": 9, "seed_is_fixed": False}) == {}
+def test_seeds_are_reported():
     assert seed_line({"seed": 9, "seed_is_fixed": False}) == "environments: seed 9 (fresh)"
-    assert seed_line({"seed": 0}, "placements") == "placements: seed 0 (fixed)"
+    fixed = Seeded(seed=5)
+    assert fixed.seed_line("placements") == "placements: seed 5 (fixed)"
+    assert fixed.seed_warning().startswith("Fixed seed 5: a policy could have been fitted")
+    assert fixed.replace(seed_is_fixed=False).seed_warning() == ""
