@@ -18,7 +18,7 @@ import math
 import re
 import types
 import typing
-from collections.abc import Callable, Mapping, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from typing import Annotated, Any, NamedTuple, TypeVar, cast
 
 from drone_rl.config.learning import Collector, Objective, Returns
@@ -27,7 +27,7 @@ from drone_rl.config.parts import Part
 from drone_rl.config.transforms import Frame, Transform
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.plugins import described, errors_of, place_of
-from drone_rl.utils.schema import Flag, Kind, Maybe, OneOf, Real, Several, Text, Whole
+from drone_rl.utils.schema import Flag, Kind, Real, Several, Text, Whole
 from drone_rl.utils.settings import Settings
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -270,22 +270,15 @@ def _fields(
 
 
 def _annotated(hint: Any, where: str) -> Any:
-    """Return the type of a parameter, annotated with the kind of its values."""
-    if typing.get_origin(hint) is Annotated:
+    """Return the type of a parameter as that of a setting: lists and sequences are tuples."""
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    inner = {*arguments} - {types.NoneType}
+    is_optional = origin in (typing.Union, types.UnionType) and len(inner) == 1
+    is_choice = origin is typing.Literal and all(isinstance(text, str) for text in arguments)
+    if origin is Annotated or hint in _KINDS or is_choice or (is_optional and inner <= {*_KINDS}):
         return hint
-    texts = typing.get_args(hint)
-    if typing.get_origin(hint) is typing.Literal and all(isinstance(text, str) for text in texts):
-        return Annotated[str, OneOf(texts)]
-    if typing.get_origin(hint) in (typing.Union, types.UnionType):
-        inner = [of for of in typing.get_args(hint) if of is not types.NoneType]
-        if len(inner) == 1 and inner[0] in _KINDS:
-            return Annotated[hint, Maybe(_KINDS[inner[0]])]
-    if typing.get_origin(hint) in (tuple, list, typing.get_origin(typing.Sequence[int])):
-        of, *more = typing.get_args(hint) or (None,)
-        if of in _KINDS and more in ([], [...]):
-            return Annotated[tuple[of, ...], Several(_KINDS[of], 0, 1000)]
-    if hint in _KINDS:
-        return Annotated[hint, _KINDS[hint]]
+    if origin in (tuple, list, Sequence) and inner <= {*_KINDS, ...} and len(inner - {...}) == 1:
+        return Annotated[tuple[arguments[0], ...], Several(_KINDS[arguments[0]], 0, 1000)]
     raise InputError(
         f"{where} is of type {hint}; give int, float, bool, str, a tuple of one of these, Literal, "
         "or Annotated with a kind of drone_rl.utils.schema"

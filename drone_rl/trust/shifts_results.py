@@ -18,7 +18,7 @@ from drone_rl.trust.results import Difference, Verdict
 from drone_rl.utils.display import Result
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import Mean, Share
-from drone_rl.utils.models import Seeded, Stored
+from drone_rl.utils.models import Model, Seeded, Stored
 from drone_rl.utils.provenance import Provenance
 from drone_rl.utils.text import listed, percent, render
 
@@ -414,7 +414,7 @@ def not_evaluated(shifts: Robustness | None) -> list[str]:
     return [name for group, name in names.items() if group not in tested]
 
 
-class Need(Stored):
+class Need(Model):
     """Required range of an axis; None stands for the value without perturbation."""
 
     low: Annotated[float, pydantic.Field(ge=-1e9, le=1e9)] | None = None

@@ -125,6 +125,7 @@ def input_error(
         else details["msg"][:1].lower() + details["msg"][1:]
     )
     if details["type"] == "literal_error":
+        reason = re.sub(r"<[\w.]+: ('[^']*')>", r"\1", reason)  # a member of an enum
         reason += did_you_mean(details["input"], re.findall(r"'([^']+)'", reason))
     value = f"{place}={shown(details['input'])}" if place else shown(details["input"])
     return InputError(f"{value}: it {reason}")

@@ -48,11 +48,13 @@ class Annotation:
     hint: Any
     unit: str = ""
     """Unit, for documentation."""
+    words: str = ""
+    """The allowed values in words."""
 
     @property
     def reason(self) -> str:
-        """Why a value is refused, as in "must be true or false"; "" for pydantic's reasons."""
-        return ""
+        """Why a value is refused; empty for pydantic's own reasons."""
+        return f"must be {self.words}" if self.words else ""
 
     def read(self, value: Any, where: str) -> Any:
         """See `Kind`."""
@@ -91,11 +93,6 @@ class Whole(Annotation):
         return Annotated[int, Field(strict=True, ge=self.low, le=high)]
 
     @property
-    def reason(self) -> str:
-        """See `Annotation`."""
-        return f"must be {self.words}"
-
-    @property
     def words(self) -> str:
         """The range in words."""
         if self.high == math.inf:
@@ -126,11 +123,6 @@ class Real(Annotation):
         return Annotated[float, Field(strict=True, allow_inf_nan=False, **bounds)]
 
     @property
-    def reason(self) -> str:
-        """See `Annotation`."""
-        return f"must be {self.words}"
-
-    @property
     def words(self) -> str:
         """The range in words."""
         low, high = f"{self.low:g}", f"{self.high:g}"
@@ -150,11 +142,6 @@ class Flag(Annotation):
 
     hint = Annotated[bool, Strict()]
     words = "true or false"
-
-    @property
-    def reason(self) -> str:
-        """See `Annotation`."""
-        return f"must be {self.words}"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -188,7 +175,6 @@ class Text(Annotation):
     """One line of printable characters; a path or a device of torch is its text."""
 
     longest: int = LONGEST_TEXT
-    words = "a text"
 
     @property
     def hint(self) -> Any:
@@ -206,7 +192,6 @@ class FileName(Annotation):
     """The name of a file without its suffix; no path and no hidden file."""
 
     longest: int = 150
-    words = "a text"
 
     @property
     def hint(self) -> Any:

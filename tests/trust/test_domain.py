@@ -199,12 +199,6 @@ def test_one_sided_policy_is_bad(make_prober):
     assert prober.plain.worst.share < 0.2
 
 
-def test_sizes_that_the_task_refuses_are_bad(make_prober):
-    probed = make_prober(subject(), 1).probe(Condition(task={"cube_size": 9.0}), 1.0)
-    assert (probed.good, probed.bad) == (False, True)
-    assert "sinks cubes" in probed.refused
-
-
 def quantity(value, lower, upper, *thresholds):
     return Quantity(value=value, lower=lower, upper=upper, thresholds=thresholds or (0.0,))
 

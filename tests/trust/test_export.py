@@ -1,6 +1,5 @@
 """Where an exported policy says that it comes from."""
 
-import dataclasses
 import json
 
 import pytest
@@ -50,12 +49,6 @@ def test_origin_of_a_run_of_a_sweep(checkpoint):
     assert chosen == {"runs": 3, "episodes": 200}
 
 
-def test_origin_of_a_run_without_a_current_verdict(checkpoint):
-    assert choice_in_sweep(checkpoint)[1] == {"runs": 3, "episodes": None}
-    judged(checkpoint, rule="of yore")
-    assert choice_in_sweep(checkpoint)[1] == {"runs": 3, "episodes": None}
-
-
 def test_origin_of_a_single_run(checkpoint):
     (checkpoint.parents[2] / "sweep.json").unlink()
     assert choice_in_sweep(checkpoint) is None
@@ -93,7 +86,7 @@ def test_card_quotes_and_copies_a_robustness_evaluation(tmp_path, name, is_good)
     """Those of one whom the card's verdict surely finds to be something else are not believed."""
     policy, made = drone_rl.load_policy(name).in_task(**ONE), tmp_path / "made.json"
     shifts_of(policy).write_json(made)
-    settings = dataclasses.replace(FEW, episodes=4 if is_good else 300, num_envs=300)
+    settings = FEW.replace(episodes=4 if is_good else 300, num_envs=300)
     export(policy, tmp_path / "mine.safetensors", settings, shifts=made)
     card = (tmp_path / "mine.md").read_text()
     assert ("with blur of up to 1 pixels and up to 4 dead rows" in card) == is_good

@@ -132,7 +132,7 @@ def _may_be(hint: Any) -> str:
             return f"{count} values, each {_may_be(kind.kind)}"
         case OneOf():
             return " or ".join(f"`{name}`" for name in kind.names)
-    return "true or false" if kind is bool else getattr(kind, "words", "a text")
+    return "true or false" if kind is bool else getattr(kind, "words", "") or "a text"
 
 
 def _link(cls: type) -> str:

@@ -179,7 +179,7 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
     words.sort(key=lambda word: word not in OPTIONS)  # Hydra needs options before settings
     import_plugins(words)
     store_defaults({name: command})
-    check_words(name, conf_dir(), words)
+    check_words(name, words)
     if is_help:
         with _explained(name, words):
             show_help(name, words, command, topics)
@@ -202,7 +202,7 @@ def _run_once(name: str, job: Callable[[DictConfig], object], words: Sequence[st
 
     Return False, without a run, if the user's own files contain callbacks or select a sweep.
     """
-    config = composed(name, conf_dir(), words)
+    config = composed(name, words)
     if config.hydra.callbacks or config.hydra.mode not in (None, RunMode.RUN):
         return False
     unused: Any = Callback()  # a base class without actions
@@ -220,7 +220,7 @@ def _explained(name: str, words: Sequence[str]) -> Iterator[None]:
     except (HydraException, OmegaConfBaseException, YAMLError) as error:
         if input_error(error) is not None:
             raise
-        raise explain(error, name, conf_dir(), words) from error
+        raise explain(error, name, words) from error
 
 
 def read_settings(cls: type[S], config: DictConfig) -> S:

@@ -20,7 +20,6 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import (
     Settings,
     about,
-    conf_dir,
     hints_of,
     inner_types,
     meanings,
@@ -49,11 +48,11 @@ def show_help(
         InputError: There is no setting and no group of settings of a name.
     """
     typed = [o for o in overrides if "=" in o or o.startswith("~")]
-    config = composed(command, conf_dir(), typed)
+    config = composed(command, typed)
     values: Any = OmegaConf.to_container(config, resolve=False)
     del values["hydra"]
     selected = {g: c for g, c in config.hydra.runtime.choices.items() if "@" not in g}
-    names = {g: [n for n in choices(conf_dir(), g) if n != "basic"] for g in selected}
+    names = {g: [n for n in choices(g) if n != "basic"] for g in selected}
     groups = {g: names[g] for g in names if names[g] and g not in _NOT_SHOWN}
     keys = [*(group for group in groups if group not in values), *flattened(values)]
     described = {key: (text, unit) for key, text, unit in _described(settings, values)}

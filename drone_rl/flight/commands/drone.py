@@ -273,7 +273,7 @@ class Drone:
         """
         requests = Several(Instance(ImageRequest), 1, 1000).read(requests, "requests")
         worlds, state = self._scene("images")
-        return [batch[0] for batch in images(worlds, state, requests, height=height, width=width)]
+        return images(worlds, state, requests, height=height, width=width)
 
     def set_pose(
         self, position: Sequence[float], *, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0

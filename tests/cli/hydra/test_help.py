@@ -16,8 +16,6 @@ from drone_rl.cli.main import find_command
 from drone_rl.utils.errors import InputError
 from tests.cli.hydra.conftest import FILES
 
-CONF = Path(__file__).parents[3] / "conf"
-
 
 @pytest.mark.parametrize("command", FILES)
 def test_every_setting_of_every_command_is_explained(command, config, capsys):
@@ -57,7 +55,7 @@ def test_examples_are_command_lines_of_the_command(name):
         first, second, *words = line.split()
         assert (first, second) == ("drone-rl", name)
         typed = find_command(name).prepare([w for w in words if "resume=" not in w])
-        composed(command, CONF, [w for w in typed if not w.startswith("-") and "," not in w])
+        composed(command, [w for w in typed if not w.startswith("-") and "," not in w])
 
 
 def test_the_policy_and_the_next_commands():
@@ -82,7 +80,7 @@ def test_next_commands_exist_with_these_settings(name, tmp_path):
         if line.startswith("  drone-rl"):
             command, *words = line.split()[1:]
             store_defaults({command: find_command(command)})
-            composed(command, CONF, words)
+            composed(command, words)
 
 
 def test_next_commands_name_existing_files(tmp_path):

@@ -6,7 +6,6 @@ from hydra.errors import HydraException
 from drone_rl.cli.hydra.mistakes import check_words, explain, no_command
 from drone_rl.cli.main import COMMANDS
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.settings import conf_dir
 from tests.cli.running import error_line
 
 pytestmark = pytest.mark.usefixtures("registered")
@@ -16,10 +15,10 @@ def message(line):
     """The error about a command line that Hydra, or the check before it, rejects."""
     name, *words = line if isinstance(line, list) else line.split(" ")
     try:
-        check_words(name, conf_dir(), words)
+        check_words(name, words)
     except InputError as error:
         return str(error)
-    return str(explain(HydraException("Hydra's words"), name, conf_dir(), words))
+    return str(explain(HydraException("Hydra's words"), name, words))
 
 
 @pytest.mark.parametrize(
@@ -56,7 +55,7 @@ def test_a_value_of_a_wrong_type_is_named(in_process):
 def test_correct_words_pass_the_check():
     words = ["-m", "seed=0,1", "--multirun", "-h", "--help", "~x", "+a.b=1", "a='b c'"]
     words += ["x=[1,2]", "y='[', ']'", "hydra/launcher=slurm", "task=choice(pillars,collect_one)"]
-    check_words("train", conf_dir(), words)
+    check_words("train", words)
 
 
 @pytest.mark.parametrize(

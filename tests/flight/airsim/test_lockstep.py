@@ -66,19 +66,6 @@ def test_what_is_asked_at_once_is_answered_at_the_start(start):
     assert stamp(client) == pytest.approx(begin + 2.0, abs=0.05)
 
 
-def test_what_is_asked_later_is_answered_at_the_end(start):
-    """The movement takes some 50 ms of real time; the request comes while it goes on."""
-    _, client = start(patience_s=0.0)
-    take_off(client)
-    begin = stamp(client)
-    movement = velocity(client, 8.0)
-    time.sleep(0.02)
-    asked = client.send("getMultirotorState")
-    assert client.receive(movement) == (None, True)
-    _, state = client.receive(asked)
-    assert state["timestamp"] / 1e9 == pytest.approx(begin + 8.0, abs=0.05)
-
-
 def test_loops_that_ask_go_on_and_end_at_the_same_time(start):
     def fly(pause):
         _, client = start(patience_s=0.3)
