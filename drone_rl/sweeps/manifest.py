@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from drone_rl.config.configuration import check_same_config
 from drone_rl.utils.errors import InputError
@@ -90,7 +90,7 @@ class Sweep(Provenance, extra="forbid"):
     """A sweep: the content of `sweep.json`."""
 
     format: Literal["drone_rl sweep, version 2"] = "drone_rl sweep, version 2"
-    command: Annotated[str, AfterValidator(lambda text: COMMAND.read(text, "command"))]
+    command: Annotated[str, COMMAND]
     """The command that began the sweep."""
     settings: dict[str, Any]
     """The common settings of all runs, with interpolations unresolved."""

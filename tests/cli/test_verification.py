@@ -12,7 +12,7 @@ def test_a_proof_for_one_cube(in_process, tmp_path):
         "prove", "policy=right_and_forward", "task.num_cubes=1", f"hydra.run.dir={tmp_path}"
     )
     assert done.returncode == 15, done.stderr
-    assert "0.6375" in done.stdout
+    assert "63.75%" in done.stdout
     assert json.loads((tmp_path / "certificate.json").read_text())["finished"]
 
 
@@ -53,4 +53,4 @@ def test_chances_of_one_placement(in_process, tmp_path):
     (placement,) = json.loads((tmp_path / "c" / "chances.json").read_text())["placements"]
     assert placement["cubes"] == [[15.0, 0.5, 2.5]]
     assert 0.9999 < placement["success"] < 1
-    assert "more than 99.99%" in done.stdout.splitlines()[1]
+    assert ">99.99%" in done.stdout.splitlines()[1]

@@ -66,8 +66,8 @@ def test_no_sweep_and_a_damaged_one(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"command": "drone-rl train; rm -rf ~"}, "not a training command"),
-        ({"settings": [1]}, r"settings=\(list\)"),
+        ({"command": "drone-rl train; rm -rf ~"}, "must be a training command"),
+        ({"settings": [1]}, r"settings=\[1\]"),
         ({"plugins": []}, "plugins is unknown"),
         ({"runs": [{"number": 0, "overrides": [], "folder": "../0"}]}, "not inside the sweep's"),
         (

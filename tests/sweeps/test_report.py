@@ -108,7 +108,7 @@ def test_terminal_lines(sweep):
     assert high[1] == "solved 0 of 2; verdicts: one-sided 1 (0 certain), failed 1"
     assert lines[4] == "run 3 failed: <b>NaN</b>"
     assert lines[5].startswith(
-        "best run: Run 0: good, which reaches 100% of its goals; selected by"
+        "best run: Run 0: good, which reaches 100% of its goals in 200 episodes"
     )
     assert lines[6] == "to repeat it: drone-rl train optimizer.lr=1e-3 seed=0 logger=csv"
 
@@ -154,7 +154,7 @@ def test_what_makes_a_sentence(six, part, text, change):
         ("sides", "Each dot", {"sides_not_offered": 6}),
         ("entropies", "Each dot", {"runs": ()}),
         ("costs", "Each dot", {"groups": {"solved": share_of_runs(0, 0, 6)}}),
-        ("settings", "Clopper-Pearson", {"unfinished": 6}),
+        ("settings", "exact 95% intervals", {"unfinished": 6}),
     ],
 )
 def test_what_takes_a_sentence_away(six, part, text, change):
