@@ -11,7 +11,7 @@ from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
-from torchrl.envs import TransformedEnv
+from torchrl.envs import EnvBase
 
 from drone_rl.config.configuration import from_arguments
 from drone_rl.explanations import attribution, behavior, class_models, embedding, response, truth
@@ -166,7 +166,7 @@ def _named(policies: Given | Sequence[Given], outputs: str | Path) -> dict[str, 
 
 
 def explain_policy(
-    env: TransformedEnv,
+    env: EnvBase,
     network: ImageNetwork,
     folder: Path,
     settings: ExplainSettings,
