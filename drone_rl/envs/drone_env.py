@@ -171,6 +171,16 @@ class DroneEnv(EnvBase):
         """
         return [side_stream(self._random_states[i], *key) for i in env_ids.tolist()]
 
+    @property
+    def base_env(self) -> Self:
+        """Itself, as TorchRL's `TransformedEnv.base_env`."""
+        return self
+
+    @property
+    def last_pixels(self) -> Tensor:
+        """The camera's images of the present states. Shape: (num_envs, H, W, 3), uint8."""
+        return self.worlds.render(self.worlds.state, appearance=self.appearances.current())
+
     def close(self, *, raise_if_closed: bool = True) -> None:
         """Stop the rendering threads."""
         if not self.is_closed:

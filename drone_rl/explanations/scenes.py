@@ -55,9 +55,8 @@ class Scenes:
         colors = {ChromaticityPixels: "chromaticity", RgbPixels: "rgb"}
         self.channels: str = next((name for kind, name in colors.items() if kind in kinds), "gray")
         """Channels of an observation: "gray", "rgb", or "chromaticity" (of red and blue)."""
-        self.memory: int = Pipeline(
-            self._transforms
-        ).earlier  # number of earlier frames in observations
+        self.memory: int = Pipeline(self._transforms).earlier
+        """Number of earlier frames in observations."""
         is_faulty = any(isinstance(one, CameraFault) for one in self._transforms)
         self.is_ambiguous: bool = is_faulty or base.appearances.varies
         """Whether a state has several observations: camera faults, appearances with ranges."""

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.collectors.complete_episodes import StepLog, run_episodes
+from drone_rl.collectors.complete_episodes import StepLog, rollout
 from drone_rl.config import (
     ActionSettings,
     CameraSettings,
@@ -216,7 +216,7 @@ def test_the_oracle_is_recorded_as_it_flies(tmp_path, kind):
     assert [path.name for path in paths] == [f"flight_0000{i}.npz" for i in range(3)]
     env = DroneEnv(3, settings.task, settings.camera, seed=5, actions=settings.actions)
     log = StepLog()
-    flown = run_episodes(env, oracle_policy(settings.task, env.worlds.dynamics.actions), 3, log=log)
+    flown = rollout(oracle_policy(settings.task, env.worlds.dynamics.actions), env, 3, log=log)
     assert bool(flown.success.all())
     env.set_seed(5)
     first = env.reset()["pixels"].numpy()

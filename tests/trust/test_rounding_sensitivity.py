@@ -7,7 +7,7 @@ import pytest
 import torch
 
 import drone_rl
-from drone_rl.collectors.complete_episodes import StepLog, run_episodes
+from drone_rl.collectors.complete_episodes import StepLog, rollout
 from drone_rl.policies.external_network import ExternalNetwork
 from drone_rl.policies.external_policy import policy_from
 from drone_rl.sim.actions import MOVES, Move
@@ -26,7 +26,7 @@ EPISODES = 20
 def examined(policy):
     with policy.flying(EPISODES, seed=1) as (env, actor):
         state, log = env.base_env.state_dict(), StepLog()
-        flown = run_episodes(env, actor, EPISODES, is_compiled=True, log=log)
+        flown = rollout(actor, env, EPISODES, compiled=True, log=log)
         env.base_env.load_state_dict(state)
         return check_rounding(env, actor, EPISODES, greedy=flown, log=log), flown, log
 
