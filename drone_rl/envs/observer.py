@@ -54,6 +54,16 @@ class EpisodeStreams:
         return sample
 
 
+def with_rows(memory: Tensor | None, rows: Tensor, values: Tensor) -> Tensor:
+    """Return a memory with values, (k, *), of environments, (k,); it grows, never in place."""
+    size = int(rows.max()) + 1
+    if memory is None or memory.shape[1:] != values.shape[1:]:
+        memory = values[:0]
+    if len(memory) < size:
+        memory = torch.cat([memory, values.new_zeros(size - len(memory), *values.shape[1:])])
+    return memory.index_copy(0, rows, values)
+
+
 class Stage:
     """A step of a pipeline that remembers something of each environment: a fault, or a stack."""
 
@@ -90,12 +100,7 @@ class Stage:
             memory = self.model.begin(images, sample)
         else:
             memory = self.model.update(self.memory[rows], images, sample)
-        known, size = self.memory, int(rows.max()) + 1
-        if known is None or known.shape[1:] != memory.shape[1:]:
-            known = memory[:0]
-        if len(known) < size:
-            known = torch.cat([known, memory.new_zeros(size - len(known), *memory.shape[1:])])
-        self.memory = known.index_copy(0, rows, memory)
+        self.memory = with_rows(self.memory, rows, memory)
 
 
 class Pipeline:

@@ -11,7 +11,7 @@ from tensordict.nn import TensorDictModuleBase
 from tensordict.utils import NestedKey
 from torch import Tensor
 
-from drone_rl.envs.observer import Observer
+from drone_rl.envs.observer import Observer, with_rows
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.view import Modality
@@ -199,17 +199,16 @@ class ActorAgent:
             read.set(key, _entry(context, key) if state is None else state[rows])
         acted = self._actor(read)
         for key in self._carried:
-            self._state[key] = self._state[key].index_copy(0, rows, acted.get(("next", key)))
+            self._state[key] = with_rows(self._state[key], rows, acted.get(("next", key)))
         written = {key: acted.get(key) for key in acted.keys(True, True)}
         return Act(written["action"], written.get("logits"), written)
 
     def _start(self, context: StepContext) -> None:
         """Forget the episodes before those that start."""
-        fresh = self._actor.network.start(context.worlds.num_envs)
         starting = context.rows[context.starts]
+        fresh = self._actor.network.start(len(starting))
         for key, value in zip(self._carried, fresh, strict=True):
-            before = self._state.get(key, value)
-            self._state[key] = before.index_copy(0, starting, value[starting])
+            self._state[key] = with_rows(self._state.get(key), starting, value)
 
 
 def _entry(context: StepContext, key: NestedKey) -> Tensor:
@@ -234,8 +233,7 @@ class DelayedAgent:
         due = range(now, now + self.delay) if decided else ()
         context.pending = [decided[max(step - self.delay, 0)][rows] for step in due]
         act = self._agent.act(context)
-        whole = act.action.new_zeros(context.worlds.num_envs, *act.action.shape[1:])
-        decided.append(whole.index_copy(0, rows, act.action))
+        decided.append(with_rows(None, rows, act.action))
         return act._replace(action=decided[max(now - self.delay, 0)][rows])
 
 

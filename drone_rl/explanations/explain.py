@@ -23,7 +23,6 @@ from drone_rl.policies import ImageNetwork
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
-from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.trust.coverage import find_domain
 from drone_rl.trust.recorded import record_verdict
 from drone_rl.trust.rounding_sensitivity import require_function
@@ -140,8 +139,6 @@ def explain(
                 seed=seed,
             )
 
-    for one in by_name.values():  # refused before any analysis
-        require_memoryless(one.make_network(), "explain")
     with torch_threads(1):  # same results for any number of cores; more would gain nothing
         numbers = {name: explain_one(one, folders[name]) for name, one in by_name.items()}
     for name, one in by_name.items():

@@ -249,7 +249,7 @@ def run_to_end(scenes: Scenes, network: ImageNetwork, state: State) -> State:
     def goes_on(step: Step) -> Tensor:
         nonlocal previous, is_new
         after = step.after
-        if previous is not None and not scenes.memory:
+        if previous is not None and not (scenes.memory or network.is_recurrent):
             is_back = ((_pose(after) - previous).abs() < _SAME).all(-1)
             after.end_reason[is_back & ~is_new] = task.truncation
         active = (after.end_reason == 0) & ~task.next_offset(after)[:, 0].isnan()

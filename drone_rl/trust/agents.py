@@ -5,6 +5,7 @@ import dataclasses
 import torch
 from torch import Tensor
 
+from drone_rl.envs.observer import with_rows
 from drone_rl.envs.rollout import Act, StepContext
 from drone_rl.policies import ImageNetwork, RecurrentNetwork
 from drone_rl.policies.recurrent import Memory
@@ -42,14 +43,14 @@ class PolicyAgent:
         network, rows = self._network, context.rows
         if not isinstance(network, RecurrentNetwork):
             return network(context.observe())
-        memory = self._memory or network.start(context.worlds.num_envs)
-        fresh, starts = network.start(len(rows)), context.starts[:, None, None]
-        before = (
-            torch.where(starts, new, old[rows]) for new, old in zip(fresh, memory, strict=True)
-        )
-        outputs, after = network.step(context.observe(), Memory(*before))
-        pairs = zip(memory, after, strict=True)
-        self._memory = Memory(*(part.index_copy(0, rows, new) for part, new in pairs))
+        fresh, before = network.start(len(rows)), self._memory
+        memory, starts = fresh, context.starts[:, None, None]
+        if before is not None and not bool(starts.all()):
+            pairs = zip(fresh, before, strict=True)
+            memory = Memory(*(torch.where(starts, new, old[rows]) for new, old in pairs))
+        outputs, after = network.step(context.observe(), memory)
+        pairs = zip(before or (None, None), after, strict=True)
+        self._memory = Memory(*(with_rows(old, rows, new) for old, new in pairs))
         return outputs
 
 

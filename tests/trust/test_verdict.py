@@ -170,7 +170,7 @@ def test_other_initial_states_are_refused(make_episodes, make_baselines):
     with pytest.raises(ValueError, match="different initial states"):
         apply_rule(ours, make_baselines(theirs))
     with pytest.raises(ValueError, match="different initial states"):
-        apply_rule(ours, make_baselines(ours), sampled=ours[:1])
+        apply_rule(ours, make_baselines(ours), sampled=ours.first(1))
 
 
 def test_sampled_episodes_are_compared_pairwise(judged, make_episodes):
@@ -241,7 +241,7 @@ def test_verdict_on_another_task():
 def test_greedy_and_sampled_episodes_share_initial_states(monkeypatch):
     flown = []
 
-    def run(env, actor, episodes, **how):
+    def run(actor, env, episodes, **how):
         flown.append((how.get("greedy", True), episodes, env.state_dict()))
         return rollout(actor, env, episodes, **how)
 
