@@ -110,11 +110,16 @@ class Pipeline:
     """
 
     def __init__(
-        self, transforms: Iterable[Transform], streams: Streams | None = None, num_envs: int = 0
+        self,
+        transforms: Iterable[Transform] = (),
+        streams: Streams | None = None,
+        num_envs: int = 0,
+        *,
+        stages: Iterable[Stage] = (),
     ) -> None:
+        """Take transforms, of which those of images are applied, after `stages`."""
         self.transforms = tuple(t for t in transforms if is_of_pixels(t))
-        """Those that change images, in order; others need TorchRL."""
-        self._steps: list[Transform | Stage] = []
+        self._steps: list[Transform | Stage] = [*stages]
         for i, transform in enumerate(self.transforms):
             if isinstance(transform, CatFrames):
                 stack = stacked_frames(transform.N, transform.padding, transform.padding_value)
@@ -131,17 +136,24 @@ class Pipeline:
         """The steps with a memory."""
         return [step for step in self._steps if isinstance(step, Stage)]
 
-    def __call__(self, images: Tensor, rows: Tensor | None = None, starts: Starts = True) -> Tensor:
+    def __call__(
+        self,
+        images: Tensor,
+        rows: Tensor | None = None,
+        starts: Starts = True,
+        blank: float = 0.0,
+    ) -> Tensor:
         """Return what policies see of new images.
 
         Args:
             images: Shape: (k, H, W, 3) or (k, C, H, W).
             rows: Environments of the images, (k,); by default the first k.
-            starts: See `Observer.observe`.
+            starts: Where episodes start; see `Starts`.
+            blank: Value of a pixel without signal.
         """
         for step in self._steps:
             images = (
-                step(images, rows, starts)
+                step(images, rows, starts, blank)
                 if isinstance(step, Stage)
                 else step._apply_transform(images)
             )
@@ -183,22 +195,6 @@ class Pipeline:
                 stream.bit_generator.state = where
 
 
-class Faults:
-    """Camera faults of an evaluation, in order: images from 0 to 1 to faulty ones."""
-
-    def __init__(self, stages: Sequence[Stage] = ()) -> None:
-        self._stages = stages
-
-    def __call__(self, images: Tensor, rows: Tensor, starts: Starts, blank: float = 0.0) -> Tensor:
-        """Return the faulty images (k, C, H, W); `blank` is the value of pixels without signal."""
-        for stage in self._stages:
-            images = stage(images, rows, starts, blank)
-        return images
-
-    def __bool__(self) -> bool:
-        return bool(self._stages)
-
-
 class Observer:
     """Renders the inputs of policies in states of environments, with the memory of their episodes.
 
@@ -212,7 +208,7 @@ class Observer:
         *,
         appearance: Callable[[Tensor], Appearance | None] = lambda rows: None,
         streams: Streams | None = None,
-        faults: Faults | None = None,
+        faults: Pipeline | None = None,
         earlier: "Observer | None" = None,
     ) -> None:
         """Observe worlds.
@@ -228,7 +224,7 @@ class Observer:
             earlier: Observer of the same environments whose memory goes on.
         """
         self.worlds, self.appearance = worlds, appearance
-        self.faults = faults or Faults()
+        self.faults = faults or Pipeline()
         self.transforms = tuple(t for t in transforms if is_of_pixels(t))
         first = next(iter(self.transforms), None)
         self._has_bytes = type(first) not in (GrayPixels, RgbPixels)
@@ -265,10 +261,10 @@ class Observer:
         images = self.worlds.render(state, self.view, appearance)
         if self.view.modalities == ("gray",):
             images = images[:, None]
-        elif self.faults or not self._has_bytes:
+        elif self.faults.stages or not self._has_bytes:
             images = RgbPixels()._apply_transform(images)
         images = self.faults(images, rows, starts)
-        if self.faults and self._has_bytes:
+        if self.faults.stages and self._has_bytes:
             images = (images * 255).round().to(torch.uint8).movedim(-3, -1)
         self.images = images
         return {"pixels": self.pipeline(images, rows, starts)}

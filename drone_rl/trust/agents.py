@@ -1,4 +1,4 @@
-"""Agents of evaluations: the policy, random and constant baselines, the oracle."""
+"""Agents of evaluations: the policy and the oracle; baselines are in `policies.baselines`."""
 
 import dataclasses
 
@@ -10,7 +10,6 @@ from drone_rl.envs.rollout import Act, StepContext
 from drone_rl.policies import ImageNetwork, RecurrentNetwork
 from drone_rl.policies.recurrent import Memory
 from drone_rl.policies.rounding import decider
-from drone_rl.sim.actions import Actions
 from drone_rl.sim.tasks import Task
 
 _NOTHING = -1.0
@@ -52,25 +51,6 @@ class PolicyAgent:
         pairs = zip(before or (None, None), after, strict=True)
         self._memory = Memory(*(with_rows(old, rows, new) for old, new in pairs))
         return outputs
-
-
-class BaselineAgent:
-    """A baseline that takes random actions, or always the same one."""
-
-    needs_only_hiding_faults = True
-
-    def __init__(self, name: str, actions: Actions, generator: torch.Generator) -> None:
-        """Take "random" or an action's name, the action space, and a generator for "random"."""
-        self._actions, self._generator = actions, generator
-        self._action = None if name == "random" else actions.always(name)
-
-    def act(self, context: StepContext) -> Act:
-        """See `Agent`."""
-        rows = context.rows
-        if self._action is not None:
-            return Act(self._action.expand(len(rows), *self._action.shape).to(rows.device))
-        sampled = self._actions.sample(tuple(rows.shape), self._generator)
-        return Act(sampled.to(rows.device))
 
 
 class OracleAgent:

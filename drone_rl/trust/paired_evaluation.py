@@ -20,14 +20,15 @@ from drone_rl.config import (
     DynamicsSettings,
 )
 from drone_rl.envs import Observer
-from drone_rl.envs.rollout import Agent, DelayedAgent, steps
+from drone_rl.envs.rollout import ActorAgent, Agent, DelayedAgent, steps
 from drone_rl.policies import ImageNetwork
+from drone_rl.policies.baselines import make_baseline
 from drone_rl.sim.dynamics import draw_seeds, make_dynamics
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import as_task
 from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.sim.worlds import Worlds
-from drone_rl.trust.agents import BaselineAgent, PolicyAgent
+from drone_rl.trust.agents import PolicyAgent
 from drone_rl.trust.perturbations import (
     ONSET_STEP,
     Condition,
@@ -198,7 +199,8 @@ class PairedEvaluator:
         episodes = {}
         for name in worlds.task.blind_baselines:
             generator = torch_generator(self.seed, Stream.ACTIONS)
-            agent = BaselineAgent(name, worlds.dynamics.actions, generator)
+            actions = worlds.dynamics.actions
+            agent = ActorAgent(make_baseline(name, worlds.task, generator, actions))
             episodes[name] = self.run(condition, agent=agent).episodes
         return episodes
 

@@ -13,7 +13,7 @@ from drone_rl.config import BaseTaskSettings
 from drone_rl.config.task import ObjectRegion
 from drone_rl.envs import fault_models
 from drone_rl.envs.fault_models import FaultModel, Sample
-from drone_rl.envs.observer import Faults, Stage
+from drone_rl.envs.observer import Pipeline, Stage
 from drone_rl.sim.rendering import Appearance, Distractors, Scene
 from drone_rl.sim.rendering.appearance import Colors, moved, turned
 from drone_rl.sim.rendering.scene import SemanticClass
@@ -275,14 +275,14 @@ class SharedStream:
 
 def make_faults(
     models: Sequence[FaultModel], num_envs: int, seed: int, *, hiding_only: bool = False
-) -> Faults:
+) -> Pipeline:
     """Return faults in the order in which they act; each has a random stream of its own.
 
     `hiding_only` leaves out those that hide nothing.
     """
     streams = (torch_generator(seed, Stream.SHIFTS, number=1 + i) for i in range(len(models)))
-    return Faults(
-        [
+    return Pipeline(
+        stages=[
             Stage(model, SharedStream(stream, num_envs))
             for model, stream in zip(models, streams, strict=True)
             if model.hides or not hiding_only

@@ -16,7 +16,7 @@ from drone_rl.envs import (
     StandardizePixels,
 )
 from drone_rl.envs.fault_models import late_frames
-from drone_rl.envs.observer import Faults, Observer, Stage
+from drone_rl.envs.observer import Observer, Stage
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
 
@@ -79,7 +79,7 @@ def test_faults_of_an_evaluation_act_before_the_transforms():
     moved, _ = worlds.advance(state, torch.tensor([0]))
     for transforms in ((), (RgbPixels(),), (GrayPixels(),)):
         seen = Observer(worlds, transforms).observe(state, rows, True, None)["pixels"]
-        late = Observer(worlds, transforms, faults=Faults([Stage(late_frames(1))]))
+        late = Observer(worlds, transforms, faults=Pipeline(stages=[Stage(late_frames(1))]))
         assert torch.equal(late.observe(state, rows, True, None)["pixels"], seen)
         assert torch.equal(late.observe(moved, rows, False, None)["pixels"], seen)
         assert not torch.equal(late.observe(moved, rows, False, None)["pixels"], seen)

@@ -7,13 +7,11 @@ from drone_rl.envs.fault_models import dead_rows, noise
 from drone_rl.envs.rollout import StepContext
 from drone_rl.policies import ImageNetwork, RecurrentNetwork
 from drone_rl.sim.actions import MOVES
-from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.tasks import as_task
 from drone_rl.sim.worlds import Worlds
-from drone_rl.trust.agents import BaselineAgent, OracleAgent, PolicyAgent, has_oracle
+from drone_rl.trust.agents import OracleAgent, PolicyAgent, has_oracle
 from drone_rl.trust.paired_evaluation import PairedEvaluator
 from drone_rl.trust.perturbations import Condition
-from tests.continuous import SETTINGS
 from tests.trust.subjects import TASK, subject
 
 
@@ -86,21 +84,6 @@ def test_fragile_episodes_are_recorded():
         agent.act(sight(worlds, 0, 1, 2, pixels=[1.0, 0.0, 0.0]))
         agent.act(sight(worlds, 1, 2, starts=False, pixels=[0.0, 0.0]))
         assert agent.is_fragile.tolist() == [examines, False, False]
-    worlds.close()
-
-
-def test_baseline_agents():
-    worlds = make_env()
-    where = sight(worlds, 0, 1, 2)
-    generator = torch.Generator().manual_seed(0)
-    assert BaselineAgent("right", MOVES, generator).act(where).action.tolist() == [2, 2, 2]
-    agent = BaselineAgent("random", MOVES, generator)
-    drawn = torch.cat([agent.act(where).action for _ in range(200)])
-    assert (drawn.bincount() / 600 - 1 / 3).abs().max() < 0.08
-    actions, where = ContinuousActions.of(SETTINGS), sight(worlds, 0, 1)
-    action = BaselineAgent("forward", actions, generator).act(where).action
-    assert action.tolist() == [[1, 0, 0]] * 2
-    assert BaselineAgent("random", actions, generator).act(where).action.shape == (2, 3)
     worlds.close()
 
 
