@@ -41,11 +41,17 @@ def shifts_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]
     """
     if (measured := context.measured) is None:
         return {}, {}
+    strips = (
+        {name: measured.shifts.frames(name) for name in measured.shifts.axes}
+        if measured.shifts
+        else {}
+    )
     arrays = {
         f"shifts_{name}": np.stack([np.zeros_like(strip[0]) if p is None else p for p in strip])
-        for name, strip in measured.pictures.items()
+        for name, strip in strips.items()
     }
-    return {"shifts": measured.evidence}, arrays
+    saved = measured.model_dump(mode="json", exclude={"shifts": {"pictures"}})
+    return {"shifts": saved}, arrays
 
 
 def dataset_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
@@ -59,9 +65,9 @@ def dataset_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray
         "episodes": len(np.unique(flights.episode)),
         "steps": len(flights),
         "action_shares": (counts / counts.sum()).tolist(),
-        "entropy": mean_interval(entropy.clip(0.0, 1.0), data.episode),
+        "entropy": mean_interval(entropy.clip(0.0, 1.0), data.episode).model_dump(),
         "goals_reached": int((flights.event > 0).sum()),
-        **({"remembers": True} if context.network.is_recurrent else {}),
+        **({"remembers": True} if context.remembers else {}),
     }
     return {"dataset": numbers}, {}
 
@@ -178,6 +184,6 @@ def summarise_loops(flights: RolloutDataset, loops: list[dict[str, int]]) -> dic
         "loops": len(loops),
         "longest": max((loop["length"] for loop in loops), default=0),
         "frames_share": sum(loop["length"] for loop in loops) / len(flights),
-        "episodes": proportion(looping, len(np.unique(flights.episode))),
+        "episodes": proportion(looping, len(np.unique(flights.episode))).model_dump(),
         "list": loops,
     }

@@ -17,7 +17,7 @@ from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frame
 from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import ImageNetwork, make_actor
-from drone_rl.trust.shifts_file import SavedShifts
+from drone_rl.trust.shifts_results import SavedShifts
 from drone_rl.trust.verdict import CertificateClaim
 from drone_rl.utils.limits import FILM_BYTES, FILM_STEPS
 from drone_rl.utils.seeding import RootSeed, Stream, torch_generator, with_seed
@@ -48,6 +48,9 @@ class Context:
     ) -> None:
         """See `explain`; raise InputError if a setting does not fit the policy."""
         self.env, self.network, self.claim = env, network, claim
+        self.remembers = network.is_recurrent
+        """Whether the policy remembers earlier frames in rollouts; of single frames, each counts as
+        the first of an episode."""
         self.settings, self.seed = with_seed(settings, seed)
         self.measured, self.unlike = measured, unlike
         self.scenes = Scenes(env)

@@ -25,8 +25,9 @@ from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.trust.coverage import find_domain
 from drone_rl.trust.recorded import record_verdict
+from drone_rl.trust.results import Verdict
 from drone_rl.trust.rounding_sensitivity import require_function
-from drone_rl.trust.shifts_file import SavedShifts
+from drone_rl.trust.shifts_results import SavedShifts
 from drone_rl.trust.verdict import CertificateClaim, FindClaim
 from drone_rl.utils.display import Result, page
 from drone_rl.utils.errors import InputError
@@ -142,7 +143,7 @@ def explain(
     with torch_threads(1):  # same results for any number of cores; more would gain nothing
         numbers = {name: explain_one(one, folders[name]) for name, one in by_name.items()}
     for name, one in by_name.items():
-        record_verdict(folders[name], one, numbers[name]["verdict"])
+        record_verdict(folders[name], one, Verdict.read(numbers[name]["verdict"]))
     progress("report")
     report = write_report(list(folders.values()), folder)
     progress("explained", 1, 1)

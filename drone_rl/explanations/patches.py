@@ -160,7 +160,7 @@ def sample_frames(episode: NDArray, most: int) -> NDArray:
 
 def summarise_scores(values: NDArray, episode: NDArray) -> dict[str, Any]:
     """Return the mean of scores over episodes with its interval; see `mean_bounds`."""
-    return mean_bounds(episode_means(values, episode).clip(-1, 1), -1.0, 1.0)
+    return mean_bounds(episode_means(values, episode).clip(-1, 1), -1.0, 1.0).model_dump()
 
 
 def _levels(heat: NDArray) -> NDArray:

@@ -209,8 +209,8 @@ def asymmetry(
     distance = actions.distance(here, there).double().cpu().numpy()
     worst = np.argsort(-distance, kind="stable")[:8]
     return {
-        "signed": mean_interval(signed, episode, low=-1.0),
-        "absolute": mean_interval(distance, episode),
+        "signed": mean_interval(signed, episode, low=-1.0).model_dump(),
+        "absolute": mean_interval(distance, episode).model_dump(),
         "worst": [{"frame": int(t), "distance": float(distance[t])} for t in worst],
     }
 

@@ -23,7 +23,7 @@ from drone_rl.envs import worlds_of
 from drone_rl.envs.rollout import ActorAgent, Recording, Step, steps
 from drone_rl.explanations.hooks import features, probabilities
 from drone_rl.explanations.scenes import Region, Scenes
-from drone_rl.policies import ImageNetwork
+from drone_rl.policies import ImageNetwork, RecurrentNetwork
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.dynamics.state import heading_of
@@ -249,7 +249,7 @@ def run_to_end(scenes: Scenes, network: ImageNetwork, state: State) -> State:
     def goes_on(step: Step) -> Tensor:
         nonlocal previous, is_new
         after = step.after
-        if previous is not None and not (scenes.memory or network.is_recurrent):
+        if previous is not None and not (scenes.memory or isinstance(network, RecurrentNetwork)):
             is_back = ((_pose(after) - previous).abs() < _SAME).all(-1)
             after.end_reason[is_back & ~is_new] = task.truncation
         active = (after.end_reason == 0) & ~task.next_offset(after)[:, 0].isnan()

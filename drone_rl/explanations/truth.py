@@ -41,7 +41,7 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
         **trust.check_maps(
             trial, trust.method_maps(context.explainer) if network.has_weights else {}
         ),
-        "interventions": {c.name: mean_interval(c.effect, episode) for c in changes},
+        "interventions": {c.name: mean_interval(c.effect, episode).model_dump() for c in changes},
         "outcomes": outcomes if outcomes["flights"] else None,
         "shown_frame": shown_frame,
     }
@@ -169,7 +169,7 @@ def measure_outcomes(
     repainted = run_to_target(scenes, network, start, target, DARK_GROUND)
 
     def mean(values: NDArray, low: float = 0.0) -> dict[str, Any]:
-        return mean_bounds(episode_means(values.astype(np.float64), group), low, 1.0)
+        return mean_bounds(episode_means(values.astype(np.float64), group), low, 1.0).model_dump()
 
     return {
         "flights": len(rows),

@@ -121,7 +121,7 @@ def test_partial_reset_resets_and_renders_only_masked_environments():
     after = env.step(state.set("action", actions(env, 0)))["next"]
     drawn = []
     render = env.worlds.render
-    env.worlds.render = lambda state, **look: drawn.append(len(state.drone)) or render(state)
+    env.worlds.render = lambda state, *view: drawn.append(len(state.drone)) or render(state, *view)
     mask = torch.tensor([[False], [True], [False]])
     reset = env.reset(after.clone().exclude("reward").set("_reset", mask))
     assert drawn == [1]

@@ -5,9 +5,10 @@ from PIL import Image
 from drone_rl.explanations.report.explanation import Explanation, Figures, Part
 from drone_rl.sim.vocabulary import shown_actions, terms_of
 from drone_rl.trust import charts
+from drone_rl.trust.axes_table import NAMES
 from drone_rl.trust.plots import images
-from drone_rl.trust.shifts_text import QUOTED, is_quoted, not_evaluated, rows
-from drone_rl.trust.verdict_text import SENTENCES, depends_on_rounding
+from drone_rl.trust.results import Verdict
+from drone_rl.trust.shifts_results import Robustness, SavedShifts, not_evaluated
 from drone_rl.utils.text import (
     Claims,
     Evidence,
@@ -16,7 +17,6 @@ from drone_rl.utils.text import (
     is_fixed,
     listed,
     percent,
-    said,
     seed_line,
 )
 
@@ -34,7 +34,7 @@ def say_source(evidence: Evidence) -> Claims:
 
 def say_verdict(evidence: Evidence) -> Claims:
     """Say the verdict by its figures; the sentence in the file may say anything."""
-    return said(SENTENCES, evidence["verdict"])
+    return {"verdict": Verdict.read(evidence["verdict"]).sentence}
 
 
 def say_advice(evidence: Evidence) -> Claims:
@@ -42,7 +42,7 @@ def say_advice(evidence: Evidence) -> Claims:
     verdict = evidence["verdict"]
     if not verdict["certain"]:
         more = "do not rely on it; more episodes do not change that."
-        if not depends_on_rounding(verdict):
+        if not Verdict.read(verdict).is_open_by_rounding:
             count = verdict["enough"]
             episodes = f"more episodes (episodes={count})" if count else "many more episodes"
             more = f"evaluate {episodes} before relying on it."
@@ -60,7 +60,7 @@ def say_advice(evidence: Evidence) -> Claims:
 
 def say_scope(evidence: Evidence) -> Claims:
     """Say with which colors, light or sizes the policy was not evaluated."""
-    if not (names := not_evaluated(evidence)):
+    if not (names := not_evaluated(quoted_shifts(evidence))):
         return {}
     return {
         "scope.appearance": (
@@ -82,6 +82,22 @@ def say_seed(evidence: Evidence) -> Claims:
     }
 
 
+def quoted_shifts(evidence: Evidence) -> Robustness | None:
+    """Return the robustness evaluation, unless there is none or it is refused."""
+    if not evidence.get("shifts"):
+        return None
+    measured = SavedShifts.read(evidence["shifts"])
+    return None if measured.why_not(Verdict.read(evidence["verdict"])) else measured.shifts
+
+
+def say_shifts(evidence: Evidence) -> Claims:
+    """Say the operating domain, or why it is not shown."""
+    if not evidence.get("shifts"):
+        return {}
+    measured = SavedShifts.read(evidence["shifts"])
+    return {"domain": measured.text(Verdict.read(evidence["verdict"]))}
+
+
 def say_left_out(evidence: Evidence) -> Claims:
     """Say why sections could not be computed for this policy."""
     return {"left_out.why": " ".join(evidence["left_out"].values())}
@@ -98,25 +114,26 @@ EVALUATION_PART = Part(
 
 def draw_shifts(explanation: Explanation) -> Figures:
     """Draw curves and rows of frames, unless the measurement is refused."""
-    numbers, arrays = explanation.numbers["shifts"], explanation.arrays
-    if not is_quoted(explanation.numbers):
+    if (shifts := quoted_shifts(explanation.numbers)) is None:
         return {}
     frames = {
-        f"conditions_{name}": charts.conditions(numbers, name, [*arrays[f"shifts_{name}"]])
-        for name in numbers["axes"]
+        f"conditions_{name}": charts.conditions(
+            shifts, name, [*explanation.arrays[f"shifts_{name}"]]
+        )
+        for name in shifts.axes
     }
-    return {"shifts": charts.curves(numbers), **frames}
+    return {"shifts": charts.curves(shifts), **frames}
 
 
 SHIFTS_PART = Part(
     title="Robustness",
     label="Robustness",
     needs=("shifts",),
-    text={"shifts": QUOTED},
+    text={"shifts": say_shifts},
     draw=draw_shifts,
     extras=lambda explanation: {
-        "rows": rows(explanation.numbers["shifts"]) if is_quoted(explanation.numbers) else [],
-        "names": charts.NAMES,
+        "rows": shifts.rows() if (shifts := quoted_shifts(explanation.numbers)) else [],
+        "names": NAMES,
     },
 )
 LEFT_OUT_PART = Part(

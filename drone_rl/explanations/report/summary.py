@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping
 
+from drone_rl.explanations.report.behavior import quoted_shifts
 from drone_rl.explanations.report.explanation import METHOD_NAMES
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.trust import shifts_text
+from drone_rl.trust.axes_table import NAMES
+from drone_rl.trust.results import Verdict
 from drone_rl.trust.rule import VerdictKind
-from drone_rl.trust.verdict_text import is_proved, is_quoted, is_stated
+from drone_rl.trust.shifts_results import SavedShifts, not_evaluated
 from drone_rl.utils.text import Claims, Evidence, listed, plural, rate
 
 LINES: Mapping[str, tuple[str, str]] = {
@@ -34,7 +36,7 @@ def say_summary(evidence: Evidence) -> Claims:
         )
     claims["summary.robustness"] = _robustness(evidence)
     if verdict:
-        claims["summary.certificate"] = _certificate(verdict)
+        claims["summary.certificate"] = _certificate(Verdict.read(verdict))
     if places:
         claims["summary.map"] = (
             f"None: {places['refused']}."
@@ -68,26 +70,27 @@ def _robustness(evidence: Evidence) -> str:
     shifts = evidence.get("shifts")
     if not shifts:
         return "Not measured; run drone-rl shifts on this policy and explain it again."
-    if not shifts_text.is_quoted(evidence):
-        return f"Measured, but not shown here: {shifts_text.why_not(evidence)}."
-    if shifts["domain"] is None:
-        return f"Success rates under {plural(len(shifts['axes']), 'perturbation')}."
-    tested = [name for name in shifts["axes"] if shifts_text.is_tested(shifts, name)]
-    wide = [shifts_text.NAMES[name] for name in shifts_text.wide(shifts)]
+    if (quoted := quoted_shifts(evidence)) is None:
+        why = SavedShifts.read(shifts).why_not(Verdict.read(evidence["verdict"]))
+        return f"Measured, but not shown here: {why}."
+    if quoted.domain is None:
+        return f"Success rates under {plural(len(quoted.axes), 'perturbation')}."
+    tested = [name for name, along in quoted.axes.items() if along.is_tested]
+    wide = [NAMES[name] for name in quoted.wide]
     return (
         f"Good with 95% confidence in a range of {len(wide)} of "
         f"{plural(len(tested), 'perturbation')} tested{': ' if wide else ''}{listed(wide)}."
     )
 
 
-def _certificate(verdict: Evidence) -> str:
-    if is_proved(verdict):
-        return (
-            "A certificate of success from every placement was re-checked by "
-            f"{verdict['proof']['checked']:,} rollouts."
-        )
-    if is_quoted(verdict):
-        part = "every placement" if is_stated(verdict) else "a part of the placements"
+def _certificate(verdict: Verdict) -> str:
+    if (proof := verdict.quoted) is not None:
+        if verdict.is_proved:
+            return (
+                "A certificate of success from every placement was re-checked by "
+                f"{proof.checked:,} rollouts."
+            )
+        part = "every placement" if proof.every else "a part of the placements"
         return (
             f"A certificate states success from {part}, but it is not a proof for all of them: see "
             "the verdict."
@@ -97,7 +100,7 @@ def _certificate(verdict: Evidence) -> str:
 
 def _limits(evidence: Evidence) -> str:
     parts = ["Real cameras and drones"]
-    if evidence.get("verdict") and (names := shifts_text.not_evaluated(evidence)):
+    if evidence.get("verdict") and (names := not_evaluated(quoted_shifts(evidence))):
         parts.append(f"other {listed(names, 'or')}")
     if left_out := evidence.get("left_out"):
         parts.append(f"what was left out ({', '.join(left_out).replace('_', ' ')})")

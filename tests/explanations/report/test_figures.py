@@ -15,7 +15,7 @@ from drone_rl.explanations.report import (
 from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.report.truth import changes, truth_charts
 from drone_rl.utils.palette import GOOD, MUTED, css
-from tests.evidence import EXPLANATION, SHIFTS, VERDICT
+from tests.evidence import EXPLANATION, SAVED_SHIFTS, SHIFTS, VERDICT
 from tests.trust.plots.test_regions import NUMBERS, WAYS
 
 SCORE = {"mean": 0.5, "lower95": 0.4, "upper95": 0.6}
@@ -80,11 +80,11 @@ def test_a_robustness_evaluation_is_drawn_unless_it_is_refused(make_explanation)
     good = {**VERDICT, "kind": "good", "certain": True}
     arrays = {f"shifts_{name}": np.zeros((6, 5, 16, 3), np.uint8) for name in SHIFTS["axes"]}
     part = behavior.SHIFTS_PART
-    drawn = part.draw(make_explanation({"shifts": SHIFTS, "verdict": good}, arrays))
+    drawn = part.draw(make_explanation({"shifts": SAVED_SHIFTS, "verdict": good}, arrays))
     assert [*drawn] == ["shifts", *(f"conditions_{name}" for name in SHIFTS["axes"])]
     for numbers in (
-        {"shifts": {"refused": "it is of another task"}, "verdict": good},
-        {"shifts": SHIFTS, "verdict": {**good, "kind": "poor"}},
+        {"shifts": {"path": "a", "refused": "it is of another task"}, "verdict": good},
+        {"shifts": SAVED_SHIFTS, "verdict": {**good, "kind": "poor"}},
     ):
         explanation = make_explanation(numbers)
         assert part.draw(explanation) == {}

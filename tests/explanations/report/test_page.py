@@ -17,7 +17,7 @@ from drone_rl.explanations.report.explanation import FORMAT, FORMAT_VERSION, Exp
 from drone_rl.explanations.report.page import PARTS, find_explanations
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import proportion
-from tests.evidence import SHIFTS
+from tests.evidence import SAVED_SHIFTS, SHIFTS
 from tests.explanations.quick import ALL_SECTIONS, quick_figures
 from tests.explanations.report.conftest import NASTY
 
@@ -167,14 +167,16 @@ def with_intervals(value):
     if isinstance(value, dict):
         items = {key: with_intervals(item) for key, item in value.items()}
         is_rate = "trials" in items
-        return items | (proportion(items["successes"], items["trials"]) if is_rate else {})
+        return items | (dict(proportion(items["successes"], items["trials"])) if is_rate else {})
     return [*map(with_intervals, value)] if isinstance(value, list) else value
 
 
 def test_a_robustness_evaluation_is_shown(changed, tmp_path):
     arrays = {f"shifts_{name}": np.zeros((6, 5, 16, 3), np.uint8) for name in SHIFTS["axes"]}
     with quick_figures():
-        text = write_report([changed(arrays, shifts=with_intervals(SHIFTS))], tmp_path).read_text()
+        text = write_report(
+            [changed(arrays, shifts=with_intervals(SAVED_SHIFTS))], tmp_path
+        ).read_text()
     part = text[text.index('<section id="shifts">') :].split("</section>")[0]
     assert "the sun at 21.1 to 60 degrees" in part and part.count("data:image/svg") == 3 + 1
     assert "not measured again here" in part and "<td>elevation of the sun</td>" in part

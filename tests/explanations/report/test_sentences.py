@@ -13,7 +13,7 @@ from drone_rl.explanations.report.response import say_asymmetry, say_response
 from drone_rl.explanations.report.summary import LINES, say_summary
 from drone_rl.explanations.report.truth import say_findings, say_reasons
 from drone_rl.utils.text import said
-from tests.evidence import EXPLANATION, HIGHER, PROOF, SHIFTS, changed
+from tests.evidence import EXPLANATION, HIGHER, PROOF, SAVED_SHIFTS, changed
 
 NONE_TRUSTED = {
     "truth.trusted": None,
@@ -58,7 +58,7 @@ def test_a_rate_close_to_one_is_not_called_certain():
         changed(EXPLANATION, {"dataset.action_shares": [0.0, 0.9999, 0.0001]})
     )
     assert "100% left" not in found["dataset.actions"]
-    assert "less than 0.1% right" in found["dataset.actions"]
+    assert "<0.1% right" in found["dataset.actions"]
 
 
 def test_no_loop_in_these_episodes_has_an_upper_limit():
@@ -150,18 +150,20 @@ def test_asymmetry_has_a_sign():
 def test_the_summary_has_one_line_for_each_question():
     assert list(say_summary(EXPLANATION)) == list(LINES)
     assert list(say_summary({})) == ["summary.robustness", "summary.limits"]
-    assert "60.0% (95% CI 58.0 to 62.0) of 400" in say_summary(EXPLANATION)["summary.success"]
+    assert "60.0% (95% CI 58.0% to 62.0%) of 400" in say_summary(EXPLANATION)["summary.success"]
 
 
 def test_the_summary_says_no_more_than_was_measured():
     def line(name, changes=None):
         return say_summary(changed(EXPLANATION, changes or {}))[f"summary.{name}"]
 
-    shifts = {"shifts": SHIFTS, "verdict.kind": "good"}
+    shifts = {"shifts": SAVED_SHIFTS, "verdict.kind": "good"}
     assert "2 of 3 perturbations" in line("robustness", shifts)
-    same = changed(SHIFTS, {"axes.blur.levels.1.modes.constant.unchanged": True})
+    same = changed(SAVED_SHIFTS, {"shifts.axes.blur.levels.1.modes.constant.unchanged": True})
     assert "1 of 2 perturbations" in line("robustness", {**shifts, "shifts": same})
-    assert "another task" in line("robustness", {"shifts": {"refused": "it is of another task"}})
+    assert "another task" in line(
+        "robustness", {"shifts": {"path": "a", "refused": "it is of another task"}}
+    )
     assert "Not measured" in line("robustness")
     assert "1,000 rollouts" in line("certificate", {"verdict.proof": PROOF})
     unchecked = {"verdict.proof": {**PROOF, "wrong_at_most": None}}
