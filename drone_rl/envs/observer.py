@@ -122,7 +122,8 @@ class Pipeline:
         self._steps: list[Transform | Stage] = [*stages]
         for i, transform in enumerate(self.transforms):
             if isinstance(transform, CatFrames):
-                stack = stacked_frames(transform.N, transform.padding, transform.padding_value)
+                padding = transform.padding, transform.padding_value
+                stack = stacked_frames(transform.N, transform.dim, *padding)
                 self._steps.append(Stage(stack))
             elif not isinstance(transform, CameraFault):
                 self._steps.append(transform)
