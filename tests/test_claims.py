@@ -1,17 +1,15 @@
-"""A claim of a report or sweep disappears or changes when evidence contradicts it."""
+"""A claim of a report disappears or changes when evidence contradicts it."""
 
 import pytest
 
 from drone_rl.explanations.report.page import PARTS
 from drone_rl.explanations.report.summary import say_summary
-from drone_rl.sweeps import text as sweep_text
 from drone_rl.utils.text import said
-from tests.evidence import EXPLANATION, PROOF, SAVED_SHIFTS, SWEEP, changed
+from tests.evidence import EXPLANATION, PROOF, SAVED_SHIFTS, changed
 
 REPORT = (say_summary, *(paragraph for part in PARTS.values() for paragraph in part.text.values()))
 SUBJECTS = {
     "report": (REPORT, EXPLANATION),
-    "sweep": ([sweep_text.SENTENCES], SWEEP),
 }
 REPORT_PROVED = {"verdict.proof": PROOF}
 GOOD = {"verdict.kind": "good", "verdict.certain": True, "verdict.exit_code": 0}
@@ -33,9 +31,6 @@ CHANGES = [
     ("report", "truth.trusted", {"truth.placebos.ones.mean": 0.9}),
     ("report", "truth.follows", {"truth.outcomes.follows.lower95": -0.1}),
     ("report", "truth.ground", {"truth.outcomes.ground_changed.upper95": 0.4}),
-    ("sweep", "runs.failed", {"failed": 0}),
-    ("sweep", "best.chosen", {"best.certain": False}),
-    ("sweep", "sides.not_offered", {"sides_not_offered": 0}),
 ]  # fmt: skip
 """Subject, sentence, evidence against it, and evidence without which it does not appear."""
 

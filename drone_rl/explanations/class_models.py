@@ -94,7 +94,7 @@ class ClassModel:
         best = every.best()
         rows = [
             {
-                **dataclasses.asdict(attempts.settings),
+                **attempts.settings.values(),
                 **attempts.best_values(),
                 "chosen": [a for a, i in enumerate(best) if i // starts == setting],
             }

@@ -201,7 +201,7 @@ def explain_policy(
         "format_version": FORMAT_VERSION,
         "name": name,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "settings": dataclasses.asdict(context.settings),
+        "settings": context.settings.values(),
         **context.seed.as_dict(),
         "seconds": {title: seconds for title, (_, _, seconds) in computed.items()},
         "actions": context.scenes.actions.as_dict(),

@@ -1,11 +1,13 @@
 """REINFORCE on the chapter's three-state process (Fig. 3), next to the exact policy gradient."""
 
 import dataclasses
+from typing import Any
 
 import torch
 from tensordict.nn import TensorDictModule
 from torch import Tensor, nn
 from torchrl.data import Categorical
+from torchrl.envs.utils import step_mdp
 from torchrl.modules import ProbabilisticActor
 
 from drone_rl.envs.three_state import ThreeStateEnv
@@ -91,8 +93,13 @@ class _Learner:
 
     def accumulate_gradient(self) -> float:
         """Run a batch of episodes, set the gradient of the loss and return the sum of rewards."""
-        with torch.no_grad():
-            rolled = self._env.rollout(self._env.horizon, self._actor, break_when_all_done=True)
+        state, steps = self._env.reset(), []
+        for _ in range(self._env.horizon):
+            with torch.no_grad():
+                state = self._env.step(self._actor(state))
+            steps.append(state)
+            state = step_mdp(state)
+        rolled: Any = torch.stack(steps, 1)  # pyright: ignore[reportArgumentType]
         ended = rolled["next", "done"].cumsum(1) - rolled["next", "done"].long()
         batch = self._returns(rolled[(ended == 0)[..., 0]])
         self.table.zero_grad()

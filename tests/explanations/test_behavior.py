@@ -1,6 +1,5 @@
 """Verdict, robustness, statistics of the data set, contradictions and loops."""
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,7 +17,8 @@ from drone_rl.explanations.behavior import (
 )
 from drone_rl.explanations.rollouts import RolloutDataset
 from drone_rl.sim.actions import MOVES
-from drone_rl.trust.shifts_file import SavedShifts
+from drone_rl.trust.shifts_results import SavedShifts, packed
+from tests.evidence import SAVED_SHIFTS, SHIFTS
 from tests.five_actions import FIVE
 
 F, L, R = 0, 1, 2
@@ -185,20 +185,17 @@ def test_loops_with_other_actions():
 
 
 def test_a_robustness_evaluation_is_copied():
-    strip = [np.full((5, 16, 3), 7, np.uint8), None, *[np.zeros((5, 16, 3), np.uint8)] * 4]
-    measured = SavedShifts(Path("shifts.json"), {"axes": {"blur": {}}}, {"blur": strip})
+    bright, dark = (packed(np.full((5, 16, 3), value, np.uint8)) for value in (7, 0))
+    images = {"image_size": (5, 16), "pictures": {"blur": (bright, None, *[dark] * 4)}}
+    axes = {"blur": SHIFTS["axes"]["blur"]}
+    measured = SavedShifts.read({**SAVED_SHIFTS, "shifts": {**SHIFTS, **images, "axes": axes}})
     numbers, arrays = shifts_section(SimpleNamespace(measured=measured))
-    assert numbers == {"shifts": {"axes": {"blur": {}}}}
+    assert SavedShifts.read(numbers["shifts"]).shifts.axes == measured.shifts.axes
     assert arrays["shifts_blur"].shape == (6, 5, 16, 3)
     assert arrays["shifts_blur"][0].min() == 7 and arrays["shifts_blur"][1].max() == 0
-
-
-def test_a_refused_robustness_evaluation_gives_its_reason():
-    refused = SavedShifts(Path("shifts.json"), None, refused="it is of another task")
-    assert shifts_section(SimpleNamespace(measured=refused)) == (
-        {"shifts": {"refused": "it is of another task"}},
-        {},
-    )
+    refused = measured.replace(shifts=None, refused="it is of another task")
+    numbers, arrays = shifts_section(SimpleNamespace(measured=refused))
+    assert numbers["shifts"]["refused"] == "it is of another task" and arrays == {}
     assert shifts_section(SimpleNamespace(measured=None)) == ({}, {})
 
 

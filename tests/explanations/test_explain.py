@@ -19,6 +19,7 @@ from drone_rl.policies import MLP
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import RootSeed
+from tests.evidence import VERDICT
 from tests.explanations.quick import ALL_SECTIONS, quick
 from tests.second_task import NUM_POSTS, Posts
 
@@ -60,7 +61,7 @@ def test_all_policies_are_explained_from_one_fresh_seed(tmp_path, monkeypatch):
     def note(env, network, folder, settings, *, seed, **kwargs):
         states = env.base_env.state_dict()["random_states"]
         seen.append((seed, settings.seed, states[0]))
-        return {"verdict": {"kind": "good", "certain": True, "sentence": "It does."}}
+        return {"verdict": VERDICT}
 
     monkeypatch.setattr(explaining, "explain_policy", note)
     monkeypatch.setattr(explaining, "write_report", lambda *args: tmp_path)

@@ -132,7 +132,7 @@ SHIFTS_PART = Part(
     text={"shifts": say_shifts},
     draw=draw_shifts,
     extras=lambda explanation: {
-        "rows": shifts.rows() if (shifts := quoted_shifts(explanation.numbers)) else [],
+        "rows": shifts.table() if (shifts := quoted_shifts(explanation.numbers)) else [],
         "names": NAMES,
     },
 )
