@@ -93,15 +93,19 @@ class _Learner:
 
     def accumulate_gradient(self) -> float:
         """Run a batch of episodes, set the gradient of the loss and return the sum of rewards."""
-        state, steps = self._env.reset(), []
-        for _ in range(self._env.horizon):
+        state, steps, masks = self._env.reset(), [], []
+        running = torch.ones(len(state), dtype=torch.bool)
+        while bool(running.any()):
+            action = torch.zeros(len(state), dtype=torch.int64)
             with torch.no_grad():
-                state = self._env.step(self._actor(state))
-            steps.append(state)
-            state = step_mdp(state)
+                action[running] = self._actor(state[running])["action"]
+            after = self._env.step(state.set("action", action))
+            steps.append(after)
+            masks.append(running)
+            running = running & ~after["next", "done"][:, 0]
+            state = step_mdp(after)
         rolled: Any = torch.stack(steps, 1)  # pyright: ignore[reportArgumentType]
-        ended = rolled["next", "done"].cumsum(1) - rolled["next", "done"].long()
-        batch = self._returns(rolled[(ended == 0)[..., 0]])
+        batch = self._returns(rolled[torch.stack(masks, 1)])
         self.table.zero_grad()
         self._loss(batch)["loss_actor"].backward()
         return float(batch["next", "reward"].sum())
