@@ -244,10 +244,10 @@ def test_onnx_model_agrees_at_every_step(trained, tmp_path):
 def test_every_command_runs_it(trained, tmp_path):
     policy, silent = load_policy(trained.folder), {"progress": lambda *_: None}
     few = {"episodes": 20, "seed": 0, **silent}
-    assert drone_rl.judge(policy, **few).as_dict()["kind"]
+    assert drone_rl.judge(policy, **few).kind
     assert drone_rl.evaluate(policy, **few).success <= 1.0
     shifted = drone_rl.shifts(policy, axes=["noise"], strengths=[3], domain_episodes=20, **few)
-    assert shifted.numbers["domain"]["plain"]["fragile"] == 0
+    assert shifted.domain.plain.fragile == 0
     sizes = {"frames": 40, "data_episodes": 30, "perplexity": 5}
     explained = drone_rl.explain(policy, folder=tmp_path / "explained", **sizes, **few)
     (numbers,) = explained.numbers.values()
