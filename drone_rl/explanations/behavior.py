@@ -67,6 +67,7 @@ def dataset_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray
         "action_shares": (counts / counts.sum()).tolist(),
         "entropy": mean_interval(entropy.clip(0.0, 1.0), data.episode).model_dump(),
         "goals_reached": int((flights.event > 0).sum()),
+        **({"remembers": True} if context.remembers else {}),
     }
     return {"dataset": numbers}, {}
 

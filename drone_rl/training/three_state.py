@@ -1,14 +1,15 @@
 """REINFORCE on the chapter's three-state process (Fig. 3), next to the exact policy gradient."""
 
 import dataclasses
+from typing import Any
 
 import torch
 from tensordict.nn import TensorDictModule
 from torch import Tensor, nn
 from torchrl.data import Categorical
+from torchrl.envs.utils import step_mdp
 from torchrl.modules import ProbabilisticActor
 
-from drone_rl.collectors import EpisodeCollector
 from drone_rl.envs.three_state import ThreeStateEnv
 from drone_rl.objectives import ReinforceLoss, TotalReward
 from drone_rl.policies.actor import RandomSource, SeededCategorical
@@ -81,8 +82,8 @@ class _Learner:
             distribution_kwargs={"source": source},
             default_interaction_type="random",
         )
-        env = ThreeStateEnv(episodes, horizon=horizon, seed=seed)
-        self._collector = EpisodeCollector(env, actor, next_keys=(), postproc=TotalReward())
+        self._env, self._actor = ThreeStateEnv(episodes, horizon=horizon, seed=seed), actor
+        self._returns = TotalReward()
         self._loss = ReinforceLoss(actor, reduction="episode_mean", entropy_coeff=0.0)
 
     @property
@@ -92,7 +93,19 @@ class _Learner:
 
     def accumulate_gradient(self) -> float:
         """Run a batch of episodes, set the gradient of the loss and return the sum of rewards."""
-        batch = self._collector.collect()
+        state, steps, masks = self._env.reset(), [], []
+        running = torch.ones(len(state), dtype=torch.bool)
+        while bool(running.any()):
+            action = torch.zeros(len(state), dtype=torch.int64)
+            with torch.no_grad():
+                action[running] = self._actor(state[running])["action"]
+            after = self._env.step(state.set("action", action))
+            steps.append(after)
+            masks.append(running)
+            running = running & ~after["next", "done"][:, 0]
+            state = step_mdp(after)
+        rolled: Any = torch.stack(steps, 1)  # pyright: ignore[reportArgumentType]
+        batch = self._returns(rolled[torch.stack(masks, 1)])
         self.table.zero_grad()
         self._loss(batch)["loss_actor"].backward()
         return float(batch["next", "reward"].sum())

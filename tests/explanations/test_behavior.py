@@ -124,7 +124,9 @@ def test_statistics_of_the_data_set_by_hand():
         actions=np.array([0, 0, 0, 2, 0]),
         event=np.array([0, 1, 1, 0, -1], np.int8),
     )
-    numbers, arrays = dataset_section(SimpleNamespace(dataset=data, flights=flights))
+    numbers, arrays = dataset_section(
+        SimpleNamespace(dataset=data, flights=flights, remembers=False)
+    )
     found = numbers["dataset"]
     assert arrays == {}
     assert (found["frames"], found["episodes"], found["steps"]) == (3, 3, 5)

@@ -6,7 +6,7 @@ import torch
 from torch import nn
 
 from drone_rl.config import TaskSettings
-from drone_rl.envs import DroneEnv, GrayPixels, with_transforms
+from drone_rl.envs import DroneEnv, GrayPixels
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.response import (
     OutcomeMap,
@@ -132,7 +132,7 @@ def test_a_turn_to_the_needed_side_is_not_blind():
 
 
 def test_outcomes_of_another_task():
-    env = with_transforms(DroneEnv(1, Posts()), [GrayPixels()])
+    env = DroneEnv(1, Posts(), transforms=[GrayPixels()])
     found = outcome_map(Scenes(env), Forward(), num_lateral=7, num_forward=2)
     env.close()
     past = [True, True, False, False, False, True, True]  # 3 to -3 m; touched within 1 m

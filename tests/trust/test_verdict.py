@@ -162,7 +162,7 @@ def test_other_initial_states_are_refused(make_episodes, make_baselines):
     with pytest.raises(ValueError, match="different initial states"):
         apply_rule(ours, make_baselines(theirs))
     with pytest.raises(ValueError, match="different initial states"):
-        apply_rule(ours, make_baselines(ours), sampled=ours[:1])
+        apply_rule(ours, make_baselines(ours), sampled=ours.first(1))
 
 
 def test_sampled_episodes_are_compared_pairwise(judged, make_episodes):
@@ -212,7 +212,7 @@ def test_task_without_an_oracle_is_refused(monkeypatch):
         raise AssertionError("episodes were flown")
 
     for module in ("verdict", "baselines"):
-        monkeypatch.setattr(f"drone_rl.trust.{module}.run_episodes", refused)
+        monkeypatch.setattr(f"drone_rl.trust.{module}.rollout", refused)
     env = DroneEnv(2, Blind(), pixels=False)
     with pytest.raises(InputError, match="task=fog has no oracle"):
         judge_policy(env, constant_policy(Move.LEFT), 2)
