@@ -1,18 +1,14 @@
-"""A claim of a verdict, report or sweep disappears or changes when evidence contradicts it."""
+"""A claim of a verdict or sweep disappears or changes when evidence contradicts it."""
 
 import pytest
 
-from drone_rl.explanations.report.page import PARTS
-from drone_rl.explanations.report.summary import say_summary
 from drone_rl.sweeps import text as sweep_text
 from drone_rl.trust import shifts_text, verdict_text
 from drone_rl.utils.text import said
-from tests.evidence import EXPLANATION, PROOF, SHIFTS, SWEEP, VERDICT, changed
+from tests.evidence import PROOF, SHIFTS, SWEEP, VERDICT, changed
 
-REPORT = (say_summary, *(paragraph for part in PARTS.values() for paragraph in part.text.values()))
 SUBJECTS = {
     "verdict": ([verdict_text.SENTENCES], VERDICT),
-    "report": (REPORT, EXPLANATION),
     "sweep": ([sweep_text.SENTENCES], SWEEP),
     "shifts": ([shifts_text.SHIFTS], SHIFTS),
 }
@@ -20,9 +16,7 @@ TRIVIAL = {"baselines.forward.success.share": 0.95}
 NEVER_FAILED = {"failures.largest": None, "failures.bound.successes": 0}
 WIND = {"unlike": {"wind": {"own": [0.0, 0.0, 0.0], "flown": [5.0, 0.0, 0.0]}}}
 UNDECIDED = {"certain": False, "enough": 1600}
-PROVED, REPORT_PROVED = {"proof": PROOF}, {"verdict.proof": PROOF}
-GOOD = {"verdict.kind": "good", "verdict.certain": True, "verdict.exit_code": 0}
-MEASURED = {"shifts": SHIFTS, **GOOD}
+PROVED = {"proof": PROOF}
 NOWHERE_GOOD = {
     "domain.plain.good": False,
     **{f"domain.ranges.{axis}.positions": None for axis in ("sun", "blur", "brightness")},
@@ -43,22 +37,6 @@ CHANGES = [
     ("verdict", "unlike", {"unlike": {}}, WIND),
     ("verdict", "drawing", {"drawing.upper95": 0.05}),
     ("verdict", "fixed_seed", {"seed_is_fixed": False}),
-    ("report", "summary.verdict", {"verdict.certain": False}),
-    ("report", "summary.certificate", {"verdict.proof.every": False}, REPORT_PROVED),
-    ("report", "summary.robustness", {"shifts.domain": None}, MEASURED),
-    ("report", "summary.heat", {"truth.methods.saliency.trusted": False}),
-    ("report", "advice.use", {"verdict.certain": False}, GOOD),
-    ("report", "advice.refuse", GOOD),
-    ("report", "domain.quoted", {"verdict.good_share": 0.99}, MEASURED),
-    ("report", "contradictions.worst", {"contradictions.contradictions": 0}),
-    ("report", "loops.share", {"loops.episodes.successes": 0}),
-    ("report", "attribution.trusted", {"truth.trusted": None}),
-    ("report", "response.blind", {"response.rows.0.blind": 0.0}),
-    ("report", "places.blind", {"places.alone": 1}),
-    ("report", "asymmetry.side", {"asymmetry.dataset.signed.upper95": 0.1}),
-    ("report", "truth.trusted", {"truth.placebos.ones.mean": 0.9}),
-    ("report", "truth.follows", {"truth.outcomes.follows.lower95": -0.1}),
-    ("report", "truth.ground", {"truth.outcomes.ground_changed.upper95": 0.4}),
     ("sweep", "runs.failed", {"failed": 0}),
     ("sweep", "best.chosen", {"best.certain": False}),
     ("sweep", "sides.not_offered", {"sides_not_offered": 0}),

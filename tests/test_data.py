@@ -15,11 +15,8 @@ from tools.readme.settings import list_commands, list_groups, list_parts
 MUTABLE = {
     "collectors.complete_episodes:CompleteEpisodes",
     "collectors.complete_episodes:StepLog",
-    "explanations.class_models:Attempts",
-    "explanations.class_models:ClassModel",
     "explanations.heat_maps:Explainer",
     "explanations.truth:Intervention",
-    "explanations.report.explanation:Explanation",
     "explanations.rollouts:RolloutDataset",
     "trust.domain:End",
     "sweeps.figures:Layout",

@@ -20,8 +20,7 @@ from drone_rl.explanations.class_model_gallery import CHAPTER, class_models
 from drone_rl.explanations.embedding import embed
 from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.hooks import feature_layer
-from drone_rl.explanations.report.embedding import tsne_map
-from drone_rl.explanations.report.explanation import Explanation
+from drone_rl.explanations.report.embedding import thumbnail_map
 from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frames, select_frames
 from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.policies.policy import Policy, load_policy
@@ -194,20 +193,17 @@ def _embeddings(settings: FigureSettings, subjects: list[Policy]) -> _Drawn:
             seed=legacy_seed(settings.seed),
             kernel=settings.kernel,
         )
-        arrays = dict(data.arrays)
-        if settings.tint == "predicted":
-            arrays["actions"] = data.probabilities.argmax(1)
-        about = {"name": subject.name, "actions": scenes.actions.as_dict()}
-        explanation = Explanation(about, {"tsne_features": points}, arrays)
+        taken = data.probabilities.argmax(1) if settings.tint == "predicted" else data.actions
+        colors = [scenes.actions.colors[action] for action in taken]
         count = len(np.unique(data.episode))
         title = f"{subject.name}: {len(data)} frames of {count} episodes"
-        maps.append(images.titled(tsne_map(explanation, "features"), title))
-        by_action = np.bincount(arrays["actions"], minlength=len(scenes.actions.names)).tolist()
+        maps.append(images.titled(thumbnail_map(data.frames, points, colors), title))
+        by_action = np.bincount(taken, minlength=len(scenes.actions.names)).tolist()
         numbers[subject.name] = {
             "frames": len(data),
             "episodes": count,
             "layer": layer,
-            **faithful,
+            **faithful.model_dump(),
             "frames_by_action": dict(zip(scenes.actions.names, by_action, strict=True)),
         }
     names = "forward violet, left orange, right blue"

@@ -149,24 +149,10 @@ def episode_means(values: NDArray, episode: NDArray) -> NDArray:
     return totals / np.bincount(number)
 
 
-def mean_interval(
-    values: NDArray, episode: NDArray, low: float = 0.0, high: float = 1.0
-) -> dict[str, Any]:
+def mean_interval(values: NDArray, episode: NDArray, low: float = 0.0, high: float = 1.0) -> Mean:
     """Return the mean over episodes of their means, with a 95% interval that counts episodes.
 
     Frames of one episode are alike, so that an interval for independent frames would be too narrow.
     `values` and `episode` are as for `episode_means`, from `low` to `high`.
-
-    Returns:
-        "mean", "lower95", "upper95" (None without frames), "frames" and "episodes".
     """
-    means = episode_means(values, episode)
-    bounds = mean_bounds(means, low, high)
-    has_mean = bounds["mean"] is not None
-    return {
-        "mean": bounds["mean"],
-        "lower95": bounds["lower95"] if has_mean else None,
-        "upper95": bounds["upper95"] if has_mean else None,
-        "frames": int(np.isfinite(values).sum()),
-        "episodes": len(means),
-    }
+    return Mean(**mean_bounds(episode_means(values, episode), low, high))

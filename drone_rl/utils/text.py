@@ -7,10 +7,40 @@ the JSON files, so that a test can change the evidence and see the sentence chan
 import dataclasses
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import jinja2
+
+    from drone_rl.utils.intervals import Mean, Share
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
 _ENDINGS = {1: "st", 2: "nd", 3: "rd"}
+
+
+def render(package: str, template: str, **values: Any) -> str:
+    """Return the text of a template in a package's folder `templates`.
+
+    Spaces and line breaks of templates of sentences (.j2) are one space each; those of Markdown
+    (.md.j2) stay. Templates have the functions of this module as filters.
+    """
+    text = _environment(package).get_template(template).render(**values)
+    return text if template.endswith(".md.j2") else " ".join(text.split())
+
+
+@functools.cache
+def _environment(package: str) -> "jinja2.Environment":
+    import jinja2  # most users of this module need no template
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader(package),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    filters = (percent, interval, rate, listed, plural, ordinal)
+    environment.filters |= {function.__name__: function for function in filters}
+    return environment
 
 
 def bounds(interval: Mapping[str, Any], show: Callable[[float], str] = "{:.2f}".format) -> str:
@@ -97,17 +127,18 @@ def percent(share: float, digits: int = 1) -> str:
         return f"{share:.0%}"
     text, step = f"{100 * share:.{digits}f}%", 10.0**-digits
     if float(text[:-1]) >= 100:
-        return f"more than {100 - step:g}%"
-    return f"less than {step:g}%" if float(text[:-1]) <= 0 else text
+        return f">{100 - step:g}%"
+    return f"<{step:g}%" if share >= 0 and float(text[:-1]) <= 0 else text
 
 
 exact_percent = functools.partial(percent, digits=2)
 """Returns a known fraction in percent with two decimals."""
 
 
-def interval(figure: Mapping[str, Any]) -> str:
-    """Return the 95% confidence interval of a rate, in percent."""
-    return " to ".join(hundredfold(figure[end]) for end in ("lower95", "upper95"))
+def interval(figure: "Share | Mean | Mapping[str, Any]") -> str:
+    """Return the 95% confidence interval of a rate."""
+    ends = figure if isinstance(figure, Mapping) else dict(figure)
+    return f"{percent(ends['lower95'])} to {percent(ends['upper95'])}"
 
 
 def hundredfold(share: float) -> str:
@@ -118,14 +149,14 @@ def hundredfold(share: float) -> str:
     return ">99.9" if text == "100.0" and share < 1 else text
 
 
-def rate(figure: Mapping[str, Any], label: str = "95% CI ") -> str:
-    """Return a rate in percent with its 95% confidence interval, which the label precedes.
+def rate(figure: "Share | Mean | Mapping[str, Any]", label: str = "95% CI ") -> str:
+    """Return a rate with its 95% confidence interval, which the label precedes.
 
-    `figure` has the rate under "share" or, for a mean over episodes, "mean". A rate of None is
-    "not offered".
+    A rate of None is "not offered".
     """
-    share = figure["share"] if "share" in figure else figure["mean"]
-    return "not offered" if share is None else f"{hundredfold(share)}% ({label}{interval(figure)})"
+    of = figure if isinstance(figure, Mapping) else dict(figure)
+    share = of["share"] if "share" in of else of["mean"]
+    return "not offered" if share is None else f"{percent(share)} ({label}{interval(figure)})"
 
 
 SEED_KEYS = ("seed", "seed_is_fixed")

@@ -15,7 +15,7 @@ from drone_rl.config.commands import PlacesSettings
 from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.config.options import PlacesOptions
 from drone_rl.envs.transforms import on_pixels
-from drone_rl.explanations.report.places import rows, say_places
+from drone_rl.explanations.report.places import describe, rows
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.trust.plots import regions
@@ -25,7 +25,6 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
-from drone_rl.utils.text import say
 from drone_rl.utils.threads import torch_threads
 from drone_rl.verification.prover.action_map import ActionMap, map_policy
 from drone_rl.verification.prover.policy_spec import make_policy_spec
@@ -75,7 +74,7 @@ class Places(TableResult):
 
     def notes(self) -> list[str]:
         """Return the findings in words."""
-        return [say(say_places, {"places": self.numbers})]
+        return [describe(self.numbers, SHOWN_MOVES.names)]
 
     def figure(self) -> Figure:
         """Return the map."""

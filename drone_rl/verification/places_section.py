@@ -4,7 +4,6 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import PlacesSettings
@@ -22,18 +21,14 @@ _COMPARED = 1000
 """Rendered frames that are compared with the closed form; fewer than in `drone-rl places`."""
 
 
-def places_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Return "places", or why it is "refused" if no exact map is known for this configuration.
-
-    Arrays: "places_..." of the outlines, see `ActionMap.outlines`.
-    """
+def places_section(context: Context) -> dict[str, Any]:
+    """Return the map and its "outlines", or why it is "refused" if none is known."""
     settings = PlacesSettings()
     try:
         action_map = _exact_map(context, settings)
     except InputError as error:
-        return {"places": {"refused": str(error)}}, {}
-    arrays = {f"places_{name}": array for name, array in action_map.outlines().items()}
-    return {"places": action_map.summary(settings.logit_gap)}, arrays
+        return {"refused": str(error)}
+    return {**action_map.summary(settings.logit_gap), "outlines": action_map.outlines()}
 
 
 def _exact_map(context: Context, settings: PlacesSettings) -> ActionMap:

@@ -11,14 +11,16 @@ from drone_rl.explanations.class_model_gallery import GALLERY
 from drone_rl.explanations.class_models import (
     Attempts,
     ClassModelSettings,
-    ImageStatistics,
     _Ascent,
+    best_models,
     gaussian_blur,
+    image_statistics,
     search,
     section,
     visualise,
 )
 from drone_rl.explanations.context import LeftOutError
+from drone_rl.explanations.results import ImageStatistics
 from drone_rl.policies import MLP
 from drone_rl.utils.errors import InputError
 
@@ -73,21 +75,20 @@ def test_an_action_that_no_image_reaches_has_a_low_probability():
     network = MLP((1, 6, 12), 3, hidden=())
     with torch.no_grad():
         network.layers.logits.bias.copy_(torch.tensor([0.0, -20.0, 0.0]))
-    summary = search(network, STATISTICS).summary()
-    assert summary["highest"][1] < 0.01 and summary["highest"][0] > 0.5
-    assert len(summary["tried"]) == summary["num_settings"] == 6
+    found = best_models(search(network, STATISTICS))
+    assert found.highest[1] < 0.01 and found.highest[0] > 0.5
+    assert (len(found.tried), found.attempts) == (6, 48)
 
 
 def test_statistics_by_hand():
     """Columns 0 1 0 1: neighbours across differ by 1, those down by 0; the data set's by 2."""
     stripes = torch.tensor([0.0, 1.0]).repeat(3).expand(1, 1, 4, 6)
-    statistics = ImageStatistics.of(2 * stripes)
-    assert statistics == ImageStatistics(
-        mean=1.0, std=pytest.approx((24 / 23) ** 0.5), low=0.0, high=2.0, roughness=2.0
-    )
+    statistics = image_statistics(2 * stripes)
+    assert (statistics.mean, statistics.low, statistics.high, statistics.roughness) == (1, 0, 2, 2)
+    assert statistics.std == pytest.approx((24 / 23) ** 0.5)
     rows = stripes.mT.contiguous()
-    assert ImageStatistics.of(rows).roughness == 1.0
-    assert ImageStatistics.of(torch.cat([stripes, 0 * stripes])).roughness == 0.5
+    assert image_statistics(rows).roughness == 1.0
+    assert image_statistics(torch.cat([stripes, 0 * stripes])).roughness == 0.5
 
 
 PLAIN = ClassModelSettings(steps=1, jitter=0, starts=1)
@@ -166,7 +167,7 @@ def test_refined_images_have_the_data_sets_mean_deviation_and_range():
     refined = refine(images, WIDE)
     torch.testing.assert_close(refined.mean((1, 2, 3)), torch.full((3,), 0.3))
     torch.testing.assert_close(refined.std((1, 2, 3)), torch.full((3,), 2.0))
-    narrow = dataclasses.replace(WIDE, low=-1.0, high=0.5)
+    narrow = WIDE.model_copy(update={"low": -1.0, "high": 0.5})
     assert refine(images, narrow).unique()[[0, -1]].tolist() == [-1.0, 0.5]
     blurred = gaussian_blur(images, 0.7)
     deviation = (blurred - blurred.mean((1, 2, 3), keepdim=True)) / blurred[0].std()
@@ -208,7 +209,7 @@ def test_squared_pixels_are_subtracted_from_the_objective():
 )
 def test_refinements_by_hand(changes, expected):
     images = torch.tensor([[-1.7, 2.3]])[None, None]
-    statistics = dataclasses.replace(WIDE, low=-1.0, high=2.0)
+    statistics = WIDE.model_copy(update={"low": -1.0, "high": 2.0})
     settings = ClassModelSettings(**{"blur": 0.0, "clamp": False, **changes})
     found = _Ascent(None, None, statistics, settings, None).refine(images)
     torch.testing.assert_close(found[0, 0], torch.tensor(expected), rtol=1e-5, atol=1e-5)

@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 from scipy.stats import binom
 
 from drone_rl.utils.intervals import (
+    Mean,
     episode_means,
     mean_bounds,
     mean_interval,
@@ -180,24 +181,18 @@ def test_each_episode_counts_once():
     episode = np.array([0, 0, 1, 1, 1, 1, 2])
     assert episode_means(values, episode).tolist() == [0.5, 1.0]
     found = mean_interval(values, episode)
-    expected = mean_bounds([0.5, 1.0])
-    assert found["mean"] == 0.75
-    assert (found["lower95"], found["upper95"]) == (expected["lower95"], expected["upper95"])
-    assert (found["frames"], found["episodes"]) == (5, 2)
+    assert found == Mean(**mean_bounds([0.5, 1.0]))
+    assert (found.mean, found.count) == (0.75, 2)
 
 
 def test_more_frames_of_an_episode_do_not_narrow_the_interval():
     few = mean_interval(np.ones(5), np.arange(5))
     many = mean_interval(np.ones(500), np.arange(500) // 100)
-    assert few["lower95"] == many["lower95"] < 0.6
+    assert few.lower95 == many.lower95 < 0.6
 
 
 def test_mean_intervals_have_the_range_of_the_values():
-    assert mean_interval(np.array([-0.5]), np.zeros(1), low=-1.0)["lower95"] < -0.5
+    assert mean_interval(np.array([-0.5]), np.zeros(1), low=-1.0).lower95 < -0.5
+    assert mean_interval(np.array([np.nan]), np.zeros(1)).mean is None
     with pytest.raises(ValueError, match="from 0"):
         mean_interval(np.array([-0.5]), np.zeros(1))
-
-
-def test_mean_interval_without_frames():
-    found = mean_interval(np.array([np.nan]), np.zeros(1))
-    assert found == {"mean": None, "lower95": None, "upper95": None, "frames": 0, "episodes": 0}

@@ -35,19 +35,19 @@ def test_exact_rates_are_never_rounded_to_all():
 def test_percentages_are_never_rounded_to_none_or_all():
     shares = (0, 0.0004, 0.0123, 0.9749, 0.9996, 1.0)
     assert [percent(share) for share in shares] == [
-        "0%", "less than 0.1%", "1.2%", "97.5%", "more than 99.9%", "100%"
+        "0%", "<0.1%", "1.2%", "97.5%", ">99.9%", "100%"
     ]  # fmt: skip
     assert [percent(share, 0) for share in shares] == [
-        "0%", "less than 1%", "1%", "97%", "more than 99%", "100%"
+        "0%", "<1%", "1%", "97%", ">99%", "100%"
     ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("share", "lower", "upper", "text"),
     [
-        (0.975, 0.9543, 0.9881, "97.5% (95% CI 95.4 to 98.8)"),
-        (0.0, 0.0, 0.0003689, "0.0% (95% CI 0.0 to <0.1)"),
-        (1.0, 0.9996312, 1.0, "100.0% (95% CI >99.9 to 100.0)"),
+        (0.975, 0.9543, 0.9881, "97.5% (95% CI 95.4% to 98.8%)"),
+        (0.0, 0.0, 0.0003689, "0% (95% CI 0% to <0.1%)"),
+        (1.0, 0.9996312, 1.0, "100% (95% CI >99.9% to 100%)"),
         (None, 0.0, 1.0, "not offered"),
     ],
 )

@@ -1,210 +1,97 @@
 """Report sections: verdict, robustness, what is left out, rollouts, flaws."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from PIL import Image
 
-from drone_rl.explanations.report.explanation import Explanation, Figures, Part
-from drone_rl.sim.vocabulary import shown_actions, terms_of
-from drone_rl.trust import charts
+from drone_rl.explanations.report.part import Figures, Part
+from drone_rl.explanations.results import Explanation
+from drone_rl.trust import charts, shifts_text
 from drone_rl.trust.plots import images
-from drone_rl.trust.shifts_text import QUOTED, is_quoted, not_evaluated, rows
 from drone_rl.trust.verdict_text import SENTENCES, depends_on_rounding
-from drone_rl.utils.text import (
-    Claims,
-    Evidence,
-    among,
-    bounds,
-    is_fixed,
-    listed,
-    percent,
-    said,
-    seed_line,
-)
+from drone_rl.utils.text import say, seed_line
+
+MAX_PAIRS = 4  # pairs of each kind that are shown
 
 
-def say_source(evidence: Evidence) -> Claims:
-    """Say which file the page repeats; "source" is its name."""
-    revision = evidence.get("provenance", {}).get("git_revision") or "unknown"
+def evidence(explanation: Explanation) -> dict[str, Any]:
+    """Return verdict and robustness for the sentences of `drone_rl.trust`."""
+    quoted = explanation.shifts
+    header = {"seed": explanation.seed, "seed_is_fixed": explanation.seed_is_fixed}
+    measured = {"shifts": quoted.measured} if quoted else {}
+    return {"verdict": explanation.verdict, **measured, **header}
+
+
+def describe_verdict(explanation: Explanation) -> dict[str, Any]:
+    """Return the verdict in words."""
+    verdict: Mapping[str, Any] = explanation.verdict or {}
     return {
-        "source.file": (
-            f"This page repeats what {evidence['source']} says (written {evidence['date']}, "
-            f"revision {revision}). The figures were read from this file and not measured again."
-        )
+        "text": say(SENTENCES, verdict),
+        "depends_on_rounding": depends_on_rounding(verdict),
+        "untested": shifts_text.not_evaluated(evidence(explanation)),
+        "seed": seed_line(evidence(explanation)),
     }
 
 
-def say_verdict(evidence: Evidence) -> Claims:
-    """Say the verdict by its figures; the sentence in the file may say anything."""
-    return said(SENTENCES, evidence["verdict"])
+def is_quoted(explanation: Explanation) -> bool:
+    """Return whether the robustness is shown."""
+    return shifts_text.is_quoted(evidence(explanation))
 
 
-def say_advice(evidence: Evidence) -> Claims:
-    """Say what to do about the verdict."""
-    verdict = evidence["verdict"]
-    if not verdict["certain"]:
-        more = "do not rely on it; more episodes do not change that."
-        if not depends_on_rounding(verdict):
-            count = verdict["enough"]
-            episodes = f"more episodes (episodes={count})" if count else "many more episodes"
-            more = f"evaluate {episodes} before relying on it."
-        return {"advice.more": f"What to do: {more}"}
-    if verdict["kind"] == "good":
-        text = "rely on it in environments like those tested, and in no others."
-        return {"advice.use": f"What to do: {text}"}
-    return {
-        "advice.refuse": (
-            "What to do: do not rely on it; drone-rl verdict with require=good ends with exit "
-            f"status {verdict['exit_code']}."
-        )
-    }
+def why_not_quoted(explanation: Explanation) -> str | None:
+    """Return the reason why the robustness is not shown, or None."""
+    return shifts_text.why_not(evidence(explanation))
 
 
-def say_scope(evidence: Evidence) -> Claims:
-    """Say with which colors, light or sizes the policy was not evaluated."""
-    if not (names := not_evaluated(evidence)):
-        return {}
-    return {
-        "scope.appearance": (
-            "The verdict holds for the appearance and light of these episodes only: nothing here "
-            f"tests other {listed(names, 'or')}."
-        )
-    }
-
-
-def say_seed(evidence: Evidence) -> Claims:
-    """Warn of a seed that was known before the analysis."""
-    if not is_fixed(evidence):
-        return {}
-    return {
-        "explanation.fixed_seed": (
-            f"Fixed seed {evidence.get('seed')}: a policy could have been fitted to the "
-            "environments, frames and placements of all sections."
-        )
-    }
-
-
-def say_left_out(evidence: Evidence) -> Claims:
-    """Say why sections could not be computed for this policy."""
-    return {"left_out.why": " ".join(evidence["left_out"].values())}
-
-
-EVALUATION_PART = Part(
-    title="Verdict",
-    label="Verdict",
-    needs=("verdict",),
-    text={"verdict": say_verdict, "advice": say_advice, "scope": say_scope, "seed": say_seed},
-    extras=lambda explanation: {"seed": seed_line(explanation.numbers)},
-)
+def robust_axes(explanation: Explanation) -> list[str]:
+    """Return the axes with a range in which the policy is good."""
+    measured = explanation.shifts.measured if explanation.shifts else {}
+    return [shifts_text.NAMES[name] for name in shifts_text.wide(measured)]
 
 
 def draw_shifts(explanation: Explanation) -> Figures:
     """Draw curves and rows of frames, unless the measurement is refused."""
-    numbers, arrays = explanation.numbers["shifts"], explanation.arrays
-    if not is_quoted(explanation.numbers):
+    quoted = explanation.shifts
+    if quoted is None or not is_quoted(explanation):
         return {}
     frames = {
-        f"conditions_{name}": charts.conditions(numbers, name, [*arrays[f"shifts_{name}"]])
-        for name in numbers["axes"]
+        f"conditions_{name}": charts.conditions(quoted.measured, name, [*strip])
+        for name, strip in quoted.frames.items()
     }
-    return {"shifts": charts.curves(numbers), **frames}
+    return {"shifts": charts.curves(quoted.measured), **frames}
 
 
-SHIFTS_PART = Part(
-    title="Robustness",
-    label="Robustness",
-    needs=("shifts",),
-    text={"shifts": QUOTED},
-    draw=draw_shifts,
-    extras=lambda explanation: {
-        "rows": rows(explanation.numbers["shifts"]) if is_quoted(explanation.numbers) else [],
+def describe_shifts(explanation: Explanation) -> dict[str, Any]:
+    """Return the robustness in words, and as a table."""
+    measured = explanation.shifts.measured if explanation.shifts else {}
+    return {
+        "text": say(shifts_text.QUOTED, evidence(explanation)),
+        "rows": shifts_text.rows(measured) if is_quoted(explanation) else [],
         "names": charts.NAMES,
-    },
-)
-LEFT_OUT_PART = Part(
-    title="What is left out, and why",
-    label="Left out",
-    needs=("left_out",),
-    text={"left_out": say_left_out},
-)
-
-
-KINDS = ("contradiction", "justified", "unknown")
-MAX_PAIRS = 4  # pairs of each kind that are shown
-
-
-def say_dataset(evidence: Evidence) -> Claims:
-    """Say what was recorded, and which actions the policy took."""
-    data, terms = evidence["dataset"], terms_of(evidence)
-    shares = zip(shown_actions(evidence).names, data["action_shares"], strict=True)
-    entropy = data["entropy"]
-    return {
-        "dataset.size": (
-            f"{data['frames']} frames, spread evenly over {data['episodes']} whole episodes of "
-            f"{data['steps']:,} steps with sampled actions; {data['goals_reached']} {terms.goals} "
-            f"{terms.reached}."
-        ),
-        "dataset.actions": (
-            f"Actions taken: {listed([f'{percent(share)} {name}' for name, share in shares])}."
-        ),
-        "dataset.entropy": (
-            f"The policy's mean entropy is {entropy['mean']:.2f}, where 0 is deterministic and 1 "
-            f"is uniform ({bounds(entropy)})."
-        ),
     }
 
 
-def say_contradictions(evidence: Evidence) -> Claims:
-    """Say how many similar frames get opposite actions, and whether that is justified."""
-    flaws, target = evidence["contradictions"], terms_of(evidence).target
-    claims = {
-        "contradictions.pairs": (
-            f"Pairs of similar frames with opposite actions among these {flaws['frames']} frames, "
-            f"each in one pair at most: {flaws['contradictions']} contradictions (the next "
-            f"{target} is at about the same place in both), {flaws['justified']} justified (it is "
-            f"elsewhere), {flaws['unknown']} unknown (a frame has no next {target})."
-        )
-    }
-    if flaws["contradictions"] > 0:
-        claims["contradictions.worst"] = (
-            "In the worst contradiction, from one frame to the other, left loses and right gains "
-            f"at least {flaws['worst_opposition']:.2f} of probability."
-        )
-    return claims
+def draw_pairs(explanation: Explanation) -> dict[str, dict[str, Image.Image]]:
+    """Draw the worst pairs of each kind, left and right in turn, by caption."""
+    assert explanation.flaws is not None
+    drawn: dict[str, dict[str, Image.Image]] = {}
+    for pair in explanation.flaws.pairs:
+        tiles = drawn.setdefault(f"pairs_{pair.kind}", {})
+        number = len(tiles) // 2 + 1
+        for side, frame in (("left", pair.left), ("right", pair.right)):
+            caption = f"frame {frame}: more {side}"
+            if number <= MAX_PAIRS:
+                tiles[f"pair {number}, {caption}"] = images.frame_with_probabilities(
+                    explanation.data, frame, caption, explanation.actions
+                )
+    return drawn
 
 
-def say_loops(evidence: Evidence) -> Claims:
-    """Say in how many episodes the drone moves back and forth."""
-    loops, share = evidence["loops"], evidence["loops"]["episodes"]
-    return {
-        "loops.share": (
-            f"In {among(share)} of these sampled episodes the drone moves back and forth in a loop "
-            f"({bounds(share, percent)}); all loops together have {percent(loops['frames_share'])} "
-            f"of the steps, the longest {loops['longest']} steps."
-        )
-    }
-
-
-def pairs(explanation: Explanation, kind: str) -> dict[str, Image.Image]:
-    """Return images of the worst pairs of a kind, left and right in turn, by caption."""
-    listed_pairs = explanation.numbers["contradictions"]["list"]
-    worst = [pair for pair in listed_pairs if pair["kind"] == kind][:MAX_PAIRS]
-    return {
-        f"pair {i}, frame {pair[side]}: more {side}": images.frame_with_probabilities(
-            explanation.data, pair[side], f"frame {pair[side]}: more {side}", explanation.actions
-        )
-        for i, pair in enumerate(worst, start=1)
-        for side in ("left", "right")
-    }
-
-
-DATASET_PART = Part(
-    title="Recorded rollouts", label="Rollouts", needs=("dataset",), text={"dataset": say_dataset}
-)
+VERDICT_PART = Part(title="Verdict", label="Verdict", values=describe_verdict)
+SHIFTS_PART = Part(title="Robustness", label="Robustness", draw=draw_shifts, values=describe_shifts)
+LEFT_OUT_PART = Part(title="What is left out, and why", label="Left out")
+DATASET_PART = Part(title="Recorded rollouts", label="Rollouts")
 FLAWS_PART = Part(
-    title="Contradictions and loops",
-    label="Contradictions and loops",
-    needs=("contradictions", "loops"),
-    text={"contradictions": say_contradictions, "loops": say_loops},
-    draw=lambda explanation: {
-        f"pairs_{kind}": tiles for kind in KINDS if (tiles := pairs(explanation, kind))
-    },
+    title="Contradictions and loops", label="Contradictions and loops", draw=draw_pairs
 )

@@ -1,36 +1,34 @@
-"""Report section "class_models": observations optimized for each action (Figs. 10 to 12)."""
+"""Report section "class_model": observations optimized for each action (Figs. 10 to 12)."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from PIL import Image
 
-from drone_rl.explanations.report.explanation import Explanation, Part
-from drone_rl.sim.vocabulary import shown_actions
+from drone_rl.explanations.report.part import Part
+from drone_rl.explanations.results import BestModels, Explanation
 from drone_rl.trust.plots import images
-from drone_rl.utils.text import Claims, Evidence, listed
-
-_OBJECTIVES = ("probability", "logit")
 
 
-def say_class_models(evidence: Evidence) -> Claims:
-    """Say which actions the optimized observations make probable, and which none does."""
-    models, names = evidence["class_model"], shown_actions(evidence).names
-    pairs = zip(names, models["logit"]["probabilities"], strict=True)
-    claims = {
-        "class_model.reached": (
-            "Probabilities of the actions on the observations optimized by logit: "
-            f"{listed([f'{action} {p:.3f}' for action, p in pairs])}."
-        )
-    }
-    highest = [max(p) for p in zip(*(models[o]["highest"] for o in _OBJECTIVES), strict=True)]
-    unreached = [action for action, p in zip(names, highest, strict=True) if p <= 0.5]
-    if unreached:
-        attempts = sum(models[o]["starts"] * models[o]["num_settings"] for o in _OBJECTIVES)
-        claims["class_model.not_reached"] = (
-            f"None of the {attempts} attempts made {listed(unreached, 'or')} more probable than "
-            "not; this does not show that no observation does."
-        )
-    return claims
+def objectives(explanation: Explanation) -> dict[str, BestModels]:
+    """Return the class models by objective."""
+    model = explanation.class_model
+    return {"probability": model.probability, "logit": model.logit} if model else {}
+
+
+def tiles(explanation: Explanation, start: str = "") -> dict[str, Image.Image]:
+    """Return the images of one policy by caption, each with a start."""
+    by_caption: dict[str, Image.Image] = {}
+    model, actions = explanation.class_model, explanation.actions
+    assert model is not None
+    limits = model.statistics.low, model.statistics.high
+    for objective, best in objectives(explanation).items():
+        for action in actions.order:
+            image = images.shown_picture(best.images[action], *limits, model.channels)
+            reached = f"{actions.names[action]} {best.probabilities[action]:.3f}"
+            caption = f"{start}{reached} (by {objective})"
+            by_caption[caption] = images.titled(images.enlarge(image), caption)
+    return by_caption
 
 
 def grid(explanations: Sequence[Explanation]) -> Image.Image:
@@ -43,28 +41,26 @@ def grid(explanations: Sequence[Explanation]) -> Image.Image:
     return images.stacked(grids, gap=12)
 
 
-def tiles(explanation: Explanation, start: str = "") -> dict[str, Image.Image]:
-    """Return the images of one policy by caption, each with a start."""
-    by_caption: dict[str, Image.Image] = {}
-    numbers = explanation.numbers["class_model"]
-    low, high = numbers["statistics"]["low"], numbers["statistics"]["high"]
-    channels = numbers["channels"]
-    for objective in _OBJECTIVES:
-        reached = numbers[objective]["probabilities"]
-        observations = explanation.arrays[f"class_model_{objective}"]
-        for action in explanation.actions.order:
-            image = images.shown_picture(observations[action], low, high, channels)
-            name = explanation.actions.names[action]
-            caption = f"{start}{name} {reached[action]:.3f} (by {objective})"
-            by_caption[caption] = images.titled(images.enlarge(image), caption)
-    return by_caption
+def values(explanation: Explanation) -> dict[str, Any]:
+    """Return the actions that no image made probable, and a table of the settings tried."""
+    names, models = explanation.actions.names, objectives(explanation)
+    highest = zip(*(best.highest for best in models.values()), strict=True)
+    rows = [["objective", "parameters", "blur", "steps", *names, "roughness", ""]]
+    for objective, best in models.items():
+        for one in best.tried:
+            of = one.settings
+            row = [objective, of["parameterisation"], f"{of['blur']}", f"{of['steps']}"]
+            row += [f"{p:.3f}" for p in one.probabilities]
+            rough = " ".join(f"{r:.2f}" for r in one.roughness)
+            rows.append([*row, rough, "shown" if one.shown else ""])
+    unreached = [name for name, most in zip(names, highest, strict=True) if max(most) <= 0.5]
+    return {"unreached": unreached, "rows": rows}
 
 
 PART = Part(
     title="Observations that maximize each action (class models)",
     label="Class models",
-    needs=("class_model",),
-    text={"class_model": say_class_models},
     draw=lambda explanation: {"class_model": tiles(explanation)},
+    values=values,
     compare=lambda explanations: {"class_models": grid(explanations)},
 )
