@@ -11,7 +11,7 @@ from torch.nn import functional
 
 from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.explanations.context import Context, LeftOutError
-from drone_rl.explanations.results import Ascent, BestModels, ClassModel, ImageStatistics
+from drone_rl.explanations.results import BestModels, ClassModel, ImageStatistics
 from drone_rl.explanations.settings import ClassModelSettings
 from drone_rl.policies import ImageNetwork
 from drone_rl.utils.errors import InputError
@@ -74,20 +74,10 @@ def best_models(tried: Sequence[Attempts]) -> BestModels:
     fields = ("images", "probabilities", "roughness")
     joined = {name: torch.cat([getattr(a, name) for a in tried], 1) for name in fields}
     every = Attempts(**joined, settings=tried[0].settings)
-    starts = tried[0].settings.starts
-    shown = {i // starts for i in every.best()}
     return BestModels(
         probabilities=tuple(every.best_values()["probabilities"]),
-        attempts=len(tried) * starts,
+        attempts=every.probabilities.shape[1],
         highest=tuple(every.probabilities.amax(1).tolist()),
-        tried=tuple(
-            Ascent(
-                settings=dataclasses.asdict(attempts.settings),
-                shown=number in shown,
-                **attempts.best_values(),
-            )
-            for number, attempts in enumerate(tried)
-        ),
         images=every.best_images().numpy(),
     )
 

@@ -127,19 +127,6 @@ class ImageStatistics(Model):
     roughness: float
 
 
-class Ascent(Model):
-    """Class models by one setting."""
-
-    settings: dict[str, Any]
-    """See `ClassModelSettings`."""
-    probabilities: tuple[float, ...]
-    """Of each action on its image."""
-    roughness: tuple[float, ...]
-    """Relative to the data set's."""
-    shown: bool
-    """Whether it has the best image of an action."""
-
-
 class BestModels(Model):
     """The best class models by one objective."""
 
@@ -149,7 +136,6 @@ class BestModels(Model):
     """Images that were optimized for an action."""
     highest: tuple[float, ...]
     """The highest probability of all attempts, by action."""
-    tried: tuple[Ascent, ...]
     images: Array
     """Shape: (num_actions, C, h, w)."""
 

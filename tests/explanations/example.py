@@ -35,13 +35,10 @@ def method(trusted, failed, score):
 def optimized(probabilities, highest):
     images = np.zeros((ACTIONS, 1, 4, 30))
     images[1] = 1.0  # that for left is white
-    settings = {"parameterisation": "pixel", "blur": 0.5, "steps": 64}
-    tried = {"settings": settings, "probabilities": probabilities, "roughness": [1, 1, 1]}
     return {
         "probabilities": probabilities,
         "highest": highest,
         "attempts": 48,
-        "tried": [{**tried, "shown": True}],
         "images": images,
     }
 

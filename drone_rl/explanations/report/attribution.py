@@ -15,10 +15,9 @@ from drone_rl.trust.plots import images
 BLOCK = 16  # sides of a film are multiples of this many pixels, as its encoder requires
 
 
-def draw(explanation: Explanation) -> Figures:
+def draw(maps: Attribution, explanation: Explanation) -> Figures:
     """Draw the map that passed the tests best, and the default one unless it passed, too."""
-    maps, actions, truth = explanation.attribution, explanation.actions, explanation.truth
-    assert maps is not None
+    actions, truth = explanation.actions, explanation.truth
     method = explanation.trusted_method
 
     def key_steps(method: str | None) -> dict[str, Image.Image]:

@@ -6,7 +6,7 @@ from typing import Any
 from PIL import Image
 
 from drone_rl.explanations.report.part import Figures, Part
-from drone_rl.explanations.results import Explanation
+from drone_rl.explanations.results import Explanation, Flaws, QuotedShifts
 from drone_rl.trust import charts, shifts_text
 from drone_rl.trust.plots import images
 from drone_rl.trust.verdict_text import SENTENCES, depends_on_rounding
@@ -23,9 +23,8 @@ def evidence(explanation: Explanation) -> dict[str, Any]:
     return {"verdict": explanation.verdict, **measured, **header}
 
 
-def describe_verdict(explanation: Explanation) -> dict[str, Any]:
+def describe_verdict(verdict: Mapping[str, Any], explanation: Explanation) -> dict[str, Any]:
     """Return the verdict in words."""
-    verdict: Mapping[str, Any] = explanation.verdict or {}
     return {
         "text": say(SENTENCES, verdict),
         "depends_on_rounding": depends_on_rounding(verdict),
@@ -50,10 +49,9 @@ def robust_axes(explanation: Explanation) -> list[str]:
     return [shifts_text.NAMES[name] for name in shifts_text.wide(measured)]
 
 
-def draw_shifts(explanation: Explanation) -> Figures:
+def draw_shifts(quoted: QuotedShifts, explanation: Explanation) -> Figures:
     """Draw curves and rows of frames, unless the measurement is refused."""
-    quoted = explanation.shifts
-    if quoted is None or not is_quoted(explanation):
+    if not is_quoted(explanation):
         return {}
     frames = {
         f"conditions_{name}": charts.conditions(quoted.measured, name, [*strip])
@@ -62,21 +60,19 @@ def draw_shifts(explanation: Explanation) -> Figures:
     return {"shifts": charts.curves(quoted.measured), **frames}
 
 
-def describe_shifts(explanation: Explanation) -> dict[str, Any]:
+def describe_shifts(quoted: QuotedShifts, explanation: Explanation) -> dict[str, Any]:
     """Return the robustness in words, and as a table."""
-    measured = explanation.shifts.measured if explanation.shifts else {}
     return {
         "text": say(shifts_text.QUOTED, evidence(explanation)),
-        "rows": shifts_text.rows(measured) if is_quoted(explanation) else [],
+        "rows": shifts_text.rows(quoted.measured) if is_quoted(explanation) else [],
         "names": charts.NAMES,
     }
 
 
-def draw_pairs(explanation: Explanation) -> dict[str, dict[str, Image.Image]]:
+def draw_pairs(flaws: Flaws, explanation: Explanation) -> dict[str, dict[str, Image.Image]]:
     """Draw the worst pairs of each kind, left and right in turn, by caption."""
-    assert explanation.flaws is not None
     drawn: dict[str, dict[str, Image.Image]] = {}
-    for pair in explanation.flaws.pairs:
+    for pair in flaws.pairs:
         tiles = drawn.setdefault(f"pairs_{pair.kind}", {})
         number = len(tiles) // 2 + 1
         for side, frame in (("left", pair.left), ("right", pair.right)):

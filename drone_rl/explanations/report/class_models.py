@@ -6,23 +6,16 @@ from typing import Any
 from PIL import Image
 
 from drone_rl.explanations.report.part import Part
-from drone_rl.explanations.results import BestModels, Explanation
+from drone_rl.explanations.results import ClassModel, Explanation
+from drone_rl.sim.vocabulary import ShownActions
 from drone_rl.trust.plots import images
 
 
-def objectives(explanation: Explanation) -> dict[str, BestModels]:
-    """Return the class models by objective."""
-    model = explanation.class_model
-    return {"probability": model.probability, "logit": model.logit} if model else {}
-
-
-def tiles(explanation: Explanation, start: str = "") -> dict[str, Image.Image]:
+def tiles(model: ClassModel, actions: ShownActions, start: str = "") -> dict[str, Image.Image]:
     """Return the images of one policy by caption, each with a start."""
     by_caption: dict[str, Image.Image] = {}
-    model, actions = explanation.class_model, explanation.actions
-    assert model is not None
     limits = model.statistics.low, model.statistics.high
-    for objective, best in objectives(explanation).items():
+    for objective, best in (("probability", model.probability), ("logit", model.logit)):
         for action in actions.order:
             image = images.shown_picture(best.images[action], *limits, model.channels)
             reached = f"{actions.names[action]} {best.probabilities[action]:.3f}"
@@ -31,36 +24,29 @@ def tiles(explanation: Explanation, start: str = "") -> dict[str, Image.Image]:
     return by_caption
 
 
-def grid(explanations: Sequence[Explanation]) -> Image.Image:
-    """Return images by policy and objective (rows) and action (columns), with probabilities."""
+def compare(explanations: Sequence[Explanation]) -> dict[str, Image.Image]:
+    """Draw images by policy and objective (rows) and action (columns), with probabilities."""
     grids = []
     for explanation in explanations:
+        model, actions = explanation.class_model, explanation.actions
+        assert model is not None
         start = f"{explanation.name[:18]}: " if len(explanations) > 1 else ""
-        row = [*tiles(explanation, start).values()]
-        grids.append(images.gridded(row, len(explanation.actions.names)))
-    return images.stacked(grids, gap=12)
+        row = [*tiles(model, actions, start).values()]
+        grids.append(images.gridded(row, len(actions.names)))
+    return {"class_models": images.stacked(grids, gap=12)}
 
 
-def values(explanation: Explanation) -> dict[str, Any]:
-    """Return the actions that no image made probable, and a table of the settings tried."""
-    names, models = explanation.actions.names, objectives(explanation)
-    highest = zip(*(best.highest for best in models.values()), strict=True)
-    rows = [["objective", "parameters", "blur", "steps", *names, "roughness", ""]]
-    for objective, best in models.items():
-        for one in best.tried:
-            of = one.settings
-            row = [objective, of["parameterisation"], f"{of['blur']}", f"{of['steps']}"]
-            row += [f"{p:.3f}" for p in one.probabilities]
-            rough = " ".join(f"{r:.2f}" for r in one.roughness)
-            rows.append([*row, rough, "shown" if one.shown else ""])
-    unreached = [name for name, most in zip(names, highest, strict=True) if max(most) <= 0.5]
-    return {"unreached": unreached, "rows": rows}
+def unreached(model: ClassModel, explanation: Explanation) -> dict[str, Any]:
+    """Return the actions that no image made probable."""
+    highest = zip(model.probability.highest, model.logit.highest, strict=True)
+    names = zip(explanation.actions.names, highest, strict=True)
+    return {"unreached": [name for name, most in names if max(most) <= 0.5]}
 
 
 PART = Part(
     title="Observations that maximize each action (class models)",
     label="Class models",
-    draw=lambda explanation: {"class_model": tiles(explanation)},
-    values=values,
-    compare=lambda explanations: {"class_models": grid(explanations)},
+    draw=lambda model, explanation: {"class_model": tiles(model, explanation.actions)},
+    values=unreached,
+    compare=compare,
 )

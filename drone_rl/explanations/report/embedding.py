@@ -10,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
 from drone_rl.explanations.report.part import Part
-from drone_rl.explanations.results import Explanation
+from drone_rl.explanations.results import Explanation, Tsne
 from drone_rl.trust.plots import images
 from drone_rl.trust.plots.saving import to_png, to_uri
 from drone_rl.utils.palette import Rgb
@@ -51,33 +51,23 @@ def snap_to_grid(points: NDArray, columns: int, rows: int) -> NDArray:
     return corners[nearest]
 
 
-def map_points(explanation: Explanation) -> dict[str, NDArray]:
-    """Return the points of both maps. Shape: (T, 2)."""
-    tsne = explanation.tsne
-    return {"features": tsne.features.points, "pixels": tsne.pixels.points} if tsne else {}
-
-
-def draw(explanation: Explanation) -> dict[str, Image.Image]:
+def draw(tsne: Tsne, explanation: Explanation) -> dict[str, Image.Image]:
     """Draw the maps of features and of pixels, tinted by the action taken."""
     data = explanation.data
     colors = [explanation.actions.colors[action] for action in data["actions"]]
-    return {
-        f"tsne_{name}": thumbnail_map(data["frames"], points, colors)
-        for name, points in map_points(explanation).items()
-    }
+    return {f"tsne_{name}": thumbnail_map(data["frames"], one.points, colors) for name, one in tsne}
 
 
-def interactive_map(explanation: Explanation) -> dict[str, Any]:
+def interactive_map(tsne: Tsne, explanation: Explanation) -> dict[str, Any]:
     """Return the data of each shown frame that the interactive map uses."""
     data, actions, terms = explanation.data, explanation.actions, explanation.terms
     frames, index = data["frames"], shown_frames(len(data["actions"]))
     tiles = [Image.fromarray(frame) for frame in frames[index]]
     sprite = images.gridded(tiles, TILES_ACROSS, gap=0).quantize(128, dither=Image.Dither.NONE)
     events = {1: f"{terms.reaches} a {terms.goal}", -1: f"misses a {terms.goal}"}
-    points = map_points(explanation).items()
     return {
         "tile": [frames.shape[2], frames.shape[1]],
-        "cells": {name: cells(frames, of).tolist() for name, of in points},
+        "cells": {name: cells(frames, one.points).tolist() for name, one in tsne},
         "action": data["actions"][index].tolist(),
         "probabilities": np.round(data["probabilities"][index].astype(float), 3).tolist(),
         "episode": data["episode"][index].tolist(),
@@ -95,5 +85,5 @@ PART = Part(
     title="Frames by similarity (t-SNE)",
     label="t-SNE",
     draw=draw,
-    values=lambda explanation: {"points": interactive_map(explanation)},
+    values=lambda *of: {"points": interactive_map(*of)},
 )

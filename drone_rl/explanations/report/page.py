@@ -131,16 +131,17 @@ def render_summary(explanations: Sequence[Explanation], sections: Sequence[str] 
 def render_section(name: str, explanations: Sequence[Explanation], folder: Path) -> str:
     """Save a section's figures in a folder; return the section of the page, as HTML."""
     part = PARTS[name]
-    shown = {i: e for i, e in enumerate(explanations) if getattr(e, name, None)}
-    _save(part.compare([*shown.values()]), folder, "")
+    results = ((getattr(e, name, None), e) for e in explanations)
+    shown = {i: (of, e) for i, (of, e) in enumerate(results) if of}
+    _save(part.compare([e for _, e in shown.values()]), folder, "")
     policies = [
         {
             "name": e.name,
             "e": e,
-            "figures": _save(part.draw(e), folder, f"{i}_{to_file_name(e.name)}_"),
-            **part.values(e),
+            "figures": _save(part.draw(of, e), folder, f"{i}_{to_file_name(e.name)}_"),
+            **part.values(of, e),
         }
-        for i, e in shown.items()
+        for i, (of, e) in shown.items()
     ]
     return _environment().get_template(f"sections/{name}.html").render(policies=policies)
 

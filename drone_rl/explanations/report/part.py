@@ -25,7 +25,7 @@ Figures = Mapping[str, Media | Mapping[str, Media]]
 """Figures by name; several under one name, by caption, are laid out side by side."""
 
 
-def _nothing(_: Any) -> dict[str, Any]:
+def _nothing(*_: Any) -> dict[str, Any]:
     return {}
 
 
@@ -41,9 +41,9 @@ class Part:
     """Heading."""
     label: str
     """A short heading, for links."""
-    draw: Callable[[Explanation], Figures] = _nothing
-    """Returns the figures of one policy by file name."""
-    values: Callable[[Explanation], Mapping[str, Any]] = _nothing
+    draw: Callable[[Any, Explanation], Figures] = _nothing
+    """Returns the figures of a result and its explanation by file name."""
+    values: Callable[[Any, Explanation], Mapping[str, Any]] = _nothing
     """Returns further values for the template."""
     compare: Callable[[Sequence[Explanation]], Figures] = _nothing
     """Returns figures of all policies together; they are saved but not on the page."""

@@ -33,17 +33,16 @@ def describe(places: Mapping[str, Any], names: Sequence[str]) -> str:
     return render("drone_rl.explanations.report", "places.j2", map=places, names=names, where=WHERE)
 
 
-def draw(explanation: Explanation) -> Figures:
+def draw(places: Mapping[str, Any], explanation: Explanation) -> Figures:
     """Draw the exact map, if there is one."""
-    places = explanation.places or {}
     if "refused" in places:
         return {}
     return {"places": regions.chart(places, places["outlines"], explanation.actions)}
 
 
-def values(explanation: Explanation) -> dict[str, Any]:
+def values(places: Mapping[str, Any], explanation: Explanation) -> dict[str, Any]:
     """Return the map in words, and as a table."""
-    places, names = explanation.places or {}, explanation.actions.names
+    names = explanation.actions.names
     text = {"text": describe(places, names)}
     return text if "refused" in places else {**text, "rows": rows(places, names)}
 

@@ -8,19 +8,18 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from drone_rl.explanations.report.part import Part
-from drone_rl.explanations.results import Explanation, TargetGrid
+from drone_rl.explanations.results import Asymmetry, Explanation, Response, TargetGrid
 from drone_rl.trust.plots import images
 from drone_rl.trust.plots.saving import new_chart
 from drone_rl.utils.palette import EMPTY, GOOD, css
 
 
-def response_charts(explanation: Explanation) -> dict[str, Figure]:
+def response_charts(result: Response, explanation: Explanation) -> dict[str, Figure]:
     """Plot over the target's place: the actions' probabilities, the best action, the outcome.
 
     Each height of targets has its own charts, the highest first.
     """
-    result, actions, terms = explanation.response, explanation.actions, explanation.terms
-    assert result is not None
+    actions, terms = explanation.actions, explanation.terms
     grid, names, heights = result.map, actions.names, result.map.height
     colors = {name: actions.css(number) for number, name in enumerate(names)}
     ends = {f"{terms.target} {terms.unhandled}": css(EMPTY)}
@@ -74,24 +73,20 @@ def _edges(middles: NDArray) -> NDArray:
     return np.append(middles - half, middles[-1] + half)
 
 
-def worst_frames(explanation: Explanation) -> dict[str, Image.Image]:
+def worst_frames(result: Asymmetry, explanation: Explanation) -> dict[str, Image.Image]:
     """Return the frames on which the policy and its mirror image differ most, by caption."""
-    assert explanation.asymmetry is not None
     data, actions = explanation.data, explanation.actions
-    worst = {
-        f"frame {one.frame}: differs by {one.distance:.2f}": one.frame
-        for one in explanation.asymmetry.worst
-    }
+    worst = {f"frame {one.frame}: differs by {one.distance:.2f}": one.frame for one in result.worst}
     return {c: images.frame_with_probabilities(data, f, c, actions) for c, f in worst.items()}
 
 
 RESPONSE_PART = Part(
     title="Response to one target by its place",
     label="Response map",
-    draw=lambda explanation: {"response": response_charts(explanation)},
+    draw=lambda *of: {"response": response_charts(*of)},
 )
 ASYMMETRY_PART = Part(
     title="Left-right asymmetry",
     label="Asymmetry",
-    draw=lambda explanation: {"asymmetry": worst_frames(explanation)},
+    draw=lambda *of: {"asymmetry": worst_frames(*of)},
 )

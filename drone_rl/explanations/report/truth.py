@@ -6,10 +6,11 @@ from typing import NamedTuple
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 from PIL import Image
 
 from drone_rl.explanations.report.part import METHOD_NAMES, Part
-from drone_rl.explanations.results import Explanation, Median, MethodTest
+from drone_rl.explanations.results import Explanation, Median, MethodTest, Truth
 from drone_rl.trust.plots import images
 from drone_rl.trust.plots.saving import new_chart
 from drone_rl.utils.intervals import Mean
@@ -34,10 +35,8 @@ class _Row(NamedTuple):
     upper: float | None
 
 
-def truth_charts(explanation: Explanation) -> dict[str, Figure]:
+def truth_charts(truth: Truth) -> dict[str, Figure]:
     """Plot the scores of methods and placebos, and the tests that a method must pass."""
-    truth = explanation.truth
-    assert truth is not None
     colors = {name: css(GOOD if of.trusted else FAINT) for name, of in truth.methods.items()}
     ordered = sorted(truth.placebos.items(), key=lambda item: -(item[1].mean or 0.0))
     methods = truth.methods.items()
@@ -87,10 +86,8 @@ def _write(axis: Axes, text: str, color: str = "black") -> None:
     axis.text(0.5, 0.5, text, color=color, **place)
 
 
-def effects_chart(explanation: Explanation) -> Figure:
+def effects_chart(effects: NDArray) -> Figure:
     """Plot the mean effect of each patch."""
-    assert explanation.truth is not None
-    effects = explanation.truth.patch_effects
     figure, axis = new_chart()
     image = axis.imshow(effects, cmap="magma", vmin=0, vmax=max(float(effects.max()), 1e-6))
     axis.set(xticks=[], yticks=[])
@@ -101,10 +98,8 @@ def effects_chart(explanation: Explanation) -> Figure:
     return figure
 
 
-def changes(explanation: Explanation) -> dict[str, Image.Image]:
+def changes(truth: Truth, explanation: Explanation) -> dict[str, Image.Image]:
     """Return one frame before and after each change to its scene, by caption."""
-    truth = explanation.truth
-    assert truth is not None
     captions = ["as it was"]
     for name, effect in truth.interventions.items():
         size = "not tried"
@@ -119,9 +114,9 @@ def changes(explanation: Explanation) -> dict[str, Image.Image]:
 PART = Part(
     title="Tests of the heat maps",
     label="Tests of the heat maps",
-    draw=lambda explanation: {
-        "truth": truth_charts(explanation),
-        "effects": effects_chart(explanation),
-        "interventions": changes(explanation),
+    draw=lambda truth, explanation: {
+        "truth": truth_charts(truth),
+        "effects": effects_chart(truth.patch_effects),
+        "interventions": changes(truth, explanation),
     },
 )

@@ -17,17 +17,17 @@ def explanation():
 
 
 def test_the_map_that_passed_comes_first_and_others_are_marked(explanation):
-    drawn = attribution.draw(explanation)
+    drawn = attribution.draw(explanation.attribution, explanation)
     assert [*drawn] == ["sequence", "untrusted", "episode"]
     assert [*drawn["sequence"]] == ["1. first", "2. first", "3. first", "4. first"]
     trusted = changed_explanation({"truth.methods.grad_cam.trusted": True})
-    assert [*attribution.draw(trusted)] == ["sequence", "episode"]
+    assert [*attribution.draw(trusted.attribution, trusted)] == ["sequence", "episode"]
     none = changed_explanation({"truth.trusted": None})
-    assert [*attribution.draw(none)] == ["untrusted", "episode"]
+    assert [*attribution.draw(none.attribution, none)] == ["untrusted", "episode"]
 
 
 def test_a_film_has_every_step_in_a_size_that_can_be_encoded(explanation):
-    frames = attribution.draw(explanation)["episode"]
+    frames = attribution.draw(explanation.attribution, explanation)["episode"]
     maps, actions = explanation.attribution, explanation.actions
     step = np.asarray(attribution.explained_step(maps, actions, 3, "step 3", "saliency"))
     assert frames.shape[0] == STEPS
@@ -38,7 +38,8 @@ def test_a_film_has_every_step_in_a_size_that_can_be_encoded(explanation):
 
 def test_pairs_are_limited_and_left_and_right_take_turns(explanation):
     pair = {"kind": "unknown", "left": 1, "right": 2, "distance": 0.1, "opposition": 0.5}
-    drawn = behavior.draw_pairs(changed_explanation({"flaws.pairs": [pair] * 9}))
+    flaws = changed_explanation({"flaws.pairs": [pair] * 9}).flaws
+    drawn = behavior.draw_pairs(flaws, explanation)
     shown = [*drawn["pairs_unknown"]]
     assert len(shown) == 2 * behavior.MAX_PAIRS and len(drawn) == 1
     assert shown[:2] == ["pair 1, frame 1: more left", "pair 1, frame 2: more right"]
@@ -48,19 +49,21 @@ def test_a_robustness_evaluation_is_drawn_unless_it_is_refused():
     frames = {name: np.zeros((6, 5, 16, 3), np.uint8) for name in SHIFTS["axes"]}
     shifts = {"measured": SHIFTS, "frames": frames}
     good = {"verdict.kind": "good", "shifts": shifts}
-    drawn = behavior.draw_shifts(changed_explanation(good))
+    quoted = changed_explanation(good)
+    drawn = behavior.draw_shifts(quoted.shifts, quoted)
     assert [*drawn] == ["shifts", *(f"conditions_{name}" for name in SHIFTS["axes"])]
     refused = {"measured": {"refused": "it is of another task"}, "frames": {}}
     for change in ({"shifts": refused}, {"shifts": shifts, "verdict.kind": "poor"}):
-        assert behavior.draw_shifts(changed_explanation(change)) == {}
+        other = changed_explanation(change)
+        assert behavior.draw_shifts(other.shifts, other) == {}
 
 
 def test_class_models_have_actions_from_left_to_right_and_their_colors(explanation):
-    grid = class_models.grid([explanation])
+    grid = class_models.compare([explanation])["class_models"]
     assert grid.size == (3 * 150 + 24, 2 * 42 + 12)
     pixels = [grid.getpixel((x * 162 + 75, 30)) for x in range(3)]
     assert pixels == [(255,) * 3, (0,) * 3, (0,) * 3]
-    two = class_models.PART.compare([explanation] * 2)["class_models"]
+    two = class_models.compare([explanation] * 2)["class_models"]
     assert two.size == (grid.width, 2 * grid.height + 12)
 
 
@@ -74,7 +77,7 @@ def test_thumbnails_have_cells_of_their_own_in_all_rows_and_columns():
 
 
 def test_the_interactive_map_has_the_data_of_each_frame(explanation):
-    points = embedding.interactive_map(explanation)
+    points = embedding.interactive_map(explanation.tsne, explanation)
     assert points["tile"] == [60, 4] and points["last"] == [5, 5]
     assert points["step"] == [*range(6), *range(6)]
     assert points["event"][1:4] == ["", "collects a cube", ""]
@@ -84,7 +87,7 @@ def test_the_interactive_map_has_the_data_of_each_frame(explanation):
 
 
 def test_the_charts_of_the_response_are_of_each_height(explanation):
-    charts = response.response_charts(explanation)
+    charts = response.response_charts(explanation.response, explanation)
     assert len(charts) == 2 * 5
     assert [*charts][:2] == ["P(left), cube +1.5 m", "P(forward), cube +1.5 m"]
     left = charts["P(left), cube +1.5 m"].axes[0].collections[0]
@@ -94,7 +97,7 @@ def test_the_charts_of_the_response_are_of_each_height(explanation):
 
 
 def test_each_change_of_a_scene_has_its_effect_as_caption(explanation):
-    assert [*changes(explanation)] == [
+    assert [*changes(explanation.truth, explanation)] == [
         "as it was",
         "target taken away: 0.40 [0.30, 0.50]",
         "ground patch changed: not tried",
@@ -102,7 +105,7 @@ def test_each_change_of_a_scene_has_its_effect_as_caption(explanation):
 
 
 def draw(changes=None):
-    return [figure.axes[0] for figure in truth_charts(changed_explanation(changes)).values()]
+    return [figure.axes[0] for figure in truth_charts(changed_explanation(changes).truth).values()]
 
 
 def texts(axis):
