@@ -51,7 +51,7 @@ def bench_airsim_chapter(folder: Path, quick: bool) -> dict[str, Any]:
     successes = sum(number == env.num_cubes for number in found)
     return {
         "airsim_chapter_cubes": cubes,
-        "airsim_chapter_lower95": proportion(successes, len(found))["lower95"],
+        "airsim_chapter_lower95": proportion(successes, len(found)).lower95,
         "airsim_chapter_minutes": minutes,
     }
 

@@ -118,7 +118,7 @@ def _means(quick: bool) -> Iterator[dict[str, Any]]:
 
         def holds(values: NDArray, of: Outcome = outcome) -> bool:
             interval = mean_bounds(values, of.low, of.high)
-            return interval["lower95"] - 1e-12 <= of.mean <= interval["upper95"] + 1e-12
+            return interval.lower95 - 1e-12 <= of.mean <= interval.upper95 + 1e-12
 
         for episodes in SIZES[len(outcome.values)][: 3 if quick else None]:
             yield _row("mean", name, episodes, coverage(outcome, episodes, holds))
@@ -128,7 +128,7 @@ def _proportions(quick: bool) -> Iterator[dict[str, Any]]:
     """Return the minimum over all true rates, which is next to the bounds of the intervals."""
     for episodes in SIZES[2][: 3 if quick else None]:
         intervals = [proportion(k, episodes) for k in range(episodes + 1)]
-        low, high = (np.array([f[end] for f in intervals]) for end in ("lower95", "upper95"))
+        low, high = np.array([(one.lower95, one.upper95) for one in intervals]).T
         ends = np.concatenate([low, high])
         truths = np.concatenate([ends - 1e-9, ends + 1e-9]).clip(0.0, 1.0)[:, None]
         covered = (low <= truths) & (truths <= high)

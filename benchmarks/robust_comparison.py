@@ -146,4 +146,4 @@ def _share(evaluator: PairedEvaluator, condition: Condition, agent: Agent) -> fl
 
 def _is_possible(evaluator: PairedEvaluator, condition: Condition, possible_share: float) -> bool:
     success = evaluator.run(condition, agent=OracleAgent()).episodes.success
-    return proportion(int(success.sum()), len(success))["upper95"] >= possible_share
+    return proportion(int(success.sum()), len(success)).upper95 >= possible_share

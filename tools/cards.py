@@ -1,13 +1,10 @@
 """`python -m tools.cards`: write the model cards of the shipped policies from their files."""
 
 import hashlib
-import json
 from pathlib import Path
 
 import drone_rl
-from drone_rl.trust.export import write_card
-from drone_rl.trust.verdict_text import SENTENCES
-from drone_rl.utils.text import say
+from drone_rl.trust.export import Card
 
 ZOO = Path(drone_rl.__file__).parent / "policies" / "zoo"
 
@@ -15,22 +12,15 @@ ZOO = Path(drone_rl.__file__).parent / "policies" / "zoo"
 def card_of(path: Path) -> str:
     """Return the card of a policy file, with sentences as they are worded today.
 
-    The figures are those of the file's metadata. `NAME.shifts.json` next to it has the operating
-    domain.
+    The figures are those of the file's metadata.
     """
     state = drone_rl.load_policy(path).state
-    seed = {"seed": state["seed"], "seed_is_fixed": True}
-    verdict = {**seed, **state["verdict"]}
-    verdict["sentence"] = say(SENTENCES, verdict)
-    shifts = path.with_suffix(".shifts.json")
-    about = {
-        **state,
-        "verdict": verdict,
-        "task": state["description"]["task"],
-        "dynamics": state["description"].get("dynamics"),
-        "shifts": json.loads(shifts.read_text()) if shifts.exists() else None,
-    }
-    return write_card(path.stem, hashlib.sha256(path.read_bytes()).hexdigest(), about)
+    verdict = {"seed": state["seed"], "seed_is_fixed": True, **state["verdict"]}
+    described = state["description"]
+    origin = {name: described.get(name) for name in ("task", "appearance", "dynamics")}
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    about = {**state, **origin, "verdict": verdict, "name": path.stem, "digest": digest}
+    return Card.read(about, path.stem).text()
 
 
 if __name__ == "__main__":

@@ -1,6 +1,5 @@
 """`drone-rl evaluate`, `play`, `verdict`, `shifts`, `bodies` and `export`: their settings."""
 
-import json
 import logging
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,10 +16,10 @@ from drone_rl.config.commands import (
     ShiftSettings,
 )
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.models import Seeded
 from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.progress import log, silent
 from drone_rl.utils.schema import FileName, OneOf, Whole
-from drone_rl.utils.text import seed_line
 
 _log = logging.getLogger(__name__)
 
@@ -49,10 +48,8 @@ class EvaluateCommand(AppearanceCommandSettings, EvaluateSettings):
         """Evaluate one policy; return the exit status and the success rate."""
         policy = self.load_policy()
         result = drone_rl.evaluate(policy, self, progress=log)
-        (folder / "evaluation.json").write_text(json.dumps(result.as_dict(), indent=2))
-        print(result)
         _log.info("policy: %s", policy.path)
-        _log.info("written: %s", folder / "evaluation.json")
+        finish(result, folder / "evaluation.json")
         if self.videos:
             from drone_rl.trust.video import film
 
@@ -61,7 +58,7 @@ class EvaluateCommand(AppearanceCommandSettings, EvaluateSettings):
                 folder / "videos",
                 self.videos,
                 greedy=self.greedy,
-                seed=result.seed.value,
+                seed=result.seed or 0,
                 device=self.device,
                 renderer=self.renderer,
             )
@@ -135,11 +132,11 @@ class VerdictCommand(AppearanceCommandSettings, JudgeSettings):
         options = {name: getattr(self, name) for name in names}
         result = drone_rl.judge(self.policy, self, **options, **self.shared(), progress=silent)
         finish(result, folder / "verdict.json")
-        if self.require == "proved" and result.verdict.evidence["proof"] is None:
+        if self.require == "proved" and result.proof is None:
             _log.info(
                 "the policy has no certificate; make one with drone-rl prove, or give certificate="
             )
-        return result.status(self.require), result.verdict.kind.value
+        return result.status(self.require), result.kind.value
 
 
 class ShiftsCommand(RolloutCommandSettings, ShiftSettings):
@@ -151,7 +148,7 @@ class ShiftsCommand(RolloutCommandSettings, ShiftSettings):
         result = drone_rl.shifts(
             self.policy, settings, dynamics=self.dynamics, **self.shared(), progress=log
         )
-        ranges = "" if result.numbers["domain"] is None else "domain.yaml, "
+        ranges = "" if result.domain is None else "domain.yaml, "
         finish(result, folder, f"shifts.json, {ranges}shifts.png and strips.png")
         return 0, result.area
 
@@ -164,7 +161,7 @@ class BodiesCommand(CommandSettings, BodiesSettings):
         settings = self.as_base(BodiesSettings)
         result = drone_rl.bodies(settings=settings, outputs=self.paths.outputs, progress=silent)
         finish(result, folder, "bodies.json, bodies.png and bodies.svg")
-        return 0, sum(map(len, result.numbers["policies"].values()))
+        return 0, sum(map(len, result.policies.values()))
 
 
 class ExportCommand(CommandSettings, HeldOutSettings):
@@ -223,7 +220,7 @@ class ExportCommand(CommandSettings, HeldOutSettings):
             recorded = recorded_verdict(policy, read_verdicts(self.paths.outputs))
             kind, success = ("not judged", "") if recorded is None else describe(recorded)
             print(f"recorded verdict: {' '.join(filter(None, (kind, success)))}")
-            evidence = seed.as_dict()
+            seeded = Seeded(**seed.as_dict())
         else:
             _log.info("judges the policy in %s episodes for the model card", f"{self.episodes:,}")
             verdict = export(
@@ -238,9 +235,8 @@ class ExportCommand(CommandSettings, HeldOutSettings):
                 find_claim=find_claim,
             )
             _log.info("written: %s and %s", target, target.with_suffix(".md").name)
-            record_verdict(folder, policy, verdict.as_dict())
-            certainty = "" if verdict.certain else " (not certain)"
-            print(f"{verdict.kind.value}{certainty}: {verdict.sentence}")
-            evidence = verdict.evidence
-        _log.info("%s", seed_line(evidence))
+            record_verdict(folder, policy, verdict)
+            print(verdict.line)
+            seeded = verdict
+        _log.info("%s", seeded.seed_line())
         return 0, str(target)

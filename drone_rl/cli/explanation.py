@@ -44,9 +44,9 @@ class ExplainCommand(CommandSettings, ExplainSettings):
             progress=log,
         )
         print(result)
-        verdicts = [one.verdict or {} for one in result.policies.values()]
-        unmet = [v for v in verdicts if not (v["certain"] and v["kind"] == self.require)]
-        statuses = [verdict["exit_code"] or VerdictKind.NONE.exit_code for verdict in unmet]
+        verdicts = [one.verdict for one in result.policies.values() if one.verdict]
+        unmet = [v for v in verdicts if not (v.certain and v.kind == self.require)]
+        statuses = [verdict.exit_code or VerdictKind.NONE.exit_code for verdict in unmet]
         return max(statuses if self.require else (), default=0), str(result.report)
 
 

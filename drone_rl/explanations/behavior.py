@@ -1,24 +1,24 @@
 """Sections "verdict", "shifts" (robustness), "dataset" (rollout statistics) and "flaws"."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from drone_rl.explanations.context import Context
-from drone_rl.explanations.results import Dataset, Flaws, Loop, Pair, QuotedShifts
+from drone_rl.explanations.results import Dataset, Flaws, Loop, Pair
 from drone_rl.explanations.rollouts import RolloutDataset
 from drone_rl.sim.actions import Actions
+from drone_rl.trust.results import Verdict
 from drone_rl.trust.rule import Rule
+from drone_rl.trust.shifts_results import SavedShifts
 from drone_rl.trust.verdict import judge_policy
-from drone_rl.utils.intervals import Share, mean_interval, proportion
+from drone_rl.utils.intervals import mean_interval, proportion
 
 ALIKE_METRES = 1.0  # next targets that differ by at most this along each axis are at the same place
 MIN_OPPOSITION = 0.2  # pairs with a smaller opposition are ignored
 
 
-def verdict_section(context: Context) -> dict[str, Any]:
+def verdict_section(context: Context) -> Verdict:
     """Judge the policy on held-out episodes."""
     return judge_policy(
         context.env,
@@ -28,18 +28,12 @@ def verdict_section(context: Context) -> dict[str, Any]:
         claim=context.claim,
         unlike=context.unlike,
         seed=context.seed,
-    ).as_dict()
+    )
 
 
-def shifts_section(context: Context) -> QuotedShifts | None:
+def shifts_section(context: Context) -> SavedShifts | None:
     """Return the robustness that was measured, if any."""
-    if (measured := context.measured) is None:
-        return None
-    frames = {
-        name: np.stack([np.zeros_like(strip[0]) if one is None else one for one in strip])
-        for name, strip in measured.pictures.items()
-    }
-    return QuotedShifts(measured=dict(measured.evidence), frames=frames)
+    return context.measured
 
 
 def dataset_section(context: Context) -> Dataset:
@@ -69,7 +63,7 @@ def flaws_section(context: Context) -> Flaws:
         alike_metres=ALIKE_METRES,
         loops=tuple(loops),
         looping_steps=sum(loop.length for loop in loops) / len(flights),
-        looping_episodes=Share(**proportion(looping, len(np.unique(flights.episode)))),
+        looping_episodes=proportion(looping, len(np.unique(flights.episode))),
     )
 
 

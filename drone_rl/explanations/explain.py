@@ -25,7 +25,7 @@ from drone_rl.sim.vocabulary import shown_actions
 from drone_rl.trust.coverage import find_domain
 from drone_rl.trust.recorded import record_verdict
 from drone_rl.trust.rounding_sensitivity import require_function
-from drone_rl.trust.shifts_file import SavedShifts
+from drone_rl.trust.shifts_results import SavedShifts
 from drone_rl.trust.verdict import CertificateClaim, FindClaim
 from drone_rl.utils.display import Result, page
 from drone_rl.utils.errors import InputError
@@ -75,9 +75,9 @@ class Explanations(Result):
     def __str__(self) -> str:
         lines = []
         for name, explanation in self.policies.items():
-            verdict = explanation.verdict or {}
-            certainty = "" if verdict["certain"] else " (not certain)"
-            lines.append(f"{name}: {verdict['kind']}{certainty}. {verdict['sentence']}")
+            if verdict := explanation.verdict:
+                certainty = "" if verdict.certain else " (not certain)"
+                lines.append(f"{name}: {verdict.kind}{certainty}. {verdict.sentence}")
         return "\n".join([*lines, f"report: {self.report}", seed_line(self.seed.as_dict())])
 
     def _repr_html_(self) -> str:

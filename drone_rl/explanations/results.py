@@ -5,15 +5,17 @@ name, such as "truth.patch_effects". This module imports no torch, so that a rep
 without.
 """
 
-import json
 from collections.abc import Container
 from pathlib import Path
 from typing import Any, Literal, Self
 
 import numpy as np
 from pydantic import ConfigDict, Field
+from pydantic_core import to_json
 
 from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary
+from drone_rl.trust.results import Verdict
+from drone_rl.trust.shifts_results import Robustness, SavedShifts, not_evaluated
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
@@ -23,16 +25,6 @@ from drone_rl.utils.models import Model
 
 Array = np.ndarray
 """An array of a result; the fields say its shape."""
-
-
-class QuotedShifts(Model):
-    """The robustness that `drone-rl shifts` measured."""
-
-    measured: dict[str, Any]
-    """Content of `shifts.json`, or only why it is "refused"."""
-    frames: dict[str, Array]
-    """Frames without a perturbation and at its five strengths, by axis; black where the task can't
-    be changed so. Shape: (6, H, W, 3)."""
 
 
 class Dataset(Model):
@@ -383,8 +375,8 @@ class Explanation(Model):
     provenance: dict[str, Any]
     left_out: dict[str, str] = Field({})
     """Why sections could not be computed."""
-    verdict: dict[str, Any] | None = None
-    shifts: QuotedShifts | None = None
+    verdict: Verdict | None = None
+    shifts: SavedShifts | None = None
     dataset: Dataset | None = None
     tsne: Tsne | None = None
     flaws: Flaws | None = None
@@ -403,6 +395,17 @@ class Explanation(Model):
     def trusted_method(self) -> str | None:
         """Return the heat maps that passed the tests best, if any did."""
         return self.truth.trusted if self.truth else None
+
+    @property
+    def robustness(self) -> Robustness | None:
+        """Return the measured robustness, None if it is refused or contradicts the verdict."""
+        saved, verdict = self.shifts, self.verdict
+        return saved.shifts if saved and verdict and not saved.why_not(verdict) else None
+
+    @property
+    def untested(self) -> list[str]:
+        """Return which of colors, light and sizes were not evaluated."""
+        return not_evaluated(self.robustness)
 
     def others(self, known: Container[str]) -> dict[str, Any]:
         """Return the results of sections that have no field and are not known."""
@@ -432,7 +435,7 @@ class Explanation(Model):
         numbers, arrays = self.model_dump(serialize_as_any=True), dict[str, Any]()
         _remove(numbers, "", arrays)
         np.savez_compressed(folder / "arrays.npz", **arrays)
-        (folder / "explanation.json").write_text(json.dumps(numbers, indent=1))
+        (folder / "explanation.json").write_bytes(to_json(numbers, indent=1))
 
 
 def _remove(tree: dict[str, Any], start: str, arrays: dict[str, Any]) -> None:

@@ -1,7 +1,6 @@
 """Evaluate a policy with software in the loop: Betaflight between actions and rotors."""
 
 import contextlib
-import dataclasses
 import tempfile
 import time
 from pathlib import Path
@@ -21,19 +20,20 @@ from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.trust.metrics import summarise
+from drone_rl.trust.results import Figures
 from drone_rl.utils.display import Result
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.models import Seeded, Stored
 from drone_rl.utils.progress import Progress, as_progress, silent
 from drone_rl.utils.schema import Whole
 from drone_rl.utils.seeding import RootSeed, root_seed
-from drone_rl.utils.text import LOOPED, interval, say, seed_line
+from drone_rl.utils.text import interval
 
 STARTS = 3
 """Attempts to start a firmware for one episode."""
 
 
-@dataclasses.dataclass(frozen=True)
-class SitlEpisode:
+class SitlEpisode(Stored):
     """One episode with software in the loop."""
 
     world: int
@@ -55,21 +55,15 @@ class SitlEpisode:
     """Positions before the first action and after each, metres, world frame."""
 
 
-@dataclasses.dataclass(frozen=True)
-class SitlEvaluation(Result):
-    """Episodes of a policy with software in the loop."""
+class SitlEvaluation(Result, Figures, Seeded):
+    """Episodes of a policy with software in the loop, and their figures."""
 
     policy: str
-    seed: RootSeed
-    """Root of the environments' random streams."""
     flights: tuple[SitlEpisode, ...]
-    figures: dict[str, Any]
-    """See `drone_rl.trust.metrics.summarise`."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values: the figures and each episode."""
-        flights = [dataclasses.asdict(f) for f in self.flights]
-        return {**self.figures, **self.seed.as_dict(), "flights": flights}
+        return self.model_dump(mode="json")
 
     def __str__(self) -> str:
         """Return a line per episode and a summary."""
@@ -78,11 +72,9 @@ class SitlEvaluation(Result):
             f"{f.steps} steps, {f.simulated_s:.1f} s"
             for f in self.flights
         ]
-        success = self.figures["success"]
-        share = f"{success['successes']} of {success['trials']} succeeded"
-        seed = self.seed.as_dict()
-        notes = [f"{share} (95% CI {interval(success)}%)", say(LOOPED, seed), seed_line(seed)]
-        return "\n".join([*lines, *filter(None, notes)])
+        success = self.success
+        share = f"{success.successes} of {success.trials} succeeded (95% CI {interval(success)})"
+        return "\n".join([*lines, *filter(None, [share, self.seed_warning(), self.seed_line()])])
 
 
 def evaluate_in_the_loop(
@@ -128,15 +120,16 @@ def evaluate_in_the_loop(
             )
     progress("flown", flights, flights)
     ended, episodes = zip(*results, strict=True)
-    return SitlEvaluation(loaded.name, root, episodes, summarise(CompleteEpisodes.joined(ended)))
+    figures = summarise(CompleteEpisodes.joined(ended))
+    return SitlEvaluation(**dict(figures), **root.as_dict(), policy=loaded.name, flights=episodes)
 
 
-def figures_in_the_loop(policy: BasePolicy, flights: int, seed: RootSeed) -> dict[str, Any]:
-    """Return `SitlEvaluation.as_dict`, or the reason why there are no episodes as "left_out"."""
+def figures_in_the_loop(policy: BasePolicy, flights: int, seed: RootSeed) -> SitlEvaluation:
+    """Return the evaluation; if there are no episodes, an `InputError` has the reason."""
     try:
-        return evaluate_in_the_loop(policy, flights, drawn_seed=seed, progress=silent).as_dict()
-    except (InputError, FlightControllerError) as error:
-        return {"left_out": str(error)}
+        return evaluate_in_the_loop(policy, flights, drawn_seed=seed, progress=silent)
+    except FlightControllerError as error:
+        raise InputError(str(error)) from error
 
 
 def _fly_or_restart(

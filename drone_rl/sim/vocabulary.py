@@ -4,46 +4,49 @@ import dataclasses
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field, StrictBool
 
 from drone_rl.utils import palette
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Flag, Kind, Real, Record, Several, Text, Whole, as_mapping, shown
+from drone_rl.utils.models import Model
+from drone_rl.utils.schema import Real, Record, Several, Text, Whole, shown
 
-LONGEST = 200
-"""Most characters of a phrase."""
 MOST = 64
 """Most phrases of a kind."""
+Phrase = Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
+"""One line."""
+Phrases = Annotated[dict[Phrase, Phrase], Field(max_length=MOST)]
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class TaskVocabulary:
+class TaskVocabulary(Model):
     """Terms of a task, as files hold them under "terms"."""
 
-    goal: str = "goal"
+    goal: Phrase = "goal"
     """Something to reach: "cube"."""
-    reach: str = "reach"
+    reach: Phrase = "reach"
     """To do so: "collect"."""
-    reached: str = "reached"
-    target: str = "target"
+    reached: Phrase = "reached"
+    target: Phrase = "target"
     """The thing in the image that requires an action: "cube"."""
-    handle: str = "reach the target"
+    handle: Phrase = "reach the target"
     """To act on a target: "collect the cube"."""
-    handled: str = "reached"
-    unhandled: str = "missed"
-    tested: str = ""
+    handled: Phrase = "reached"
+    unhandled: Phrase = "missed"
+    tested: Phrase = ""
     """The scenes of the test, for the model card: "three cubes of 2.5 m"."""
-    follows: bool = True
+    follows: StrictBool = True
     """Whether the drone flies to a target and follows it; else it flies around it."""
-    sides: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    sides: Phrases = {}
     """Phrases after goals, by stratum: "on its left"."""
-    places: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    places: Phrases = {}
     """Phrases after places of a single target, by stratum: "on its left"."""
-    classes: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    classes: Phrases = {}
     """Phrases of failures, by the variable that classifies goals: "at the {value} cube"."""
-    labels: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    labels: Phrases = {}
     """Names of these variables in tables: "number of the cube"."""
-    ends: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    ends: Phrases = {}
     """Phrases of the ends of episodes, by name: "at the step limit"."""
 
     @property
@@ -97,7 +100,7 @@ class TaskVocabulary:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the values that files hold."""
-        return {k: dict(v) if isinstance(v, Mapping) else v for k, v in vars(self).items()}
+        return self.model_dump()
 
 
 def _third(verb: str) -> str:
@@ -116,27 +119,7 @@ def terms_of(evidence: Mapping[str, Any]) -> TaskVocabulary:
     """Return the terms of `verdict.json`, `explanation.json` or a card; raises `InputError`."""
     if "terms" not in evidence:
         return CUBES
-    return TaskVocabulary(**_FIELDS.read(evidence["terms"], "terms"))
-
-
-class _Phrases:
-    """Schema of phrases by name; see `drone_rl.utils.schema.Kind`."""
-
-    def read(self, value: Any, where: str) -> dict[str, str]:
-        values = as_mapping(value, where)
-        if len(values) > MOST:
-            raise InputError(f"{where} holds {len(values)} phrases; give at most {MOST}")
-        phrase = Text(LONGEST)
-        return {phrase.read(k, where): phrase.read(v, f"{where}.{k}") for k, v in values.items()}
-
-
-def _kind(field: dataclasses.Field) -> Kind:
-    if field.type in (bool, "bool"):
-        return Flag()
-    return Text(LONGEST) if field.type in (str, "str") else _Phrases()
-
-
-_FIELDS = Record({field.name: _kind(field) for field in dataclasses.fields(TaskVocabulary)})
+    return TaskVocabulary.read(evidence["terms"], "terms")
 
 
 def some_cubes(task: Mapping[str, Any]) -> str:

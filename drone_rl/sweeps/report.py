@@ -129,7 +129,8 @@ def judge_run(
         result = read_result(folder)
         if result is None:
             raise InputError(f"{folder} has no result.json; give the sweep's command to finish it")
-        verdict, progress = judge_for_selection(last_of(folder), episodes, device, seed=seed)
+        judged, progress = judge_for_selection(last_of(folder), episodes, device, seed=seed)
+        verdict = judged.as_dict()
         if progress["frames"] != result.get("frames"):
             raise InputError(
                 f"{folder}/checkpoints/last.pt is of frame {progress['frames']}, result.json of "

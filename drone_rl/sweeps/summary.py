@@ -180,8 +180,8 @@ def share_of_runs(successes: int, unknown: int, trials: int) -> dict[str, Any]:
     The unknown runs may all be successes, or none. The result is that of `proportion`, with
     "unknown".
     """
-    upper = proportion(successes + unknown, trials)["upper95"]
-    return {**proportion(successes, trials), "upper95": upper, "unknown": unknown}
+    upper = proportion(successes + unknown, trials).upper95
+    return {**dict(proportion(successes, trials)), "upper95": upper, "unknown": unknown}
 
 
 def median_of_runs(values: Sequence[float], used: Sequence[float] | None = None) -> dict[str, Any]:

@@ -41,6 +41,7 @@ from drone_rl.utils.files import (
     new_run_folder,
     write_atomically,
 )
+from drone_rl.utils.models import Model
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import shown
@@ -217,9 +218,9 @@ class Judge:
 
     check: Callable[[Task[Any], Actions], None]
     """Raises an `InputError` if it can't judge policies in a task, with such actions."""
-    verdict: Callable[[Path, int, str, str], tuple[dict[str, Any], dict[str, Any]]]
-    """Takes a checkpoint, number of episodes, device and renderer; returns the verdict, as in
-    verdict.json, and the checkpoint's progress."""
+    verdict: Callable[[Path, int, str, str], tuple[Model, dict[str, Any]]]
+    """Takes a checkpoint, number of episodes, device and renderer; returns the verdict and the
+    checkpoint's progress."""
 
 
 def check_judge(settings: TrainSettings, judge: Judge | None) -> None:
@@ -282,7 +283,8 @@ def finish(
     """Judge the last policy if settings request it and no signal came; write `result.json`."""
     if settings.evaluate_after and judge and not result["reason"].startswith("SIG"):
         last, episodes = last_of(folder), settings.evaluate_after
-        result["verdict"], _ = judge.verdict(last, episodes, settings.device, settings.renderer)
+        verdict, _ = judge.verdict(last, episodes, settings.device, settings.renderer)
+        result["verdict"] = verdict.model_dump(mode="json")
     write_atomically(folder / "result.json", json.dumps(result, indent=2, allow_nan=False))
     return Training(folder, result["reason"], result)
 

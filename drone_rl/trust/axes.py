@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 from drone_rl.envs.fault_models import dead_rows, late_frames, noise, out_of_focus
 from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.trust.axes_table import TABLE
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy
 from drone_rl.trust.perturbations import (
     Condition,
@@ -26,7 +27,6 @@ from drone_rl.trust.perturbations import (
     tint,
     whiten,
 )
-from drone_rl.trust.shifts_text import TABLE
 from drone_rl.utils.errors import InputError, did_you_mean
 
 TOGETHER = 3

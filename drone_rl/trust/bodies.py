@@ -1,13 +1,12 @@
 """`drone-rl bodies`: judge policies under several vehicle dynamics, also in the loop."""
 
-import dataclasses
 import itertools
-import json
 import textwrap
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Unpack
 
+import pydantic
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
@@ -17,20 +16,19 @@ from drone_rl.config.configuration import from_arguments
 from drone_rl.config.options import BodiesOptions
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
-from drone_rl.sim.vocabulary import terms_of
 from drone_rl.trust.judge import Judgement, judge_one
+from drone_rl.trust.results import Figures, Verdict
 from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.models import Seeded, Stored
 from drone_rl.utils.palette import BAD, EMPTY, FAINT, GOOD, INK, ONE_SIDED, css, light
 from drone_rl.utils.progress import Progress, as_progress, silent
-from drone_rl.utils.provenance import provenance
+from drone_rl.utils.provenance import Provenance, provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.text import BODIES, Evidence, interval, percent, rate, say, seed_line
+from drone_rl.utils.text import interval, percent, rate
 
 LOOPED = "software in the loop"
-"""Name of the column of these episodes, and their key in the evidence."""
-InTheLoop = Callable[[BasePolicy, int, RootSeed], dict[str, Any]]
-"""Runs so many episodes with software in the loop; returns figures, or why they are "left_out"."""
+"""Name of the column of these episodes, and their key in the file."""
 GUSTS = 0.25
 """Standard deviation of the wind along each axis, as a fraction of its mean."""
 _COLORS = {
@@ -45,34 +43,50 @@ _WIDTH, _HEIGHT = 1.35, 1.1
 """Inches of a cell."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Bodies(TableResult):
+class LeftOut(Stored):
+    """The reason why there are no episodes with software in the loop."""
+
+    left_out: str
+
+
+class Bodies(TableResult, Seeded, Provenance):
     """Verdicts by policy and dynamics."""
 
-    settings: BodiesSettings
-    numbers: dict[str, Any]
-    """As in `bodies.json`: by policy and dynamics the verdict's evidence, and by policy the
-    episodes with software in the loop, if any."""
+    model_config = pydantic.ConfigDict(validate_by_name=True, serialize_by_alias=True)
+
+    bodies: tuple[str, ...]
+    """Names of the dynamics."""
+    policies: dict[str, dict[str, Verdict]]
+    """By policy and dynamics."""
+    in_the_loop: dict[str, Figures | LeftOut] = pydantic.Field({}, alias=LOOPED)
+    """Of episodes with software in the loop, by policy."""
 
     def save(self, folder: Path) -> None:
         """Write `bodies.json`, `bodies.png` and `bodies.svg`."""
-        (folder / "bodies.json").write_text(json.dumps({**self.numbers, **provenance()}, indent=2))
+        self.replace(**provenance()).write_json(folder / "bodies.json")
         figure = self.figure()
         for kind in ("png", "svg"):
             figure.savefig(folder / f"bodies.{kind}", dpi=130)
 
     def rows(self) -> list[list[str]]:
         """Return the verdicts as a table: a header, then a row for each policy."""
-        return rows(self.numbers)
+        column = [LOOPED] if self.in_the_loop else []
+        table = [["", *self.bodies, *column]]
+        for name, by_body in self.policies.items():
+            cells = [" ".join(_cell(by_body[body])) for body in self.bodies]
+            flights = [_looped(self.in_the_loop[name])] if self.in_the_loop else []
+            table.append([name, *cells, *flights])
+        return table
 
     def figure(self) -> Figure:
         """Return the table with colors."""
-        return chart(self.numbers)
+        return chart(self)
 
     def notes(self) -> list[str]:
         """Return the reasons for missing episodes, and the seed."""
-        notes = [*left_out(self.numbers), say(BODIES, self.numbers), seed_line(self.numbers)]
-        return [*filter(None, notes)]
+        looped = self.in_the_loop.items()
+        missing = [f"{n}, {LOOPED}: {of.left_out}" for n, of in looped if isinstance(of, LeftOut)]
+        return [*filter(None, [*missing, self.seed_warning()]), self.seed_line()]
 
 
 def bodies(
@@ -82,7 +96,7 @@ def bodies(
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
     judge: Callable[..., Judgement] = judge_one,
-    in_the_loop: InTheLoop | None = None,
+    in_the_loop: Callable[[BasePolicy, int, RootSeed], Figures] | None = None,
     **changes: Unpack[BodiesOptions],
 ) -> Bodies:
     """Judge policies in computer-vision mode, in flight, in wind, and with worse drones.
@@ -95,7 +109,8 @@ def bodies(
         progress: Called with what is running; a progress bar by default.
         judge: Judges one policy, by default without certificates; `drone_rl.bodies` passes
             `drone_rl.judge`.
-        in_the_loop: Runs episodes for `loop_flights`; `drone_rl.bodies` passes
+        in_the_loop: Runs so many episodes with software in the loop, for `loop_flights`, or raises
+            an `InputError`; `drone_rl.bodies` passes
             `drone_rl.flight.sitl_evaluation.figures_in_the_loop`.
         changes: Settings to change, as in `bodies("good", episodes=100)`.
 
@@ -110,7 +125,7 @@ def bodies(
     shared = settings.as_base(JudgeSettings)
     for policy, body in itertools.product(loaded, settings.bodies):  # before any episode
         policy.in_dynamics(**changes_of(body, policy.dynamics))
-    by_policy: dict[str, dict[str, Any]] = {}
+    by_policy: dict[str, dict[str, Verdict]] = {}
     steps = len(loaded) * (len(settings.bodies) + bool(settings.loop_flights))
     for policy in loaded:
         verdicts = by_policy.setdefault(policy.name, {})
@@ -118,21 +133,19 @@ def bodies(
             count = sum(map(len, by_policy.values()))
             progress(f"{policy.name}: {body}", count, steps)
             how = {"dynamics": changes_of(body, policy.dynamics), "outputs": outputs}
-            done = judge(policy, shared, **how, progress=silent, drawn_seed=seed)
-            verdicts[body] = done.verdict.as_dict()
-    numbers: dict[str, Any] = {
-        "bodies": [*settings.bodies],
-        **seed.as_dict(),
-        "policies": by_policy,
-    }
+            verdicts[body] = judge(policy, shared, **how, progress=silent, drawn_seed=seed)
+    looped: dict[str, Figures | LeftOut] = {}
     if in_the_loop is not None and settings.loop_flights:
-        looped = numbers[LOOPED] = {}
         for policy in loaded:
             progress(f"{policy.name}: {LOOPED}", steps - len(loaded) + len(looped), steps)
             still = policy.in_dynamics(**changes_of("simple flight", policy.dynamics))
-            looped[policy.name] = in_the_loop(still, settings.loop_flights, seed)
+            try:
+                looped[policy.name] = in_the_loop(still, settings.loop_flights, seed)
+            except InputError as error:
+                looped[policy.name] = LeftOut(left_out=str(error))
     progress("flown", steps, steps)
-    return Bodies(settings, numbers)
+    names = tuple(settings.bodies)
+    return Bodies(bodies=names, **seed.as_dict(), policies=by_policy, in_the_loop=looped)
 
 
 def _load(policies: Any, outputs: str | Path) -> list[BasePolicy]:
@@ -163,53 +176,24 @@ def changes_of(body: str, dynamics: DynamicsSettings) -> Mapping[str, Any]:
     return {**flying, "camera_mount": "body"} if body == "camera on the body" else flying
 
 
-def rows(numbers: Evidence) -> list[list[str]]:
-    """Return a table of texts: names of dynamics, then a row for each policy."""
-    bodies, verdicts = [str(body) for body in numbers["bodies"]], numbers["policies"]
-    table = [["", *bodies]]
-    table += [
-        [name, *(cell(by_body[body]) for body in bodies)] for name, by_body in verdicts.items()
-    ]
-    if LOOPED not in numbers:
-        return table
-    column = [LOOPED, *(sitl_cell(numbers[LOOPED][name]) for name in verdicts)]
-    return [[*row, text] for row, text in zip(table, column, strict=True)]
+def _cell(verdict: Verdict) -> tuple[str, str]:
+    """Return the kind and the success rate."""
+    success = rate(verdict.greedy.success, label="")
+    return f"{verdict.kind.value}{'' if verdict.certain else '?'}", success
 
 
-def cell(verdict: Evidence) -> str:
-    """Return a verdict in a few words: its kind and the success rate."""
-    success = verdict["greedy"]["success"]
-    unsure = "" if verdict["certain"] else "?"
-    return f"{verdict['kind']}{unsure} {rate(success, label='')}"
-
-
-def sitl_cell(flights: Evidence) -> str:
+def _looped(flights: Figures | LeftOut) -> str:
     """Return the successes with software in the loop, which are too few for a verdict."""
-    if "left_out" in flights:
+    if isinstance(flights, LeftOut):
         return "left out"
-    success = flights["success"]
-    return f"no verdict: {success['successes']} of {success['trials']} ({interval(success)}%)"
+    success = flights.success
+    return f"no verdict: {success.successes} of {success.trials} ({interval(success)})"
 
 
-def left_out(numbers: Evidence) -> list[str]:
-    """Return the reasons why there are no episodes with software in the loop, a line each."""
-    looped = numbers.get(LOOPED, {}).items()
-    return [f"{name}, {LOOPED}: {f['left_out']}" for name, f in looped if "left_out" in f]
-
-
-def failure(verdict: Evidence) -> str:
-    """Return where most episodes fail, or nothing."""
-    row: dict[str, Any] | None = verdict["failures"]["largest"]
-    return "" if row is None else terms_of(verdict).failing(row["by"], row["value"])
-
-
-def chart(numbers: Mapping[str, Any]) -> Figure:
-    """Draw a colored table: verdict, success rate with 95% interval, and largest failure.
-
-    `numbers` are those of `bodies.json`.
-    """
-    policies, looped = numbers["policies"], numbers.get(LOOPED, {})
-    bodies = [*numbers["bodies"], *([LOOPED] if looped else [])]
+def chart(result: Bodies) -> Figure:
+    """Draw a colored table: verdict, success rate with 95% interval, and largest failure."""
+    policies, looped = result.policies, result.in_the_loop
+    bodies = [*result.bodies, *([LOOPED] if looped else [])]
     size = (_WIDTH * (len(bodies) + 1), _HEIGHT * len(policies) + 0.9)
     figure = Figure(figsize=size, layout="constrained")
     axes = figure.subplots()
@@ -224,9 +208,9 @@ def chart(numbers: Mapping[str, Any]) -> Figure:
         axes.text(x + 0.5, -0.25, text, ha="center", va="center", fontsize=10, color=_INK)
     for y, (name, verdicts) in enumerate(policies.items()):
         axes.text(-0.05, y + 0.5, name, ha="right", va="center", fontsize=11, color=_INK)
-        cells = [_verdict_cell(verdicts[body]) for body in numbers["bodies"]]
+        cells = [_verdict_cell(verdicts[body]) for body in result.bodies]
         if looped:
-            text = textwrap.fill(sitl_cell(looped[name]), 17)
+            text = textwrap.fill(_looped(looped[name]), 17)
             cells.append((_COLORS["none"], "..", [(0.5, text, 8.5, _INK)]))
         for x, (color, hatch, lines) in enumerate(cells):
             axes.add_patch(Rectangle((x, y), 1, 1, fc=color, ec="white", lw=2, hatch=hatch))
@@ -237,14 +221,15 @@ def chart(numbers: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def _verdict_cell(verdict: Evidence) -> tuple[str, str | None, list[tuple[float, str, float, str]]]:
+def _verdict_cell(verdict: Verdict) -> tuple[str, str | None, list[tuple[float, str, float, str]]]:
     """Color, hatch, and lines of a cell: height, text, points and color of each."""
-    kind, success = verdict["kind"], verdict["greedy"]["success"]
+    kind, success, row = verdict.kind.value, verdict.greedy.success, verdict.failures.largest
+    failure = "" if row is None else verdict.terms.failing(row.by, row.value)
     color = _COLORS.get(kind) or _COLORS.get(kind.split()[0], _COLORS["none"])
     lines = [
-        (0.17, f"{kind}{'' if verdict['certain'] else ' ?'}", 9.0, _INK),
-        (0.38, percent(success["share"]), 11.0, _INK),
+        (0.17, f"{kind}{'' if verdict.certain else ' ?'}", 9.0, _INK),
+        (0.38, percent(success.share or 0.0), 11.0, _INK),
         (0.57, interval(success), 8.5, _INK),
-        (0.81, textwrap.fill(failure(verdict), 21), 7.0, _FAINT),
+        (0.81, textwrap.fill(failure, 21), 7.0, _FAINT),
     ]
-    return color, None if verdict["certain"] else "//", lines
+    return color, None if verdict.certain else "//", lines

@@ -1,6 +1,6 @@
 """Find a policy's operating domain, compare it with a required one, and re-run a sample of it."""
 
-import dataclasses
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import closing, suppress
 from pathlib import Path
@@ -13,93 +13,36 @@ from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.zoo import shifts_path
 from drone_rl.trust.agents import OracleAgent
 from drone_rl.trust.axes import AXES, Axis, find_axes
+from drone_rl.trust.axes_table import NAMES
 from drone_rl.trust.domain import Prober
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
 from drone_rl.trust.perturbations import Condition
-from drone_rl.trust.shifts_file import SavedShifts, read_shifts
-from drone_rl.trust.shifts_text import contradicted, lacking, needed_range
-from drone_rl.utils.display import Result
+from drone_rl.trust.shifts_file import read_shifts
+from drone_rl.trust.shifts_results import (
+    AlongAxis,
+    Coverage,
+    DomainRecheck,
+    Need,
+    Probe,
+    Robustness,
+    SavedShifts,
+)
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path, parse_json, read_bytes
 from drone_rl.utils.limits import YAML_BYTES
 from drone_rl.utils.readers import parse_yaml
-from drone_rl.utils.schema import Maybe, OneOf, Real, Record, as_mapping
+from drone_rl.utils.schema import OneOf, as_mapping
 from drone_rl.utils.seeding import RootSeed
+from drone_rl.utils.text import percent
 
 NUM_RANDOM_STRENGTHS = 2
 """Number of random strengths within each range, in addition to its ends."""
 MAX_FILES = 100
 """Largest number of files of `drone-rl shifts` to read."""
-Need = Mapping[str, float | None]
-"""Required range of an axis: "low" and "high"; None stands for the value without perturbation."""
-_LIMIT = Maybe(Real(-1e9, 1e9))
+NEARLY = 1e-9
+"""Relative rounding of a limit."""
 _SIGNED = frozenset({"sun"})
 """Axes with values below 0."""
-
-
-@dataclasses.dataclass(frozen=True)
-class DomainRecheck(Result):
-    """New episodes under required conditions, compared with a file."""
-
-    episodes: int
-    """At each strength."""
-    seed: int
-    """Of the episodes and of the random strengths."""
-    seed_is_fixed: bool
-    """Whether it was chosen, so that a policy could have been fitted to it."""
-    strengths: Mapping[str, tuple[float, ...]]
-    """Values that were run, by axis."""
-    contradictions: tuple[str, ...]
-    """What contradicts the file, one line each."""
-
-    @property
-    def count(self) -> int:
-        """Number of strengths of all axes."""
-        return sum(map(len, self.strengths.values()))
-
-    def __str__(self) -> str:
-        """Return the numbers of episodes and strengths, and the seed."""
-        fitted = ", to which a policy could have been fitted" if self.seed_is_fixed else ""
-        kind = "fixed" if self.seed_is_fixed else "fresh"
-        return (
-            f"re-checked by {self.episodes:,} episodes at each of {self.count} strengths, ends of "
-            f"the ranges and random ones ({kind} seed {self.seed}{fitted})"
-        )
-
-
-@dataclasses.dataclass(frozen=True)
-class Coverage(Result):
-    """A required operating domain compared with a measured one."""
-
-    needs: Mapping[str, Need]
-    """By axis."""
-    lacking: Mapping[str, str]
-    """By axis that is not covered, what the operating domain lacks."""
-    against: str | None = None
-    """The reason why the operating domain is refused, if it is."""
-    reflown: DomainRecheck | None = None
-    """New episodes at a sample of the requirements, if any were run."""
-
-    @property
-    def is_stated(self) -> bool:
-        """Whether the file states that the policy is good under all requirements."""
-        return not self.lacking and self.against is None
-
-    @property
-    def is_covered(self) -> bool:
-        """Whether it states so, and new episodes do not contradict it."""
-        return self.is_stated and self.reflown is not None and not self.reflown.contradictions
-
-    def __str__(self) -> str:
-        """Return a line for each axis that is not covered, or one for all."""
-        if self.is_covered:
-            return f"covered: {', '.join(self.needs)}, each alone, {self.reflown}"
-        lines = [*self.lacking.values(), *filter(None, [self.against])]
-        if self.reflown is not None:
-            lines += self.reflown.contradictions
-        elif not lines:
-            lines.append("the file states it, and no episodes re-checked it (domain_flights=0)")
-        return "\n".join(f"not covered: {line}" for line in lines)
 
 
 def find_domain(
@@ -131,14 +74,14 @@ def find_domain(
         try:
             return read_shifts(adjacent, *of)
         except InputError as error:
-            return SavedShifts(adjacent, None, refused=str(error))
+            return SavedShifts(path=str(adjacent), refused=str(error))
     folder = as_path(outputs, "outputs") / "shifts"
     there = [*folder.glob("runs/*/shifts.json"), *folder.glob("multiruns/*/*/shifts.json")]
     newest = None
     for path in sorted(there, key=lambda p: p.stat().st_mtime, reverse=True)[:MAX_FILES]:
         with suppress(InputError):  # of another policy
             measured = read_shifts(path, *of)
-            if measured.has_ranges:
+            if measured.ranges:
                 return measured
             newest = newest or measured
     return newest
@@ -166,16 +109,17 @@ def read_requirements(path: Path) -> dict[str, Need]:
 
 def _read_need(name: str, value: Any) -> Need:
     axis = AXES[OneOf(tuple(AXES)).read(name, "axis")]
-    kinds = {"low": _LIMIT, "high": _LIMIT, "unit": OneOf((axis.unit,))}
     try:
-        need = Record(kinds, optional=frozenset(("low", "high"))).read(value, name)
-        limits = [need[end] for end in ("low", "high") if need.get(end) is not None]
+        need = Need.read(value, name)
+        limits = [limit for limit in (need.low, need.high) if limit is not None]
+        if need.unit != axis.unit:
+            raise InputError(f"{name}.unit={need.unit} must be {axis.unit}")
         if not limits or limits != sorted(limits) or (limits[0] < 0 and name not in _SIGNED):
             wanted = "numbers" if name in _SIGNED else "numbers of 0 or more"
             raise InputError(f"{name}: {limits} must be one or two rising {wanted}")
     except InputError as error:
         raise InputError(f"{error}; give low, high or both, and unit: {axis.unit}") from None
-    return {"low": need.get("low"), "high": need.get("high")}
+    return need
 
 
 def compare_with_required(
@@ -198,29 +142,30 @@ def compare_with_required(
     remedy = f"run drone-rl shifts policy={policy.path} first, in the same task"
     if measured is None:
         raise InputError(f"require_domain={needed}, but the policy has no shifts.json; {remedy}")
-    if measured.numbers is None:
+    if measured.shifts is None:
         raise InputError(f"require_domain={needed}, but {measured.refused}; {remedy}")
-    if not measured.has_ranges:
+    if not measured.ranges:
         raise InputError(
             f"require_domain={needed}, but {measured.path} has no ranges (domain=false); {remedy}"
         )
     try:
-        lacks = {name: lacking(measured.numbers, name, need) for name, need in needs.items()}
+        lacks = {name: lacking(measured.shifts, name, need) for name, need in needs.items()}
     except InputError as error:
         raise InputError(f"require_domain={needed}: {error}") from None
-    return Coverage(needs, {name: line for name, line in lacks.items() if line is not None})
+    found = {name: line for name, line in lacks.items() if line is not None}
+    return Coverage(needs=needs, lacking=found)
 
 
 def recheck_domain(
     policy: BasePolicy,
     needs: Mapping[str, Need],
-    numbers: Mapping[str, Any],
+    measured: Robustness,
     settings: JudgeSettings,
     seed: RootSeed,
 ) -> DomainRecheck:
     """Run new episodes at the ends of the required ranges and at random strengths within them.
 
-    `needs` are from `read_requirements`, `numbers` as in `shifts.json`; the settings have
+    `needs` are from `read_requirements`; the settings have
     `domain_flights` and `good_share`. `seed` is the root of all random streams.
     """
     from drone_rl.trust.shifts import make_evaluated_policy  # slow to import: it draws charts
@@ -228,7 +173,7 @@ def recheck_domain(
     how = ShiftSettings(device=settings.device, renderer=settings.renderer)
     subject, rng = make_evaluated_policy(policy, how), np.random.default_rng(seed.value)
     tried = {
-        axis: [*_strengths(axis, subject, needs[axis.name], numbers, rng)]
+        axis: [*_strengths(axis, subject, needs[axis.name], measured, rng)]
         for axis in find_axes(needs, subject)
     }
     count = sum(map(len, tried.values())) + 1
@@ -243,8 +188,7 @@ def recheck_domain(
                 contradictions.append(contradicted(axis.name, value, axis.unit, probed))
     return DomainRecheck(
         episodes=settings.domain_flights,
-        seed=seed.value,
-        seed_is_fixed=seed.is_fixed,
+        **seed.as_dict(),
         strengths={
             axis.name: tuple(axis.value(strength, subject) for strength in strengths)
             for axis, strengths in tried.items()
@@ -257,11 +201,11 @@ def _strengths(
     axis: Axis,
     subject: EvaluatedPolicy,
     need: Need,
-    numbers: Mapping[str, Any],
+    measured: Robustness,
     rng: np.random.Generator,
 ) -> Iterator[float]:
     """The ends other than no perturbation, and random strengths between them, each once."""
-    low, high = needed_range(axis.name, numbers["axes"][axis.name], need)
+    low, high = needed_range(axis.name, measured.axes[axis.name], need)
     ends = sorted(axis.position(axis.strength(value, subject)) for value in (low, high))
     sampled = rng.uniform(ends[0], ends[1], NUM_RANDOM_STRENGTHS) if ends[0] < ends[1] else []
     seen: set[float] = set()
@@ -271,3 +215,70 @@ def _strengths(
         if abs(axis.position(strength)) > 1e-12 and strength not in seen:
             seen.add(strength)
             yield strength
+
+
+def needed_range(name: str, along: AlongAxis, need: Need) -> tuple[float, float]:
+    """Return the ends of a required range on an axis.
+
+    None stands for the value without perturbation; an `InputError` is raised if that is beyond.
+    """
+    neutral = _finite(along.neutral)
+    low = neutral if need.low is None else need.low
+    high = neutral if need.high is None else need.high
+    if low <= high:
+        return low, high
+    missing, other, limit = ("low", "high", high) if need.low is None else ("high", "low", low)
+    raise InputError(
+        f"{NAMES[name]}: {missing} is missing and therefore {neutral:.4g} {along.unit}, the value "
+        f"without perturbation, but {other} is {limit:.4g}; give {missing}, too"
+    )
+
+
+def contradicted(name: str | None, value: float, unit: str, probe: Probe) -> str | None:
+    """Return how new episodes contradict a file, or None if they do not.
+
+    They are at a value of an axis, None without perturbation.
+    """
+    if not probe.bad:
+        return None
+    where = "without perturbation" if name is None else f"{NAMES[name]} at {value:.4g} {unit}"
+    if probe.refused is not None:
+        return f"{where}: the task does not allow it ({probe.refused})"
+    return (
+        f"{where}: {percent(probe.success or 0.0)} of new episodes succeed, so the policy is "
+        "certainly not good there; the file states that it is"
+    )
+
+
+def lacking(shifts: Robustness, name: str, need: Need) -> str | None:
+    """Return what an operating domain lacks of a required range of an axis, or None."""
+    found, along = shifts.ranges.get(name), shifts.axes.get(name)
+    if found is None or along is None:
+        return f"{NAMES[name]}: not evaluated; run drone-rl shifts with axes=[{name}] among others"
+    low, high = needed_range(name, along, need)
+    needed = f"{NAMES[name]}: needed {_span(low, high, along.unit)}"
+    if found.positions is None:
+        return f"{needed}; it is not certainly good even without perturbation"
+    if not along.is_tested:
+        return f"{needed}; not tested: {shifts.untested[NAMES[name]]}"
+    good = _finite(found.low), _finite(found.high)
+    short = {
+        "low": good[0] > low + NEARLY * abs(low),
+        "high": math.isfinite(good[1]) and good[1] < high - NEARLY * abs(high),
+    }
+    if not any(short.values()):
+        return None
+    is_lost = any(end.impossible and short[end.end] for end in found.failed)
+    more = "; more is impossible even for the oracle" if is_lost else ""
+    is_clear = math.isinf(good[0])  # only air without fog has an infinite lower limit
+    where = f"only without {NAMES[name]}" if is_clear else _span(*good, along.unit)
+    return f"{needed}, good {where}{more}"
+
+
+def _finite(value: float | None) -> float:
+    return math.inf if value is None else value
+
+
+def _span(low: float, high: float, unit: str) -> str:
+    ends = f"{low:.4g} and more" if math.isinf(high) else f"{low:.4g} to {high:.4g}"
+    return f"{ends} {unit}"

@@ -28,6 +28,7 @@ from drone_rl.trust.axes import Axis
 from drone_rl.trust.paired_evaluation import PairedEvaluator
 from drone_rl.trust.perturbations import Condition
 from drone_rl.trust.rule import Quantity, Rule, VerdictKind, kinds_within
+from drone_rl.trust.shifts_results import FailedEnd, Probe, Range, Side, TestedStrength
 from drone_rl.trust.suite import finite
 from drone_rl.trust.verdict import estimate, observe_each
 from drone_rl.utils.errors import InputError
@@ -85,22 +86,21 @@ def walk(axis: Axis, sign: int, seed: int, is_good: Callable[[float, float], boo
     return end
 
 
-def range_of(
-    axis: Axis, ends: Mapping[str, End], failed: Sequence[Mapping[str, Any]], of: Any
-) -> dict[str, Any]:
+def range_of(axis: Axis, ends: Mapping[str, End], failed: Sequence[FailedEnd], of: Any) -> Range:
     """Return the result of `Prober.search` from the two ends by name."""
 
     def value(strength: float) -> float | None:
         return finite(axis.value(strength, of))
 
     tested = [(axis.position(s), value(s), good) for end in ends.values() for s, good in end.tested]
-    return {
+    low, high = sorted(axis.position(end.limit) for end in ends.values())
+    return Range(
         **{name: value(end.limit) for name, end in ends.items()},
         **{f"{n}_open": e.failed is None if e.tested else None for n, e in ends.items()},
-        "positions": sorted(axis.position(end.limit) for end in ends.values()),
-        "failed": failed,
-        "flown": [{"position": p, "value": v, "good": good} for p, v, good in sorted(tested)],
-    }
+        positions=(low, high),
+        failed=tuple(failed),
+        flown=tuple(TestedStrength(position=p, value=v, good=g) for p, v, g in sorted(tested)),
+    )
 
 
 class Prober:
@@ -129,26 +129,20 @@ class Prober:
 
     def rule_at(self, part: float) -> Rule:
         """Return the rule with this fraction of an axis's error probability."""
-        return dataclasses.replace(self._rule, error_rate=part * self._rule.error_rate)
+        return self._rule.replace(error_rate=part * self._rule.error_rate)
 
-    def probe(self, condition: Condition, part: float) -> dict[str, Any]:
+    def probe(self, condition: Condition, part: float) -> Probe:
         """Test whether the policy is certainly good under a condition.
 
         That is, the verdict is certainly good, and the policy is certainly better than the random
         and constant baselines, however easy the condition makes the task. Episodes that depend on
         rounding count as failures for "good", and as successes for "bad". The test may use this
         part of the axis's error.
-
-        Returns:
-            "good" and "bad" (certainly; neither if there are too few episodes, or too many depend
-            on rounding), "success", "fragile": the number of episodes that depend on rounding, and
-            "worst": the side with the least goals reached, with "share"; or "refused", the reason
-            why the task does not allow the condition.
         """
         try:
             key = self._evaluator.settings(condition)
         except InputError as error:
-            return {"good": False, "bad": True, "refused": str(error)}
+            return Probe(good=False, bad=True, refused=str(error))
         subject, count = self._evaluator.subject, self._evaluator.episodes
         agent = PolicyAgent(subject.network, subject.transforms, count, examines_rounding=True)
         greedy = self._evaluator.run(condition, agent=agent).episodes
@@ -157,55 +151,43 @@ class Prober:
         rule = self.rule_at(part)
         baselines = {**self._baselines[key], "oracle": self._oracle}
         quantities = measure_open(greedy, baselines, rule, agent.is_fragile)
-        return {
-            "good": is_surely_good(quantities, rule),
-            "bad": VerdictKind.GOOD not in _kinds(quantities, rule),
-            "refused": None,
-            "success": float(greedy.success.mean()),
-            "fragile": int(agent.is_fragile.sum()),
-            "worst": _worst(quantities, rule),
-        }
+        return Probe(
+            good=is_surely_good(quantities, rule),
+            bad=VerdictKind.GOOD not in _kinds(quantities, rule),
+            success=float(greedy.success.mean()),
+            fragile=int(agent.is_fragile.sum()),
+            worst=_worst(quantities, rule),
+        )
 
-    def search(self, axis: Axis) -> dict[str, Any]:
-        """Find the widest range of an axis.
-
-        Returns:
-            "low", "high": the ends in the axis's unit; None if infinite. "positions": the ends on
-            the axis's scale, lower first; None if the policy is not certainly good even without
-            perturbation. "low_open", "high_open": whether the policy is still good at the strongest
-            perturbation of that side; None if the side has no strengths. "failed": the strength at
-            which each side ends, lower values first: "end", "value", the result of `probe`, the
-            oracle's success rate ("oracle"; None without one), and whether it is too low
-            ("impossible"). "flown": all tested strengths, lowest position first: "value",
-            "position" and "good".
-        """
-        if not self.plain["good"]:
-            nothing = {"low": None, "high": None, "positions": None, "failed": [], "flown": []}
-            return {**nothing, "low_open": None, "high_open": None}
-        probed: dict[float, dict[str, Any]] = {}
+    def search(self, axis: Axis) -> Range:
+        """Find the widest range of an axis."""
+        if not self.plain.good:
+            return Range()
+        probed: dict[float, Probe] = {}
 
         def is_good(strength: float, part: float) -> bool:
             condition = axis.make(strength, self._evaluator.subject)
             probed[strength] = self.probe(condition, part)
-            return probed[strength]["good"]
+            return probed[strength].good
 
         signs = axis.signs.items()
         ends = {name: walk(axis, sign, self._evaluator.seed, is_good) for name, sign in signs}
         failed = [
-            {"end": name, "value": finite(axis.value(end.failed, self._evaluator.subject))}
-            | self._explain(axis, end.failed, probed[end.failed])
+            self._explain(axis, name, end.failed, probed[end.failed])
             for name, end in ends.items()
             if end.failed is not None
         ]
         return range_of(axis, ends, failed, self._evaluator.subject)
 
-    def _explain(self, axis: Axis, strength: float, probed: dict[str, Any]) -> dict[str, Any]:
-        if probed["refused"] is not None or not has_oracle(self._oracle.task):
-            return {**probed, "oracle": None, "impossible": False}
+    def _explain(self, axis: Axis, end: Any, strength: float, probed: Probe) -> FailedEnd:
+        value = finite(axis.value(strength, self._evaluator.subject))
+        failed = FailedEnd(**dict(probed), end=end, value=value)
+        if probed.refused is not None or not has_oracle(self._oracle.task):
+            return failed
         condition = axis.make(strength, self._evaluator.subject)
         success = self._evaluator.run(condition, agent=OracleAgent()).episodes.success
         seen = proportion(int(success.sum()), len(success))
-        return {**probed, "oracle": seen, "impossible": seen["upper95"] < self._possible}
+        return failed.replace(oracle=seen, impossible=seen.upper95 < self._possible)
 
 
 def measure_open(
@@ -224,7 +206,7 @@ def measure_open(
             for one in (values, *(np.where(rows, end, values) for end in rule.ranges[i]))
         )
         low, high = min(middle.lower, least.lower), max(middle.upper, most.upper)
-        quantities[name] = middle._replace(lower=low, upper=high)
+        quantities[name] = middle.replace(lower=low, upper=high)
     return quantities
 
 
@@ -240,14 +222,14 @@ def _kinds(quantities: Mapping[str, Quantity], rule: Rule) -> frozenset[VerdictK
     return kinds_within(box, len(rule.strata))
 
 
-def _worst(quantities: Mapping[str, Quantity], rule: Rule) -> dict[str, Any] | None:
+def _worst(quantities: Mapping[str, Quantity], rule: Rule) -> Side | None:
     """Return the stratum with the smallest fraction of goals reached, None if unknown."""
     shares = {s: quantities[f"collected {s}"].value for s in rule.strata}
     rates = {stratum: share for stratum, share in shares.items() if share is not None}
     if not rates:
         return None
     side = min(rates, key=lambda stratum: rates[stratum])
-    return {"side": side, "share": rates[side]}
+    return Side(side=side, share=rates[side])
 
 
 def _course(axis: Axis, side: list[float], seed: int) -> Iterator[float]:

@@ -1,11 +1,11 @@
 """`drone-rl evaluate`: evaluate a policy next to the baselines, and print the figures."""
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, ClassVar, Unpack
 
+import pydantic
 from tensordict.nn import TensorDictModuleBase
 
 from drone_rl.collectors.complete_episodes import run_episodes
@@ -19,58 +19,72 @@ from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.tasks import as_task
+from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.trust.baselines import run_baselines
 from drone_rl.trust.metrics import summarise
+from drone_rl.trust.results import Difference, Figures
 from drone_rl.trust.rounding_sensitivity import require_function
-from drone_rl.trust.verdict_text import unlike as unlike_text
 from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.intervals import Mean, Share
+from drone_rl.utils.models import Seeded
 from drone_rl.utils.progress import Progress, as_progress
-from drone_rl.utils.provenance import provenance
+from drone_rl.utils.provenance import Provenance, provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.text import fixed_seed, interval, percent, say, seed_line
+from drone_rl.utils.text import interval, percent, render
 
 
-@dataclasses.dataclass(frozen=True)
-class Evaluation(TableResult):
-    """Figures of a policy and of the baselines on the same initial states."""
+class Evaluation(TableResult, Seeded, Provenance):
+    """Figures of a policy and of the baselines on the same initial states, by name."""
 
-    policy: BasePolicy
-    settings: EvaluateSettings
-    figures: dict[str, dict[str, Any]]
-    """Figures of "greedy", "sampled" and the baselines; see `drone_rl.trust.metrics.summarise`."""
-    seed: RootSeed
-    """Root of the environments' random streams."""
-    are_numbers = True
+    model_config = pydantic.ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Figures]  # pyright: ignore[reportIncompatibleVariableOverride]
+
+    policy: str
+    """Its name."""
+    terms: TaskVocabulary
+    unlike: dict[str, Difference] = {}
+    """Settings that differ from the training, by name."""
+    greedy: Figures
+    """With the most probable actions."""
+    sampled: Figures
+    trained: dict[str, Any] | None = None
+    """Progress of the training."""
+    are_numbers: ClassVar[bool] = True
+
+    @property
+    def figures(self) -> dict[str, Figures]:
+        """Figures of "greedy", "sampled" and the baselines."""
+        return {"greedy": self.greedy, "sampled": self.sampled, **self.__pydantic_extra__}
 
     @property
     def success(self) -> float:
         """Success rate with the most probable actions."""
-        return self.figures["greedy"]["success"]["share"]
+        return self.greedy.success.share or 0.0
 
     def rows(self) -> list[list[str]]:
         """Return the figures as rows of text: a header, the figures, and intervals of rates.
 
         The intervals are those of the policy only, so that the table fits a terminal.
         """
-        figures = self.figures.values()
-        terms = as_task(self.policy.task).vocabulary
-        rows = [["", *self.figures], *self._rates("success rate", [f["success"] for f in figures])]
-        for name in self.figures["greedy"]["shares"]:
+        figures, terms = self.figures.values(), self.terms
+        rows = [["", *self.figures], *self._rates("success rate", [f.success for f in figures])]
+        for name in self.greedy.shares:
             label = f"{terms.goals} {terms.reached}" if name == "all" else terms.side(name)
-            rows += self._rates(label, [f["shares"][name] for f in figures])
-        rows.append([f"mean {terms.goals}", *(f"{f['mean_goals']:.2f}" for f in figures)])
-        rows.append(["never reached", *(percent(f["never_reached"]["mean"]) for f in figures)])
-        for reason in self.figures["greedy"]["ends"]:
-            cells = (str(f["ends"][reason]["successes"]) for f in figures)
+            rows += self._rates(label, [f.shares[name] for f in figures])
+        rows.append([f"mean {terms.goals}", *(f"{f.mean_goals:.2f}" for f in figures)])
+        lost = [f.never_reached and f.never_reached.mean for f in figures]
+        rows.append(["never reached", *(percent(share or 0.0) for share in lost)])
+        for reason in self.greedy.ends:
+            cells = (str(f.ends[reason].successes) for f in figures)
             rows.append([f"end: {reason.replace('_', ' ')}", *cells])
-        rows.append(["mean length", *(f"{f['mean_length']:.1f}" for f in figures)])
-        rows.append(["episodes", *(str(f["episodes"]) for f in figures)])
+        rows.append(["mean length", *(f"{f.mean_length:.1f}" for f in figures)])
+        rows.append(["episodes", *(str(f.episodes) for f in figures)])
         return rows
 
-    def _rates(self, label: str, figures: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+    def _rates(self, label: str, figures: Sequence[Share | Mean]) -> list[list[str]]:
         """Return a row of rates, and a row of the policy's 95% intervals."""
-        rates = [f["share"] if "share" in f else f["mean"] for f in figures]
+        rates = [f.share if isinstance(f, Share) else f.mean for f in figures]
         texts = ["-" if rate is None else percent(rate) for rate in rates]
         policy = [
             interval(figure) if name in ("greedy", "sampled") and rate is not None else ""
@@ -78,26 +92,14 @@ class Evaluation(TableResult):
         ]
         return [[label, *texts], ["  95% CI", *policy]]
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values, as in `evaluation.json`."""
-        origin = self.policy.origin
-        return {
-            "policy": origin["policy"],
-            **self.seed.as_dict(),
-            **({"unlike": self.policy.unlike} if self.policy.unlike else {}),
-            **self.figures,
-            **provenance(),
-            "trained": origin["trained"] and origin["trained"]["progress"],
-        }
-
     def notes(self) -> list[str]:
         """Return notes on the seed and what differs from the training."""
-        unlike, seed = self.policy.unlike, self.seed.as_dict()
-        notes = [
-            say((fixed_seed("evaluation.fixed_seed"),), seed),
-            unlike_text({"unlike": unlike}) if unlike else "",
-        ]
-        return [*filter(None, notes), seed_line(seed)]
+        unlike = render("drone_rl.trust", "evaluation.j2", e=self)
+        return [*filter(None, [self.seed_warning(), unlike]), self.seed_line()]
+
+    def save(self, path: Path) -> None:
+        """Write `evaluation.json`."""
+        self.replace(**provenance()).write_json(path)
 
 
 def evaluate(
@@ -148,8 +150,15 @@ def evaluate(
         num_envs, device = settings.batch_size, settings.device
         rollouts |= run_baselines(num_envs, policy.task, state, episodes, device, flown)
     progress("evaluated", steps, steps)
-    figures = {name: summarise(e) for name, e in rollouts.items()}
-    return Evaluation(policy, settings, figures, seed)
+    origin = policy.origin
+    return Evaluation(
+        policy=origin["policy"],
+        **seed.as_dict(),
+        terms=as_task(policy.task).vocabulary,
+        unlike=policy.unlike,
+        trained=origin["trained"] and origin["trained"]["progress"],
+        **{name: summarise(e) for name, e in rollouts.items()},
+    )
 
 
 def held_out_environments(

@@ -1,7 +1,5 @@
 """`drone-rl verdict`: judge policies and baselines, with certificate and operating domain."""
 
-import dataclasses
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,56 +17,43 @@ from drone_rl.policies.baselines import make_baseline
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy, Policy
+from drone_rl.policies.zoo import fingerprint, parse
 from drone_rl.trust.baselines import BASELINES
-from drone_rl.trust.coverage import Coverage, compare_with_required, find_domain, recheck_domain
+from drone_rl.trust.coverage import compare_with_required, find_domain, recheck_domain
 from drone_rl.trust.evaluate import held_out_environments
-from drone_rl.trust.recorded import identify
+from drone_rl.trust.results import Verdict
 from drone_rl.trust.rule import Rule
-from drone_rl.trust.shifts_file import SavedShifts
-from drone_rl.trust.shifts_text import BRIEF, why_not
-from drone_rl.trust.verdict import FindClaim, Verdict, judge_policy
+from drone_rl.trust.shifts_results import Coverage, SavedShifts
+from drone_rl.trust.verdict import CertificateClaim, FindClaim, judge_policy
 from drone_rl.utils.display import Result, TableResult, paragraph
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import NOT_COVERED, PROOF_MISSING
 from drone_rl.utils.progress import Progress, as_progress
-from drone_rl.utils.provenance import provenance
+from drone_rl.utils.provenance import Provenance, provenance
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator, with_seed
-from drone_rl.utils.text import rate, say, seed_line
+from drone_rl.utils.text import rate
 
 
-@dataclasses.dataclass(frozen=True)
-class Judgement(Result):
-    """A verdict on a policy, with certificate and operating domain."""
+class Judgement(Result, Verdict, Provenance):
+    """A verdict on a policy, with certificate and operating domain; as in `verdict.json`."""
 
-    name: str
-    settings: JudgeSettings
-    verdict: Verdict
-    certificate: Path | None = None
-    """The given file or that next to the policy, even if the verdict does not quote it."""
-    measured: SavedShifts | None = None
-    """Its robustness evaluation, if there is one."""
+    policy: str
+    """Its name."""
     weights: str | None = None
     """Hash of the policy's weights if it was judged in the conditions of its training."""
-    coverage: Coverage | None = None
+    certificate: str | None = None
+    """The given file or that next to the policy, even if the verdict does not quote it."""
+    shifts: str | None = None
+    """File of its robustness evaluation, if there is one."""
+    domain: str | None = None
+    """The operating domain as text, if it was measured."""
+    required_domain: Coverage | None = None
     """The required operating domain compared with its own, if one is required."""
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values, as in `verdict.json`."""
-        return {
-            "policy": self.name,
-            "weights": self.weights,
-            "certificate": self.certificate and str(self.certificate),
-            "shifts": self.measured and str(self.measured.path),
-            "domain": self.domain or None,
-            "required_domain": self.coverage and dataclasses.asdict(self.coverage),
-            **self.verdict.as_dict(),
-            **provenance(),
-        }
-
     @property
-    def domain(self) -> str:
-        """The operating domain as text; empty if it was not measured."""
-        return "" if self.measured is None else say(BRIEF, _quoted(self.measured, self.verdict))
+    def verdict(self) -> Verdict:
+        """The verdict: this result, which adds files and the operating domain to it."""
+        return self
 
     def status(self, require: str | None = None) -> int:
         """Return the exit code of `drone-rl verdict`.
@@ -77,24 +62,20 @@ class Judgement(Result):
             require: "proved" for a re-checked proof of every placement, "good" or None for the
                 verdict's own code; a required domain has to be covered, too.
         """
-        if require == "proved" and not self.verdict.is_proved:
+        if require == "proved" and not self.is_proved:
             return PROOF_MISSING
-        if self.coverage is not None and not self.coverage.is_covered:
+        if self.required_domain is not None and not self.required_domain.is_covered:
             return NOT_COVERED
-        is_proof_enough = require == "proved" and self.coverage is None
-        return 0 if is_proof_enough else self.verdict.exit_code
+        return 0 if require == "proved" and self.required_domain is None else self.exit_code
 
     def save(self, path: Path) -> None:
         """Write `verdict.json`."""
-        path.write_text(json.dumps(self.as_dict(), indent=2))
+        self.replace(**provenance()).write_json(path)
 
     def __str__(self) -> str:
         """Return the verdict, the operating domain, what it does not cover, and the seed."""
-        certainty = "" if self.verdict.certain else " (not certain)"
-        line = f"{self.verdict.kind.value}{certainty}: {self.verdict.sentence}"
-        required = "" if self.coverage is None else str(self.coverage)
-        seed = seed_line(self.verdict.evidence)
-        return "\n".join(filter(None, (line, self.domain, required, seed)))
+        required = "" if self.required_domain is None else str(self.required_domain)
+        return "\n".join(filter(None, (self.line, self.domain, required, self.seed_line())))
 
     def _repr_html_(self) -> str:
         return "".join(map(paragraph, str(self).splitlines()))
@@ -108,9 +89,9 @@ class Judgements(TableResult, tuple[Judgement, ...]):
     def rows(self) -> list[list[str]]:
         """Return a table of texts: a heading, then a row for each policy."""
         rows = [["policy", "verdict", "certain", "success rate (95% CI)"]]
-        for name, verdict in ((one.name, one.verdict) for one in self):
-            success = rate(verdict.evidence["greedy"]["success"], label="")
-            rows.append([name, verdict.kind.value, "yes" if verdict.certain else "no", success])
+        for one in self:
+            certain, success = "yes" if one.certain else "no", rate(one.greedy.success, label="")
+            rows.append([one.policy, one.kind.value, certain, success])
         return rows
 
 
@@ -226,7 +207,9 @@ def judge_one(
     name = str(policy) if loaded is None or isinstance(policy, str | Path) else loaded.name
     if isinstance(loaded, Policy) and policy == "latest":  # which changes with the next run
         name = str(loaded.path)
-    claim = measured = coverage = None
+    claim: CertificateClaim | None = None
+    measured: SavedShifts | None = None
+    coverage: Coverage | None = None
     if loaded is None:
         files = {"certificate": certificate, "shifts": shifts, "require_domain": require_domain}
         for setting, path in files.items():
@@ -244,9 +227,7 @@ def judge_one(
         worlds = _baseline(name, TaskSettings(**changed_task), drone, settings, seed)
     else:
         measured = find_domain(loaded, shifts, outputs)
-        needs = require_domain
-        coverage = None if needs is None else compare_with_required(loaded, needs, measured)
-        coverage = _reflown(loaded, coverage, measured, settings, seed)
+        coverage = _compared(loaded, require_domain, measured, settings, seed)
         where = {"device": settings.device, "renderer": settings.renderer}
         flights = settings.certificate_flights
         if find_claim is not None:
@@ -264,12 +245,43 @@ def judge_one(
             seed=seed,
         )
     progress("judged", 1, 1)
-    path = None if claim is None else claim.path
-    judgement = Judgement(name, settings, verdict, path, measured, identify(loaded))
-    if coverage is None or measured is None:
-        return judgement
-    against = why_not(_quoted(measured, verdict))
-    return dataclasses.replace(judgement, coverage=dataclasses.replace(coverage, against=against))
+    if coverage is not None and measured is not None:
+        coverage = coverage.replace(against=measured.why_not(verdict))
+    return Judgement(
+        **dict(verdict),
+        policy=name,
+        weights=identify(loaded),
+        certificate=None if claim is None else str(claim.path),
+        shifts=None if measured is None else measured.path,
+        domain=None if measured is None else measured.text(verdict, brief=True),
+        required_domain=coverage,
+    )
+
+
+def _compared(
+    loaded: BasePolicy,
+    needed: str | Path | None,
+    measured: SavedShifts | None,
+    settings: JudgeSettings,
+    seed: RootSeed,
+) -> Coverage | None:
+    """Compare a required domain, if any; run new episodes if the file states that it is covered."""
+    if needed is None:
+        return None
+    coverage = compare_with_required(loaded, needed, measured)
+    shifts = measured and measured.shifts
+    if shifts is None or not coverage.is_stated or not settings.domain_flights:
+        return coverage
+    return coverage.replace(reflown=recheck_domain(loaded, coverage.needs, shifts, settings, seed))
+
+
+def identify(policy: BasePolicy | None) -> str | None:
+    """Return the hash of a policy's weights, None if its conditions are not those of training."""
+    if not isinstance(policy, Policy):
+        return None
+    if policy.description.as_dict() != parse(policy.state["description"]).as_dict():
+        return None
+    return fingerprint(policy.state["policy"])
 
 
 def _loaded(policy: Any, outputs: str | Path, changed: Mapping[str, Any]) -> BasePolicy | None:
@@ -279,26 +291,6 @@ def _loaded(policy: Any, outputs: str | Path, changed: Mapping[str, Any]) -> Bas
     if changed["appearance"] is not None:
         raise InputError(f"policy={policy} sees no images; leave appearance out")
     return None
-
-
-def _reflown(
-    loaded: BasePolicy,
-    coverage: Coverage | None,
-    measured: SavedShifts | None,
-    settings: JudgeSettings,
-    seed: RootSeed,
-) -> Coverage | None:
-    """Add new episodes, if the file states that the domain is covered."""
-    numbers = None if measured is None else measured.numbers
-    if coverage is None or numbers is None or not coverage.is_stated or not settings.domain_flights:
-        return coverage
-    reflown = recheck_domain(loaded, coverage.needs, numbers, settings, seed)
-    return dataclasses.replace(coverage, reflown=reflown)
-
-
-def _quoted(measured: SavedShifts, verdict: Verdict) -> dict[str, Any]:
-    """Evidence of the sentences about the operating domain."""
-    return {"shifts": measured.evidence, "verdict": verdict.evidence}
 
 
 @contextmanager

@@ -1,6 +1,5 @@
 """Check whether a policy's episodes depend on rounding, and whether implementations agree."""
 
-import dataclasses
 from collections.abc import Iterable, Sequence
 from typing import Any, cast
 
@@ -32,16 +31,9 @@ from drone_rl.policies.rounding import (
 )
 from drone_rl.sim.actions import DiscreteActions
 from drone_rl.sim.dynamics import ComputerVision
+from drone_rl.trust.results import MAX_UNEXPLAINED, Rounding
 from drone_rl.utils.errors import InputError
 
-MAX_FRAGILE = 0.02
-"""Largest fraction of fragile frames for a certain verdict; honest policies have at most 0.003."""
-MAX_FRAGILE_EPISODES = 0.25
-"""Largest fraction of episodes with a fragile frame. Honest policies have at most 0.15."""
-MAX_UNEXPLAINED = 0.04
-"""Largest fraction of episodes that may end differently in another implementation if there is no
-bound on rounding, actions are continuous, or drones have flight dynamics. Otherwise an episode may
-take other actions only in or after a fragile frame."""
 COMPARED = 50
 """Episodes that are run again: by the other implementation, or in other batches."""
 ALONE = 16
@@ -50,61 +42,6 @@ _CHECKED_EPISODES = 32
 """Episodes that check whether a third-party policy depends on the current frame only."""
 _BATCH_SIZES = (*range(1, 65), 100, 128, 200, 250, 256, 400, 500, 512, 1000)
 """Sizes of the batches in which the same frames are evaluated."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Rounding:
-    """How far some episodes depend on rounding."""
-
-    arithmetic: str
-    """Arithmetic that computed the episodes, such as "float32 on cpu, fused kernel"."""
-    is_bound: bool
-    """Whether the rounding error is bounded, not estimated."""
-    frames: int
-    fragile: int
-    """Frames in which rounding can change the action."""
-    episodes: int
-    fragile_episodes: int
-    """Episodes with such a frame."""
-    compared: str
-    """Implementation that ran the episodes again."""
-    compared_episodes: int
-    differing: int
-    """Episodes in which it took other actions; with continuous actions or flight dynamics, episodes
-    that ended differently."""
-    unexplained: int
-    """Differing episodes without a fragile frame up to the first other action, or at all if
-    outcomes were compared."""
-
-    @property
-    def is_excessive(self) -> bool:
-        """Whether too much is fragile or unexplained for any verdict to be certain."""
-        allowed = 0.0 if self.is_bound else MAX_UNEXPLAINED
-        return self.frames > 0 and (
-            self.fragile > MAX_FRAGILE * self.frames
-            or self.fragile_episodes > MAX_FRAGILE_EPISODES * self.episodes
-            or self.unexplained > allowed * self.compared_episodes
-        )
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values, as in `verdict.json`."""
-        return {
-            "arithmetic": self.arithmetic,
-            "bound": self.is_bound,
-            "frames": self.frames,
-            "fragile": self.fragile,
-            "fragile_rate": self.fragile / max(1, self.frames),
-            "threshold": MAX_FRAGILE,
-            "episodes": self.episodes,
-            "fragile_episodes": self.fragile_episodes,
-            "fragile_episodes_rate": self.fragile_episodes / max(1, self.episodes),
-            "threshold_episodes": MAX_FRAGILE_EPISODES,
-            "compared": self.compared,
-            "compared_episodes": self.compared_episodes,
-            "differing": self.differing,
-            "unexplained": self.unexplained,
-            "excessive": self.is_excessive,
-        }
 
 
 def require_function(
@@ -177,7 +114,7 @@ def check_rounding(
         _require_function_of_frames(env, network, log, fragile)
     return Rounding(
         arithmetic=f"{arithmetic}, {log.implementation}",
-        is_bound=is_bound and by_action and is_exact,
+        bound=is_bound and by_action and is_exact,
         frames=sum(map(len, fragile)),
         fragile=int(sum(f.sum() for f in fragile)),
         episodes=len(fragile),

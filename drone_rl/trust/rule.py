@@ -5,18 +5,19 @@ The intervals of all quantities hold at once with the required probability. The 
 if all levels within the intervals lead to the same kind.
 """
 
-import dataclasses
 import enum
 import functools
 import itertools
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import Annotated, Self
+
+import pydantic
 
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import NO_KIND, ONE_SIDED, POOR, TRIVIAL
-from drone_rl.utils.schema import Real
+from drone_rl.utils.models import Model, Stored
 
-_FRACTION = Real(0.0, 1.0, is_above=True, is_below=True)
+Fraction = Annotated[float, pydantic.Field(gt=0.0, lt=1.0)]
 
 
 class VerdictKind(enum.StrEnum):
@@ -59,37 +60,29 @@ TOLERANCE = 1e-9
 """Rounding of a mean: a value that exceeds a threshold by less counts as equal to it."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Rule:
-    """Thresholds.
+class Rule(Model):
+    """Thresholds."""
 
-    Raises:
-        InputError: A value is out of range.
-    """
-
-    good_share: float = 0.9
+    good_share: Fraction = 0.9
     """Fraction of the oracle's success rate that a good policy exceeds."""
-    side_share: float = 0.7
+    side_share: Fraction = 0.7
     """Fraction of goals that a good policy exceeds on each side, a one-sided one on its side."""
-    other_share: float = 0.3
+    other_share: Fraction = 0.3
     """Fraction of goals that a one-sided policy does not exceed on the other side."""
-    offered_share: float = 0.05
+    offered_share: Fraction = 0.05
     """Fraction of episodes that must offer a goal on a side for the side to count."""
-    poor_margin: float = 1 / 6
+    poor_margin: Fraction = 1 / 6
     """Fraction of the way from the best random or constant baseline to the oracle up to which a
     policy is poor."""
-    error_rate: float = 0.05
+    error_rate: Fraction = 0.05
     """Largest probability of a certain and wrong verdict."""
     strata: tuple[str, ...] = SIDES
     """Of the task, from left to right; one-sided policies differ between first and last."""
     blind_baselines: tuple[str, ...] = BLIND_BASELINES
     """Random and constant baselines of the task."""
 
-    def __post_init__(self) -> None:
-        """Refuse thresholds that no policy could meet or miss."""
-        for field in dataclasses.fields(self):
-            if field.type is float:
-                _FRACTION.read(getattr(self, field.name), field.name)
+    @pydantic.model_validator(mode="after")
+    def _check(self) -> Self:
         for name in ("strata", "blind_baselines"):
             if not getattr(self, name):
                 raise InputError(f"a task without {name} can't be judged; name some in the task")
@@ -99,6 +92,7 @@ class Rule:
             raise InputError(
                 f"other_share={self.other_share} must not exceed side_share={self.side_share}"
             )
+        return self
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -148,7 +142,7 @@ the same wherever the quantities lie within intervals that hold all at once with
 {100 * (1 - self.error_rate):g}% probability, whatever depends on what within an episode."""
 
 
-class Quantity(NamedTuple):
+class Quantity(Stored):
     """One number of the rule, with its interval."""
 
     value: float | None

@@ -1,8 +1,6 @@
 """`drone-rl shifts`: evaluate a policy under perturbations, and find its operating domain."""
 
-import dataclasses
 import itertools
-import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
@@ -11,7 +9,6 @@ from typing import Any, Unpack
 
 import yaml
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from drone_rl.config import MINIMAL, BaseTaskSettings
 from drone_rl.config.commands import ShiftSettings
@@ -26,47 +23,23 @@ from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.policies.zoo import fingerprint
 from drone_rl.sim.tasks import as_task
 from drone_rl.trust.agents import OracleAgent
-from drone_rl.trust.axes import AXES, Axis, check_axes, find_axes
+from drone_rl.trust.axes import Axis, check_axes, find_axes
 from drone_rl.trust.charts import chart, strips
 from drone_rl.trust.domain import Prober
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
 from drone_rl.trust.perturbations import Condition, PerturbationMode
 from drone_rl.trust.rounding_sensitivity import require_function
-from drone_rl.trust.shifts_file import FORMAT, FORMAT_VERSION
-from drone_rl.trust.shifts_text import SHIFTS, is_tested, rows
-from drone_rl.trust.suite import Suite, make_strip, packed
-from drone_rl.trust.verdict_text import unlike as say_unlike
+from drone_rl.trust.shifts_results import Domain, NetworkIdentity, Range, Robustness, packed
+from drone_rl.trust.suite import Suite, make_strip
 from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.text import say, seed_line
 
 
-@dataclasses.dataclass(frozen=True)
-class Shifts(TableResult):
-    """Success rates of a policy under perturbations, and its operating domain."""
-
-    policy: BasePolicy
-    settings: ShiftSettings
-    numbers: dict[str, Any]
-    """The results as plain values, as in `shifts.json`."""
-    pictures: Mapping[str, Sequence[NDArray | None]]
-    """Camera images of each axis: without perturbation, then at each of the five strengths; None if
-    the task does not allow the strength. Shapes: (H, W, 3), uint8."""
-
-    @property
-    def area(self) -> float:
-        """Mean over axes of the area under the curve of success rate against strength."""
-        areas = [along["areas"]["constant"] for along in self.numbers["axes"].values()]
-        defined = [area for area in areas if area is not None]
-        return sum(defined) / max(len(defined), 1)
-
-    @property
-    def sentence(self) -> str:
-        """The operating domain as text."""
-        return say(SHIFTS, self.numbers)
+class Shifts(TableResult, Robustness):
+    """Success rates of a policy under perturbations, and its operating domain, with charts."""
 
     def save(self, folder: Path) -> None:
         """Write `shifts.json`, which verdicts, cards and reports quote, and the charts.
@@ -74,30 +47,19 @@ class Shifts(TableResult):
         `domain.yaml` has the ranges, if any, in the format of `drone-rl verdict
         require_domain=FILE`; `shifts.png` has curves, `strips.png` camera images.
         """
-        images = {
-            name: [None if one is None else packed(one) for one in strip]
-            for name, strip in self.pictures.items()
-        }
-        written = {**self.numbers, "pictures": images, **provenance()}
-        (folder / "shifts.json").write_text(json.dumps(written, indent=2))
-        if self.numbers["domain"] is not None:
-            (folder / "domain.yaml").write_text(yaml.safe_dump(ranges_of(self.numbers)))
+        self.replace(**provenance()).write_json(folder / "shifts.json")
+        if self.domain is not None:
+            (folder / "domain.yaml").write_text(yaml.safe_dump(self.requirements()))
         self.figure().savefig(folder / "shifts.png", dpi=110)
-        strips(self.numbers, self.pictures).save(folder / "strips.png")
-
-    def rows(self) -> list[list[str]]:
-        """Return the success rates as a table: a header, then a row for each axis."""
-        return rows(self.numbers)
+        strips(self).save(folder / "strips.png")
 
     def figure(self) -> Figure:
         """Return the curves."""
-        return chart(self.numbers)
+        return chart(self)
 
     def notes(self) -> tuple[str, str]:
         """Return the operating domain, what differs from the training, and the seed."""
-        unlike = self.policy.unlike
-        other = f" {say_unlike({'unlike': unlike})}" if unlike else ""
-        return f"{self.sentence}{other}", seed_line(self.numbers)
+        return self.sentence, self.seed_line()
 
 
 def shifts(
@@ -153,33 +115,27 @@ def shifts(
     with closing(PairedEvaluator(subject, 1, seed.value)) as filmed:
         pictures = {axis.name: make_strip(filmed, axis) for axis in axes}
     progress("flown", total, total)
-    identity = None  # of a third-party policy
+    network = None  # of a third-party policy
     if isinstance(loaded, Policy):
         described = loaded.description.as_dict()
-        identity = {"weights": fingerprint(loaded.state["policy"]), "description": described}
-    numbers = {
-        "format": FORMAT,
-        "format_version": FORMAT_VERSION,
-        "policy": loaded.name,
-        "network": identity,
-        "settings": settings.values(),
+        weights = fingerprint(loaded.state["policy"])
+        network = NetworkIdentity(weights=weights, description=described)
+    return Shifts(
+        policy=loaded.name,
+        network=network,
+        settings=settings,
         **seed.as_dict(),
-        "terms": as_task(subject.task).vocabulary.as_dict(),
+        terms=as_task(subject.task).vocabulary,
         **measured,
-        "domain": domain,
-        "seconds": time.perf_counter() - begin,
-    }
-    return Shifts(loaded, settings, numbers, pictures)
-
-
-def ranges_of(numbers: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Convert the operating domain of `shifts.json` to the format of `require_domain`."""
-    return {
-        name: {end: range_[end] for end in ("low", "high") if range_[end] is not None}
-        | {"unit": AXES[name].unit}
-        for name, range_ in numbers["domain"]["ranges"].items()
-        if range_["positions"] is not None and is_tested(numbers, name)
-    }
+        domain=domain,
+        seconds=time.perf_counter() - begin,
+        unlike=loaded.unlike,
+        image_size=(subject.camera.height, subject.camera.width),
+        pictures={
+            name: tuple(None if frame is None else packed(frame) for frame in strip)
+            for name, strip in pictures.items()
+        },
+    )
 
 
 def _domain(
@@ -188,16 +144,16 @@ def _domain(
     settings: ShiftSettings,
     seed: RootSeed,
     report: Callable[[str], None],
-) -> dict[str, Any]:
-    """Return the operating domain: "plain", without perturbation, and "ranges" by axis."""
-    ranges: dict[str, Any] = {}
+) -> Domain:
+    """Search the operating domain."""
+    ranges: dict[str, Range] = {}
     with closing(PairedEvaluator(subject, settings.domain_episodes, seed.value)) as evaluator:
         oracle = evaluator.run(Condition(), agent=OracleAgent(only_visible=False)).episodes
         prober = Prober(evaluator, oracle, settings.good_share, settings.possible_share)
         for axis in axes:
             report(f"range of {axis.name}")
             ranges[axis.name] = prober.search(axis)
-    return {"plain": prober.plain, "ranges": ranges}
+    return Domain(plain=prober.plain, ranges=ranges)
 
 
 def make_evaluated_policy(policy: BasePolicy, settings: ShiftSettings) -> EvaluatedPolicy:

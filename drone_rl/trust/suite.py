@@ -1,11 +1,9 @@
 """Measure success rates along every axis, paired with those without perturbation."""
 
-import base64
 import contextlib
 import dataclasses
 import functools
 import math
-import zlib
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
@@ -18,8 +16,9 @@ from drone_rl.trust.agents import OracleAgent, StepContext, has_oracle
 from drone_rl.trust.axes import TOGETHER, Axis
 from drone_rl.trust.paired_evaluation import ConditionResult, PairedEvaluator
 from drone_rl.trust.perturbations import Condition, PerturbationMode
+from drone_rl.trust.shifts_results import AlongAxis, ConditionFigures, Level, ModeFigures, Plain
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.intervals import mean_bounds, proportion
+from drone_rl.utils.intervals import Share, mean_bounds, proportion
 
 Report = Callable[[str], None]
 STEP = 8
@@ -46,56 +45,52 @@ class Suite:
         """Measure axes at the strengths with these numbers (from 1), alone and combined.
 
         Returns:
-            Plain values: "plain", without perturbation; "axes", by name; and "together", all axes
-            combined, each at its third strength.
+            "plain", "axes" and "together" of `Shifts`.
         """
         by_axis = {axis.name: self.along(axis, numbers, report) for axis in axes}
         report("all together")
         parts = (axis.make(axis.strengths[TOGETHER - 1], self._evaluator.subject) for axis in axes)
         together = functools.reduce(lambda a, b: a | b, parts, Condition())
-        plain = {"oracle": _success(self.oracle), **self._figures(self.plain)}
+        plain = Plain(oracle=_success(self.oracle), **dict(self._figures(self.plain)))
         return {"plain": plain, "axes": by_axis, "together": self.level(together)}
 
-    def along(self, axis: Axis, numbers: Sequence[int], report: Report) -> dict[str, Any]:
+    def along(self, axis: Axis, numbers: Sequence[int], report: Report) -> AlongAxis:
         """Measure one axis at some of its strengths."""
         levels, subject = [], self._evaluator.subject
         for number in numbers:
             strength = axis.strengths[number - 1]
             report(f"{axis.name} {number}")
-            at = {"value": axis.value(strength, subject), "position": axis.position(strength)}
-            levels.append({"number": number, **at, **self.level(axis.make(strength, subject))})
+            level = Level(
+                **dict(self.level(axis.make(strength, subject))),
+                number=number,
+                value=axis.value(strength, subject),
+                position=axis.position(strength),
+            )
+            levels.append(level)
         plain = float(self.plain.episodes.success.mean())
-        return {
-            "group": axis.group,
-            "unit": axis.unit,
-            "neutral": finite(axis.value(axis.neutral, subject)),
-            "areas": {mode.value: success_area(levels, plain, mode) for mode in self._modes},
-            "levels": levels,
-        }
+        return AlongAxis(
+            group=axis.group,
+            unit=axis.unit,
+            neutral=finite(axis.value(axis.neutral, subject)),
+            areas={mode.value: success_area(levels, plain, mode) for mode in self._modes},
+            levels=tuple(levels),
+        )
 
-    def level(self, condition: Condition) -> dict[str, Any]:
-        """Measure one condition.
-
-        Returns:
-            "refused": why the task or the camera does not allow it, or None; "oracle": the oracle's
-            success rate, if any; "impossible": whether that is too low; "modes": figures by mode.
-        """
+    def level(self, condition: Condition) -> ConditionFigures:
+        """Measure one condition."""
         try:
             self._evaluator.settings(condition)
         except InputError as error:
-            return {"refused": str(error), "oracle": None, "impossible": None, "modes": {}}
+            return ConditionFigures(refused=str(error))
         oracle = _success(self._fly_oracle(condition) if self._knows else None)
         drifts = sum(condition.dimensions) > 0
-        return {
-            "refused": None,
-            "oracle": oracle,
-            "impossible": None if oracle is None else oracle["upper95"] < self._possible,
-            "modes": {
-                mode.value: self._figures(self._evaluator.run(condition, mode))
-                for mode in self._modes
-                if drifts or mode is not PerturbationMode.DRIFTING
-            },
+        modes: Any = {
+            mode.value: self._figures(self._evaluator.run(condition, mode))
+            for mode in self._modes
+            if drifts or mode is not PerturbationMode.DRIFTING
         }
+        impossible = None if oracle is None else oracle.upper95 < self._possible
+        return ConditionFigures(oracle=oracle, impossible=impossible, modes=modes)
 
     def _fly_oracle(self, condition: Condition) -> ConditionResult:
         """Run the oracle; if a condition changes nothing that affects it, reuse the first run.
@@ -108,21 +103,21 @@ class Suite:
             return self.oracle
         return self._evaluator.run(condition, agent=OracleAgent())
 
-    def _figures(self, result: ConditionResult) -> dict[str, Any]:
+    def _figures(self, result: ConditionResult) -> ModeFigures:
         episodes, plain = result.episodes, self.plain.episodes
         task = episodes.task
         shares = {"all": mean_bounds(episodes.share)}
         for i, name in enumerate(task.strata):
             shares[name] = mean_bounds(episodes.stratum_share(i))
         ends = torch.bincount(episodes.end_reason, minlength=len(task.ends)).tolist()
-        return {
-            "success": proportion(int(episodes.success.sum()), len(episodes)),
-            "difference": mean_bounds(episodes.success - plain.success, -1.0, 1.0),
-            "shares": shares,
-            "ends": {end.name.lower(): ends[end] for end in task.ends if end != 0},
-            "unchanged": bool(torch.equal(result.trace, self.plain.trace))
-            and bool(torch.equal(episodes.length, plain.length)),
-        }
+        return ModeFigures(
+            success=proportion(int(episodes.success.sum()), len(episodes)),
+            difference=mean_bounds(episodes.success - plain.success, -1.0, 1.0),
+            shares=shares,
+            ends={end.name.lower(): ends[end] for end in task.ends if end != 0},
+            unchanged=torch.equal(result.trace, self.plain.trace)
+            and torch.equal(episodes.length, plain.length),
+        )
 
 
 class FrameRecorder:
@@ -172,14 +167,12 @@ def area(positions: Sequence[float], shares: Sequence[float]) -> float:
     return float(np.trapezoid(shares, positions)) / width if width else float(shares[0])
 
 
-def success_area(
-    levels: Iterable[dict[str, Any]], plain: float, mode: PerturbationMode
-) -> float | None:
+def success_area(levels: Iterable[Level], plain: float, mode: PerturbationMode) -> float | None:
     """Return the mean height of the curve of success rate against strength; None without levels."""
     points = [(0.0, plain)] + [
-        (level["position"], level["modes"][mode.value]["success"]["share"])
+        (level.position, level.modes[mode.value].success.share or 0.0)
         for level in levels
-        if mode.value in level["modes"]
+        if mode.value in level.modes
     ]
     if len(points) == 1:
         return None
@@ -187,26 +180,8 @@ def success_area(
     return area(positions, shares)
 
 
-def _success(result: ConditionResult | None) -> dict[str, Any] | None:
+def _success(result: ConditionResult | None) -> Share | None:
     if result is None:
         return None
     success = result.episodes.success
     return proportion(int(success.sum()), len(success))
-
-
-def packed(image: NDArray) -> str:
-    """Encode an image as text."""
-    return base64.b64encode(zlib.compress(image.tobytes(), 9)).decode()
-
-
-def unpacked(text: str, shape: tuple[int, ...], where: str) -> NDArray:
-    """Decode an image of `packed`, uint8; any other text is an `InputError` about `where`."""
-    size = math.prod(shape)
-    try:
-        unpacking = zlib.decompressobj()
-        content = unpacking.decompress(base64.b64decode(text, validate=True), size + 1)
-    except (ValueError, zlib.error):
-        content = b""
-    if len(content) != size:
-        raise InputError(f"{where} is not an image of {shape[0]} rows and {shape[1]} columns")
-    return np.frombuffer(content, np.uint8).reshape(shape)

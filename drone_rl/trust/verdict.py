@@ -1,6 +1,5 @@
 """Judge a policy: run episodes, apply the rule and return a verdict."""
 
-import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol
@@ -17,16 +16,14 @@ from drone_rl.policies.baselines import check_baselines
 from drone_rl.policies.policy import BasePolicy, load_policy
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.tasks import Task
-from drone_rl.sim.vocabulary import terms_of
 from drone_rl.trust.baselines import run_baselines
 from drone_rl.trust.metrics import failure_table, summarise
-from drone_rl.trust.rounding_sensitivity import Rounding, check_rounding
-from drone_rl.trust.rule import Quantity, Rule, VerdictKind, decide, kinds_within
-from drone_rl.trust.verdict_text import SENTENCES, is_proved
+from drone_rl.trust.results import Proof, Rounding, Verdict
+from drone_rl.trust.rounding_sensitivity import check_rounding
+from drone_rl.trust.rule import Quantity, Rule, decide, kinds_within
 from drone_rl.utils.exit_codes import NOT_CERTAIN
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed
-from drone_rl.utils.text import say
 
 MANY = (2, 3, 5, 10, 20, 50, 100)
 """Multiples of the number of episodes for which certainty is extrapolated."""
@@ -45,10 +42,8 @@ class CertificateClaim(Protocol):
         """Why it is refused, in one line; None if it is not."""
         ...
 
-    def as_evidence(
-        self, greedy: CompleteEpisodes, *, rounding: Rounding | None = None
-    ) -> dict[str, Any]:
-        """Return the evidence that a verdict on these greedy episodes may quote."""
+    def quote(self, greedy: CompleteEpisodes, *, rounding: Rounding | None = None) -> Proof:
+        """Return what a verdict on these greedy episodes may quote."""
         ...
 
 
@@ -67,35 +62,6 @@ class FindClaim(Protocol):
     ) -> CertificateClaim | None:
         """Return the certificate at a path, by default the one next to the policy, if any."""
         ...
-
-
-@dataclasses.dataclass(frozen=True)
-class Verdict:
-    """The kind of a policy, whether that is certain, and the evidence."""
-
-    kind: VerdictKind
-    certain: bool
-    evidence: dict[str, Any]
-    """Plain values: all entries of `as_dict` except the sentence."""
-
-    @property
-    def exit_code(self) -> int:
-        """Exit code of the kind if it is certain, else `NOT_CERTAIN`."""
-        return self.evidence["exit_code"]
-
-    @property
-    def is_proved(self) -> bool:
-        """Whether a re-checked certificate states success from every placement."""
-        return is_proved(self.evidence)
-
-    @property
-    def sentence(self) -> str:
-        """The verdict as text."""
-        return say(SENTENCES, self.evidence)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values, as in `verdict.json`."""
-        return {**self.evidence, "sentence": self.sentence}
 
 
 def judge_policy(
@@ -149,12 +115,12 @@ def judge_for_selection(
     renderer: str = "raytrace",
     *,
     seed: RootSeed | None = None,
-) -> tuple[dict[str, Any], dict]:
+) -> tuple[Verdict, dict[str, Any]]:
     """Judge a checkpoint in environments of `Stream.CHOICE`, for selection.
 
     Reported figures come from environments of `Stream.REPORT`, never from these.
-    The root of the random streams is fresh by default. Return the verdict, as in verdict.json, and
-    the checkpoint's progress.
+    The root of the random streams is fresh by default. Return the verdict and the checkpoint's
+    progress.
 
     Raises:
         InputError: The checkpoint is unusable.
@@ -162,21 +128,18 @@ def judge_for_selection(
     policy, seed = load_policy(path), seed or root_seed(None)
     how: dict[str, Any] = {"stream": Stream.CHOICE, "device": device, "renderer": renderer}
     with policy.flying(min(episodes, 250), seed=seed.value, **how) as (env, actor):
-        verdict = judge_policy(env, actor, episodes, seed=seed)
-        return verdict.as_dict(), policy.state["progress"]
+        return judge_policy(env, actor, episodes, seed=seed), policy.state["progress"]
 
 
 def check_judged(task: Task[Any], actions: Actions) -> None:
     """Raise the `InputError` with which a verdict on a task would end after its episodes."""
     _rule_of(None, task)
     check_baselines(task, actions)
-    terms_of({"terms": task.vocabulary.as_dict()})
 
 
 def _rule_of(rule: Rule | None, task: Task[Any]) -> Rule:
     """Return the rule for a task's strata and baselines; an `InputError` if it has none."""
-    of_task = {"strata": task.strata, "blind_baselines": task.blind_baselines}
-    return dataclasses.replace(rule or Rule(), **of_task)
+    return (rule or Rule()).replace(strata=task.strata, blind_baselines=task.blind_baselines)
 
 
 def apply_rule(
@@ -198,8 +161,7 @@ def apply_rule(
         rule: Thresholds of the verdict.
         sampled: The policy's episodes with sampled actions, from the same states.
         claim: A certificate of the policy in this task, if there is one.
-        unlike: Settings that differ from the training, by name: "own", its value in training, and
-            "flown".
+        unlike: Settings that differ from the training, by name.
         seed: Root of the environments' random streams; without it the verdict says that a policy
             could have been fitted to these environments.
         rounding: How far `greedy` depends on rounding; None if that was not checked.
@@ -214,40 +176,35 @@ def apply_rule(
             raise ValueError("policy and baselines have different initial states; use the same")
     quantities = measure(greedy, baselines, rule)
     kind = decide([quantity.level for quantity in quantities], len(rule.strata))
-    is_enough, is_open = (
-        _is_certain(quantities, rule),
-        rounding is not None and rounding.is_excessive,
-    )
-    certain, depends = is_enough and not is_open, is_enough and is_open
-    evidence = {
-        "kind": kind.value,
-        "certain": certain,
-        "exit_code": kind.exit_code if certain else NOT_CERTAIN,
-        **({"seed": None, "seed_is_fixed": True} if seed is None else seed.as_dict()),
-        "rule": rule.text,
-        "error_rate": rule.error_rate,
-        "good_share": rule.good_share,
-        "terms": task.vocabulary.as_dict(),
-        "num_cubes": greedy.goals.reached.shape[-1],
-        "rounding": None if rounding is None else {**rounding.as_dict(), "decides": depends},
-        "proof": None if claim is None else claim.as_evidence(greedy, rounding=rounding),
-        "greedy": summarise(greedy),
-        "sampled": None if sampled is None else summarise(sampled),
-        "baselines": {name: summarise(of) for name, of in baselines.items()},
-        "skill": {
+    is_enough = _is_certain(quantities, rule)
+    is_open = rounding is not None and rounding.excessive
+    certain = is_enough and not is_open
+    return Verdict(
+        kind=kind,
+        certain=certain,
+        exit_code=kind.exit_code if certain else NOT_CERTAIN,
+        **({} if seed is None else seed.as_dict()),
+        rule=rule.text,
+        error_rate=rule.error_rate,
+        good_share=rule.good_share,
+        terms=task.vocabulary,
+        num_cubes=greedy.goals.reached.shape[-1],
+        rounding=rounding and rounding.replace(decides=is_enough and is_open),
+        proof=None if claim is None else claim.quote(greedy, rounding=rounding),
+        greedy=summarise(greedy),
+        sampled=None if sampled is None else summarise(sampled),
+        baselines={name: summarise(of) for name, of in baselines.items()},
+        skill={
             name: mean_bounds(greedy.share - of.share, -1.0, 1.0) for name, of in baselines.items()
         },
-        "drawing": None
+        drawing=None
         if sampled is None
         else mean_bounds(sampled.success - greedy.success, -1.0, 1.0),
-        "failures": failure_table(greedy),
-        "quantities": {
-            name: q._asdict() for name, q in zip(rule.quantities, quantities, strict=True)
-        },
-        "enough": _enough(greedy, baselines, rule) if is_enough or not is_open else None,
-        **({"unlike": dict(unlike)} if unlike else {}),
-    }
-    return Verdict(kind, certain, evidence)
+        failures=failure_table(greedy),
+        quantities=dict(zip(rule.quantities, quantities, strict=True)),
+        enough=_enough(greedy, baselines, rule) if is_enough or not is_open else None,
+        unlike=dict(unlike or {}),
+    )
 
 
 def measure(
@@ -276,10 +233,12 @@ def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
     """Estimate the quantity of this index in a rule from its values, see `observe`."""
     name, thresholds = rule.quantities[quantity], rule.thresholds[quantity]
     if name.startswith("offered"):
-        share = proportion(int(values.sum()), len(values), rule.confidence)
-        return Quantity(share["share"], share["lower95"], share["upper95"], thresholds)
-    mean = mean_bounds(values, *rule.ranges[quantity], rule.confidence)
-    return Quantity(mean["mean"], mean["lower95"], mean["upper95"], thresholds)
+        of = proportion(int(values.sum()), len(values), rule.confidence)
+        value = of.share
+    else:
+        of = mean_bounds(values, *rule.ranges[quantity], rule.confidence)
+        value = of.mean
+    return Quantity(value=value, lower=of.lower95, upper=of.upper95, thresholds=thresholds)
 
 
 def observe_each(

@@ -1,15 +1,14 @@
 """Confidence intervals: exact ones of rates, and of bounded means for any distribution."""
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drone_rl.utils.models import Model
+from drone_rl.utils.models import Stored
 
 
-class Share(Model):
+class Share(Stored):
     """A rate with its exact (Clopper-Pearson) interval."""
 
     share: float | None
@@ -24,7 +23,7 @@ class Share(Model):
     """All trials."""
 
 
-class Mean(Model):
+class Mean(Stored):
     """A mean of bounded values with an interval that is valid for any distribution."""
 
     mean: float | None
@@ -37,30 +36,20 @@ class Mean(Model):
     """Number of values."""
 
 
-def proportion(successes: int, trials: int, confidence: float = 0.95) -> dict[str, Any]:
-    """Return a rate with its exact (Clopper-Pearson) interval.
-
-    Returns:
-        "share" (None without trials), "lower95" and "upper95" (so named for any `confidence`; 0
-        and 1 without trials), "successes" and "trials".
-    """
+def proportion(successes: int, trials: int, confidence: float = 0.95) -> Share:
+    """Return a rate with its exact (Clopper-Pearson) interval."""
     from scipy.special import betaincinv  # slow to import, and trainings report no interval
 
     tail, failures = (1.0 - confidence) / 2, trials - successes
     lower = float(betaincinv(successes, failures + 1, tail)) if successes else 0.0
     upper = float(betaincinv(successes + 1, failures, 1.0 - tail)) if failures else 1.0
-    return {
-        "share": successes / trials if trials else None,
-        "lower95": lower,
-        "upper95": upper,
-        "successes": successes,
-        "trials": trials,
-    }
+    share = successes / trials if trials else None
+    return Share(share=share, lower95=lower, upper95=upper, successes=successes, trials=trials)
 
 
 def mean_bounds(
     values: ArrayLike, low: float = 0.0, high: float = 1.0, confidence: float = 0.95
-) -> dict[str, Any]:
+) -> Mean:
     """Return a mean of bounded values with an interval that is valid for any distribution.
 
     With one value for each episode the interval is valid for any dependence within episodes; it
@@ -75,9 +64,6 @@ def mean_bounds(
         high: Greatest possible value.
         confidence: Coverage of the interval.
 
-    Returns:
-        "mean" (None without values), "lower95", "upper95" (then the whole range), "count".
-
     Raises:
         ValueError: A value is not finite or out of range.
     """
@@ -85,15 +71,15 @@ def mean_bounds(
     if not np.isfinite(z).all() or (z < -1e-9).any() or (z > 1 + 1e-9).any():
         raise ValueError(f"values must lie from {low} to {high}")
     if len(z) == 0:
-        return {"mean": None, "lower95": low, "upper95": high, "count": 0}
+        return Mean(mean=None, lower95=low, upper95=high, count=0)
     z, tail = z.clip(0.0, 1.0), (1.0 - confidence) / 2
     lower, upper = _refuted_below(z, tail), 1.0 - _refuted_below(1.0 - z, tail)
-    return {
-        "mean": float(low + (high - low) * z.mean()),
-        "lower95": low + (high - low) * lower,
-        "upper95": low + (high - low) * upper,
-        "count": len(z),
-    }
+    return Mean(
+        mean=float(low + (high - low) * z.mean()),
+        lower95=low + (high - low) * lower,
+        upper95=low + (high - low) * upper,
+        count=len(z),
+    )
 
 
 def _refuted_below(z: NDArray, tail: float) -> float:
@@ -155,4 +141,4 @@ def mean_interval(values: NDArray, episode: NDArray, low: float = 0.0, high: flo
     Frames of one episode are alike, so that an interval for independent frames would be too narrow.
     `values` and `episode` are as for `episode_means`, from `low` to `high`.
     """
-    return Mean(**mean_bounds(episode_means(values, episode), low, high))
+    return mean_bounds(episode_means(values, episode), low, high)

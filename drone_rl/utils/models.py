@@ -9,7 +9,7 @@ import pydantic
 from pydantic_core import ErrorDetails
 
 from drone_rl.utils.errors import InputError, did_you_mean
-from drone_rl.utils.files import read_bytes
+from drone_rl.utils.files import read_bytes, write_atomically
 from drone_rl.utils.limits import RESULT_BYTES
 from drone_rl.utils.schema import shown
 
@@ -66,7 +66,38 @@ class Model(pydantic.BaseModel, metaclass=_Checked):
 
     def write_json(self, path: Path) -> None:
         """Write a JSON file that `read_json` reads."""
-        path.write_text(self.model_dump_json(indent=2), "utf-8")
+        write_atomically(path, self.model_dump_json(indent=2))
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a copy with other values of some fields; see above for errors."""
+        return type(self)(**{**dict(self), **changes})
+
+
+class Stored(Model):
+    """Base of results: entries of files that this version does not know are ignored."""
+
+    model_config = pydantic.ConfigDict(extra="ignore")
+
+
+class Seeded(Stored):
+    """Base of results that are claims: they record the seed of what was sampled for them."""
+
+    seed: int | None = None
+    """Root of the random streams; None if it was not recorded."""
+    seed_is_fixed: bool = True
+    """Whether the seed was known before, so that a policy could have been fitted to it."""
+
+    def seed_line(self, what: str = "environments") -> str:
+        """Return the seed and its origin; `what` is sampled from its streams."""
+        seed = "not recorded" if self.seed is None else self.seed
+        return f"{what}: seed {seed} ({'fixed' if self.seed_is_fixed else 'fresh'})"
+
+    def seed_warning(self, what: str = "environments") -> str:
+        """Return a warning of a seed that was known before; empty for a fresh one."""
+        if not self.seed_is_fixed:
+            return ""
+        label = f"Fixed {what}" if self.seed is None else f"Fixed seed {self.seed}"
+        return f"{label}: a policy could have been fitted to these {what}."
 
 
 def input_error(

@@ -6,10 +6,21 @@ import subprocess
 from importlib import metadata
 from pathlib import Path
 
+from drone_rl.utils.models import Stored
+
 PACKAGES = (
     *("drone-rl", "torch", "torchrl", "tensordict", "mujoco", "mujoco-warp", "warp-lang"),
     *("dm_control", "hydra-core", "numpy"),
 )
+
+
+class Provenance(Stored):
+    """Base of results whose files record where they are from."""
+
+    versions: dict[str, str] = {}
+    """Versions of Python and of packages."""
+    git_revision: str | None = None
+    machine: dict[str, str | int | None] = {}
 
 
 def versions() -> dict[str, str]:

@@ -6,6 +6,7 @@ the JSON files, so that a test can change the evidence and see the sentence chan
 
 import dataclasses
 import functools
+import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -38,9 +39,18 @@ def _environment(package: str) -> "jinja2.Environment":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    filters = (percent, interval, rate, listed, plural, ordinal)
+    filters = (percent, interval, rate, listed, plural, ordinal, setting)
     environment.filters |= {function.__name__: function for function in filters}
     return environment
+
+
+def setting(value: Any) -> str:
+    """Return a value as one types it in a setting."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(setting, value))}]"
+    if isinstance(value, float):
+        return f"{value:.12g}"  # without ".0"
+    return value if isinstance(value, str) else json.dumps(value)
 
 
 def bounds(interval: Mapping[str, Any], show: Callable[[float], str] = "{:.2f}".format) -> str:
@@ -139,14 +149,6 @@ def interval(figure: "Share | Mean | Mapping[str, Any]") -> str:
     """Return the 95% confidence interval of a rate."""
     ends = figure if isinstance(figure, Mapping) else dict(figure)
     return f"{percent(ends['lower95'])} to {percent(ends['upper95'])}"
-
-
-def hundredfold(share: float) -> str:
-    """Return a rate times 100 with one decimal; 0.0 and 100.0 only if it is exactly 0 or 1."""
-    text = f"{100 * share:.1f}"
-    if text == "0.0" and share > 0:
-        return "<0.1"
-    return ">99.9" if text == "100.0" and share < 1 else text
 
 
 def rate(figure: "Share | Mean | Mapping[str, Any]", label: str = "95% CI ") -> str:

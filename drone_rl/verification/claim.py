@@ -2,7 +2,6 @@
 
 import dataclasses
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from drone_rl.config.commands import JudgeSettings
 from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.zoo import certificate_path
 from drone_rl.sim.tasks.collect_cubes import CubesEnd
-from drone_rl.trust.rounding_sensitivity import Rounding
+from drone_rl.trust.results import Proof, Rounding
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path
 from drone_rl.utils.seeding import RootSeed, root_seed
@@ -52,47 +51,37 @@ class Claim:
         """
         return 1.0 - 0.05 ** (1.0 / self.uniform) if self.uniform else None
 
-    def as_evidence(
-        self, greedy: CompleteEpisodes, *, rounding: Rounding | None = None
-    ) -> dict[str, Any]:
+    def quote(self, greedy: CompleteEpisodes, *, rounding: Rounding | None = None) -> Proof:
         """Return what a verdict may quote: nothing if an episode contradicts the certificate.
 
         A proof holds for any order of sums, so nothing is quoted either if the episodes depend too
         much on rounding.
-
-        Returns:
-            Plain values: "refused" (the reason or None) and, unless refused, "every" (whether all
-            cubes are collected from every placement), the fractions of placements from which all
-            are collected ("share"), are not ("lost"), and that are "undecided", "finished",
-            "checked" (number of rollouts), "wrong_at_most", "seed" and "seed_is_fixed" (of their
-            placements) and "agreeing" (the verdict's own episodes with a stated end).
         """
         stated = self.certificate
         if stated is None:
-            return {"refused": self.refused}
+            return Proof(refused=self.refused)
         held = _ends_as_stated(stated, greedy)
         if not all(held):
             count = f"{len(held) - sum(held)} of {len(held)} greedy flights of this verdict"
-            return {"refused": f"{count} ended otherwise than it states"}
-        if rounding is not None and rounding.is_excessive:
-            return {"refused": "decisions of the policy depend on rounding"}
+            return Proof(refused=f"{count} ended otherwise than it states")
+        if rounding is not None and rounding.excessive:
+            return Proof(refused="decisions of the policy depend on rounding")
         won, lost = (
             [o for o in stated.outcomes if len(o.boxes) and (o.end == CubesEnd.ALL_CUBES) == wins]
             for wins in (True, False)
         )
-        return {
-            "refused": None,
-            "every": not lost and not len(stated.undecided),
-            "share": sum(outcome.share for outcome in won),
-            "lost": sum(outcome.share for outcome in lost),
-            "undecided": stated.undecided_share,
-            "finished": stated.finished,
-            "checked": self.flights,
-            "wrong_at_most": self.wrong_at_most,
-            "seed": self.seed,
-            "seed_is_fixed": self.seed_is_fixed,
-            "agreeing": len(held),
-        }
+        return Proof(
+            every=not lost and not len(stated.undecided),
+            share=sum(outcome.share for outcome in won),
+            lost=sum(outcome.share for outcome in lost),
+            undecided=stated.undecided_share,
+            finished=stated.finished,
+            checked=self.flights,
+            wrong_at_most=self.wrong_at_most,
+            seed=self.seed,
+            seed_is_fixed=self.seed_is_fixed,
+            agreeing=len(held),
+        )
 
 
 def find_claim(

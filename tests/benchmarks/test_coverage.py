@@ -31,7 +31,7 @@ def test_an_interval_that_assumes_independent_cubes_is_detected():
 
     def holds(values):
         interval = proportion(int(3 * values.sum()), 3 * len(values))
-        return interval["lower95"] <= 0.9 <= interval["upper95"]
+        return interval.lower95 <= 0.9 <= interval.upper95
 
     assert coverage.coverage(coverage.OUTCOMES["all or nothing, 9 of 10"], 100, holds) < 0.8
 

@@ -4,7 +4,8 @@ import numpy as np
 
 from drone_rl.explanations.results import Explanation
 from drone_rl.sim.vocabulary import CUBES, SHOWN_MOVES
-from tests.evidence import VERDICT, changed
+from drone_rl.trust.shifts_results import packed
+from tests.evidence import SAVED_SHIFTS, SHIFTS, VERDICT, changed
 from tests.trust.plots.test_regions import NUMBERS, WAYS
 
 FRAMES, STEPS, ACTIONS = 12, 5, 3  # of the data set, in two episodes; of the film
@@ -215,6 +216,14 @@ CONTENT = {
     },
     "data": data(),
 }
+
+
+STRIP = [packed(np.zeros((5, 16, 3), np.uint8))] * 6
+PICTURED = changed(
+    SAVED_SHIFTS,
+    {"shifts.image_size": [5, 16], "shifts.pictures": dict.fromkeys(SHIFTS["axes"], STRIP)},
+)
+"""A robustness evaluation with camera images."""
 
 
 def changed_explanation(changes=None):

@@ -1,6 +1,5 @@
 """Verdict, robustness, statistics of the data set, contradictions and loops."""
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,12 +11,10 @@ from drone_rl.explanations.behavior import (
     find_pairs,
     flaws_section,
     median_frame_change,
-    shifts_section,
     verdict_section,
 )
 from drone_rl.explanations.rollouts import RolloutDataset
 from drone_rl.sim.actions import MOVES
-from drone_rl.trust.shifts_file import SavedShifts
 from tests.five_actions import FIVE
 
 F, L, R = 0, 1, 2
@@ -156,17 +153,7 @@ def test_episodes_with_a_loop_are_counted_once():
     assert (found.looping_episodes.successes, found.looping_episodes.trials) == (1, 2)
 
 
-def test_a_robustness_evaluation_is_copied():
-    strip = [np.full((5, 16, 3), 7, np.uint8), None, *[np.zeros((5, 16, 3), np.uint8)] * 4]
-    measured = SavedShifts(Path("shifts.json"), {"axes": {"blur": {}}}, {"blur": strip})
-    found = shifts_section(SimpleNamespace(measured=measured))
-    assert found.measured == {"axes": {"blur": {}}}
-    assert found.frames["blur"].shape == (6, 5, 16, 3)
-    assert found.frames["blur"][0].min() == 7 and found.frames["blur"][1].max() == 0
-    assert shifts_section(SimpleNamespace(measured=None)) is None
-
-
 def test_the_verdict_does_not_depend_on_earlier_episodes(context):
     verdict = verdict_section(context)
-    assert (verdict["greedy"]["episodes"], verdict["good_share"]) == (6, 0.7)
+    assert (verdict.greedy.episodes, verdict.good_share) == (6, 0.7)
     assert verdict_section(context) == verdict

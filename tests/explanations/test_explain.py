@@ -28,7 +28,7 @@ SEED = RootSeed(6, is_fixed=False)
 
 
 def explanation(kind, **verdict):
-    changes = {"kind": kind, "sentence": "It does.", **verdict}
+    changes = {"kind": kind, **verdict}
     return changed_explanation({f"verdict.{name}": value for name, value in changes.items()})
 
 
@@ -86,12 +86,9 @@ def test_the_result_prints_verdict_and_report(tmp_path):
     (tmp_path / "report.html").write_text("<h1>trusted?</h1>")
     of_x = explanation("good", certain=False)
     shown = Explanations(tmp_path, tmp_path / "report.html", {"x": of_x}, SEED)
-    report = f"report: {tmp_path / 'report.html'}"
-    assert str(shown).splitlines() == [
-        "x: good (not certain). It does.",
-        report,
-        "environments: seed 6 (fresh)",
-    ]
+    first, *rest = str(shown).splitlines()
+    assert first.startswith("x: good (not certain). This policy looks good")
+    assert rest == [f"report: {tmp_path / 'report.html'}", "environments: seed 6 (fresh)"]
     assert shown._repr_html_().startswith(
         '<iframe sandbox="allow-scripts" srcdoc="&lt;h1&gt;trusted?'
     )
@@ -191,6 +188,6 @@ def test_all_sections_work_with_another_task(posts, tmp_path):
         numbers = explain_policy(
             posts.env, posts.network, tmp_path, posts.settings, name="posts", provenance={}
         )
-    assert numbers.verdict["num_cubes"] == NUM_POSTS
+    assert numbers.verdict.num_cubes == NUM_POSTS
     assert [row.side for row in numbers.response.rows] == ["left", "right"]
     assert numbers.truth.outcomes.collected.keys() == {"as it was", "moved left", "moved right"}

@@ -1,7 +1,5 @@
 """Terms of reports and displays of actions, as files hold them."""
 
-import dataclasses
-
 import pytest
 
 from drone_rl.sim import actions
@@ -11,7 +9,7 @@ from drone_rl.utils.errors import InputError
 
 def test_vocabulary_round_trip_and_default():
     assert terms_of({}) == CUBES
-    other = dataclasses.replace(CUBES, goal="post", sides={"near": "close by"})
+    other = CUBES.replace(goal="post", sides={"near": "close by"})
     assert terms_of({"terms": other.as_dict()}) == other
 
 

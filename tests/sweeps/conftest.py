@@ -54,7 +54,7 @@ def _verdict(kind="good", left=1.0, ahead=1.0, right=1.0, *, whole=1.0, certain=
     shares = {"all": whole, **(dict.fromkeys(strata, 1.0) if strata else sides)}
     greedy = {
         "episodes": 200,
-        "success": proportion(round(200 * whole), 200),
+        "success": dict(proportion(round(200 * whole), 200)),
         "shares": {name: {"mean": share} for name, share in shares.items()},
     }
     verdict = {"kind": kind, "certain": certain, "rule": Rule().text, "error_rate": 0.05}

@@ -90,9 +90,9 @@ def test_failed_runs_count(begin_sweep, make_verdict):
             {f"seed={i}": "NaN" for i in range(9)} | {"seed=9": {"verdict": make_verdict()}}
         )
     )
-    assert group["solved"] == {**proportion(1, 10), "unknown": 0}
+    assert group["solved"] == {**dict(proportion(1, 10)), "unknown": 0}
     assert group["verdicts"]["good"]["share"] == 0.1
-    assert group["verdicts"]["good"]["upper95"] == proportion(1, 10)["upper95"]  # all is known
+    assert group["verdicts"]["good"]["upper95"] == proportion(1, 10).upper95  # all is known
     assert group["verdicts"]["failed"]["share"] == 0.9
     assert group["frames_to_solve"]["median"] is None
     assert group["frames_to_solve"]["more_than"] == 1000  # what they had when they failed
@@ -112,8 +112,8 @@ def test_runs_that_are_not_judged_may_be_of_any_kind(begin_sweep, make_verdict):
     (group,) = groups(begin_sweep({"seed=0": {"verdict": make_verdict()}, "seed=1": old}))
     for kind, hits in {"good": 1, "poor": 0}.items():
         share = group["verdicts"][kind]
-        assert share["lower95"] == proportion(hits, 2)["lower95"]
-        assert share["upper95"] == proportion(hits + 1, 2)["upper95"]
+        assert share["lower95"] == proportion(hits, 2).lower95
+        assert share["upper95"] == proportion(hits + 1, 2).upper95
     assert group["verdicts"]["failed"]["unknown"] == 0  # it did not fail
     assert group["solved"]["share"] == 1.0
 
@@ -123,7 +123,7 @@ def test_a_damaged_run_may_be_anything_and_an_unfinished_one_is_left_out(begin_s
     (group,) = groups(sweep)
     assert (group["runs"], group["ended"], group["unfinished"]) == (3, 2, 1)
     assert group["solved"] == {
-        **proportion(1, 2),
+        **dict(proportion(1, 2)),
         "upper95": 1.0,
         "unknown": 1,
     }
@@ -135,8 +135,8 @@ def test_a_damaged_run_may_be_anything_and_an_unfinished_one_is_left_out(begin_s
 def test_an_unknown_run_may_be_a_success_or_none():
     figure = share_of_runs(3, 2, 10)
     assert figure["share"] == 0.3
-    assert figure["lower95"] == proportion(3, 10)["lower95"]
-    assert figure["upper95"] == proportion(5, 10)["upper95"]
+    assert figure["lower95"] == proportion(3, 10).lower95
+    assert figure["upper95"] == proportion(5, 10).upper95
     assert share_of_runs(0, 4, 4)["upper95"] == 1.0
 
 

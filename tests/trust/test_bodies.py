@@ -1,7 +1,5 @@
 """A policy in several bodies from Python, and what each body changes."""
 
-import json
-
 import pytest
 from matplotlib.colors import to_hex
 from matplotlib.patches import Rectangle
@@ -9,11 +7,8 @@ from matplotlib.patches import Rectangle
 import drone_rl
 from drone_rl.config import DynamicsSettings
 from drone_rl.trust.bodies import (
-    LOOPED,
+    Bodies,
     changes_of,
-    chart,
-    left_out,
-    rows,
 )
 from drone_rl.utils import palette
 from drone_rl.utils.errors import InputError
@@ -48,18 +43,18 @@ def test_changes_of_named_dynamics(body, changes):
 
 
 def test_a_verdict_for_each_dynamics(done):
-    flown = done.numbers["policies"]["good"]
-    assert done.numbers["bodies"] == [*flown] == TWO
-    assert all(verdict["greedy"]["episodes"] == 4 for verdict in flown.values())
-    assert flown["computer vision"]["greedy"]["success"]["share"] == 1.0
+    flown = done.policies["good"]
+    assert [*done.bodies] == [*flown] == TWO
+    assert all(verdict.greedy.episodes == 4 for verdict in flown.values())
+    assert flown["computer vision"].greedy.success.share == 1.0
 
 
 def test_text_and_files(done, tmp_path):
     assert str(done).splitlines()[0].split() == ["computer", "vision", "wind", "8", "m/s"]
     assert "<td>good</td>" in done._repr_html_() and "<img" in done._repr_html_()
     done.save(tmp_path)
-    kept = json.loads((tmp_path / "bodies.json").read_text())
-    assert kept["policies"].keys() == {"good"} and "versions" in kept
+    kept = Bodies.read_json(tmp_path / "bodies.json")
+    assert kept.rows() == done.rows() and kept.versions
     assert (tmp_path / "bodies.png").read_bytes().startswith(b"\x89PNG")
     assert "<svg" in (tmp_path / "bodies.svg").read_text()
 
@@ -78,12 +73,17 @@ def test_mistakes(policies, told, message):
         drone_rl.bodies(policies, progress=silent, **told)
 
 
+def share(value, lower, upper):
+    of = {"successes": round(400 * value), "trials": 400}
+    return {"share": value, "lower95": lower, "upper95": upper, **of}
+
+
 GOOD = changed(
     VERDICT,
     {
         "kind": "good",
         "certain": True,
-        "greedy.success": {"share": 0.975, "lower95": 0.954, "upper95": 0.988},
+        "greedy.success": share(0.975, 0.954, 0.988),
         "failures.largest": None,
     },
 )
@@ -92,29 +92,26 @@ BAD = changed(
     {
         "kind": "poor",
         "certain": False,
-        "greedy.success": {"share": 0.1, "lower95": 0.07, "upper95": 0.14},
-        "failures.largest": {"by": "end", "value": "step_limit", "failed": 9, "lower95": 0.1},
+        "greedy.success": share(0.1, 0.07, 0.14),
+        "failures.largest": VERDICT["failures"]["rows"][1],
     },
 )
-NUMBERS = {
-    "bodies": ["computer vision", "wind 8 m/s"],
-    "policies": {"one": {"computer vision": GOOD, "wind 8 m/s": BAD}},
-}
+TABLE = Bodies(
+    bodies=("computer vision", "wind 8 m/s"),
+    policies={"one": {"computer vision": GOOD, "wind 8 m/s": BAD}},
+)
 
 
 def test_table_has_a_row_per_policy():
-    assert rows(NUMBERS) == [
+    assert TABLE.rows() == [
         ["", "computer vision", "wind 8 m/s"],
-        ["one", "good 97.5% (95.4 to 98.8)", "poor? 10.0% (7.0 to 14.0)"],
+        ["one", "good 97.5% (95.4% to 98.8%)", "poor? 10.0% (7.0% to 14.0%)"],
     ]
 
 
-def cells(figure):
-    return [patch for patch in figure.axes[0].patches if isinstance(patch, Rectangle)]
-
-
 def test_chart_cells_have_the_color_of_their_verdict():
-    boxes = cells(chart(NUMBERS))
+    patches = TABLE.figure().axes[0].patches
+    boxes = [patch for patch in patches if isinstance(patch, Rectangle)]
     assert [box.get_xy() for box in boxes] == [(0, 0), (1, 0)]
     assert [box.get_hatch() for box in boxes] == [None, "//"]  # the second is not certain
     green, red = (to_hex(box.get_facecolor()) for box in boxes)
@@ -122,10 +119,9 @@ def test_chart_cells_have_the_color_of_their_verdict():
 
 
 def test_column_of_episodes_with_software_in_the_loop():
-    flights = {"success": proportion(4, 5)}
-    assert rows({**NUMBERS, LOOPED: {"one": flights}})[1][-1] == (
-        "no verdict: 4 of 5 (28.4 to 99.5%)"
-    )
-    missing = {**NUMBERS, LOOPED: {"one": {"left_out": "no rotor turned"}}}
-    assert rows(missing)[1][-1] == "left out"
-    assert left_out(missing) == ["one, software in the loop: no rotor turned"]
+    flights = VERDICT["greedy"] | {"success": proportion(4, 5)}
+    table = TABLE.replace(in_the_loop={"one": flights})
+    assert table.rows()[1][-1] == "no verdict: 4 of 5 (28.4% to 99.5%)"
+    missing = TABLE.replace(in_the_loop={"one": {"left_out": "no rotor turned"}})
+    assert missing.rows()[1][-1] == "left out"
+    assert "one, software in the loop: no rotor turned" in missing.notes()

@@ -1,13 +1,15 @@
 import numpy as np
 
 from drone_rl.trust.charts import chart, curves, strips
-from tests.evidence import SHIFTS, changed
+from drone_rl.trust.shifts_results import Robustness, packed
+from tests.evidence import SHIFTS
 
-PICTURES = [np.full((25, 64, 3), 40 * i, np.uint8) for i in range(6)]
+MEASURED = Robustness.read(SHIFTS)
+FRAMES = tuple(packed(np.full((25, 64, 3), 40 * i, np.uint8)) for i in range(6))
 
 
 def test_curves_go_through_the_measured_points():
-    figure = chart(SHIFTS)
+    figure = chart(MEASURED)
     sun = figure.axes[0]
     assert sun.get_title() == "elevation of the sun" and sun.get_xlabel() == "degrees"
     policy = next(line for line in sun.lines if line.get_label() == "success rate of the policy")
@@ -23,23 +25,21 @@ def test_curves_go_through_the_measured_points():
 
 
 def test_chart_without_a_search_has_no_range():
-    figure = chart(changed(SHIFTS, {"domain": None}))
+    figure = chart(MEASURED.replace(domain=None))
     labels = [label for axis in figure.axes for label in axis.get_legend_handles_labels()[1]]
     assert "certainly good in this range" not in labels
 
 
 def test_strips_show_the_tested_strengths():
-    one = strips(SHIFTS, {"sun": PICTURES})
+    one = strips(MEASURED.replace(image_size=(25, 64), pictures={"sun": FRAMES}))
     assert one.height >= 25 * 3 and one.width > 3 * 64 * 3
-    two = strips(SHIFTS, {"sun": PICTURES, "blur": [*PICTURES[:3], None, *PICTURES[4:]]})
-    assert two.height == 2 * one.height
     counts = {color: count for count, color in one.convert("L").getcolors()}
     shown = {color for color in range(0, 240, 40) if counts.get(color, 0) >= 25 * 64 * 9}
     assert shown == {0, 40, 200}  # strengths 1 and 5 alone were flown
 
 
 def test_chart_of_each_axis_and_the_legend():
-    charts = curves(SHIFTS)
+    charts = curves(MEASURED)
     assert next(iter(charts)) == "elevation of the sun"
     assert [*charts][-1] == "legend" and len(charts) == 4
     sun = charts["elevation of the sun"].axes[0]

@@ -15,6 +15,7 @@ from drone_rl.trust.domain import Prober, is_surely_good
 from drone_rl.trust.paired_evaluation import PairedEvaluator
 from drone_rl.trust.perturbations import Condition
 from drone_rl.trust.rule import Quantity, Rule
+from drone_rl.trust.shifts_results import FailedEnd, Probe
 from drone_rl.utils.intervals import mean_bounds
 from tests.trust.subjects import Blind, Steering, subject
 
@@ -37,6 +38,10 @@ def make_prober():
         evaluator.close()
 
 
+def _failed(axis, end, strength, probe):
+    return FailedEnd(**dict(probe), end=end, value=strength)
+
+
 def good_at(prober, is_good, monkeypatch):
     """Lets a policy be good at some strengths, whatever it is; notes what is asked."""
     asked = []
@@ -45,11 +50,11 @@ def good_at(prober, is_good, monkeypatch):
         strength = condition.task["strength"]
         asked.append((strength, part))
         good = is_good(strength)
-        return {"good": good, "bad": not good, "refused": None, "success": 0.5, "worst": None}
+        return Probe(good=good, bad=not good, success=0.5)
 
     monkeypatch.setattr(prober, "probe", probe)
-    monkeypatch.setattr(prober, "_explain", lambda axis, strength, found: found)
-    prober.plain = {"good": True}
+    monkeypatch.setattr(prober, "_explain", _failed)
+    prober.plain = Probe(good=True)
     return asked
 
 
@@ -72,21 +77,21 @@ def test_search_samples_strengths_between_those_of_the_table(make_prober, monkey
     assert below[1] == -1.0 and -1 < below[0] < 0 and above[0] == pytest.approx(-below[0])
     inside = [s for s, part in asked if part == domain.REFINING]
     assert inside and all(abs(s) > 1 for s in inside)
-    assert found["positions"] == [
+    assert found.positions == (
         min(s for s, _ in asked if s >= -1.3), max(s for s, _ in asked if s <= 2.6)
-    ]  # fmt: skip
-    assert [found["low"], found["high"]] == [10 * limit for limit in found["positions"]]
-    assert [failed["end"] for failed in found["failed"]] == ["low", "high"]
-    assert (found["low_open"], found["high_open"]) == (False, False)
-    assert [at["position"] for at in found["flown"]] == sorted(s for s, _ in asked)
+    )  # fmt: skip
+    assert [found.low, found.high] == [10 * limit for limit in found.positions]
+    assert [failed.end for failed in found.failed] == ["low", "high"]
+    assert (found.low_open, found.high_open) == (False, False)
+    assert [at.position for at in found.flown] == sorted(s for s, _ in asked)
 
 
 def test_range_that_reaches_the_last_strength_is_open(make_prober, monkeypatch):
     prober = make_prober(subject(), 1)
     good_at(prober, lambda s: s <= 9, monkeypatch)
     found = prober.search(axis((1.0, 2.0, 3.0, 4.0, 5.0)))
-    assert (found["low"], found["high"], len(found["flown"])) == (0.0, 50.0, 10)
-    assert (found["low_open"], found["high_open"], found["failed"]) == (None, True, [])
+    assert (found.low, found.high, len(found.flown)) == (0.0, 50.0, 10)
+    assert (found.low_open, found.high_open, found.failed) == (None, True, ())
 
 
 def test_hole_ends_the_range(make_prober, monkeypatch):
@@ -94,7 +99,7 @@ def test_hole_ends_the_range(make_prober, monkeypatch):
     prober = make_prober(subject(), 1)
     asked = good_at(prober, lambda s: s in (1.0, 3.0, 4.0), monkeypatch)
     found = prober.search(axis((1.0, 2.0, 3.0, 4.0, 5.0), whole=True))
-    assert (found["high"], [s for s, _ in asked]) == (10.0, [1.0, 2.0])
+    assert (found.high, [s for s, _ in asked]) == (10.0, [1.0, 2.0])
 
 
 def test_policy_fitted_to_the_table_has_no_range(make_prober, monkeypatch):
@@ -103,7 +108,7 @@ def test_policy_fitted_to_the_table_has_no_range(make_prober, monkeypatch):
     table = (1.0, 2.0, 3.0, 4.0, 5.0)
     good_at(prober, lambda s: s in table, monkeypatch)
     found = prober.search(axis(table))
-    assert (found["high"], found["positions"]) == (0.0, [0.0, 0.0])
+    assert (found.high, found.positions) == (0.0, (0.0, 0.0))
 
 
 FLIGHTS = 400
@@ -115,7 +120,7 @@ def least_successes(part):
     values = np.zeros(FLIGHTS)
     for count in range(360, FLIGHTS + 1):
         values[:count] = 1.0
-        if mean_bounds(values - 0.9, -0.9, 1.0, confidence)["lower95"] > 0:
+        if mean_bounds(values - 0.9, -0.9, 1.0, confidence).lower95 > 0:
             return count
     raise AssertionError("nobody is good")
 
@@ -149,11 +154,11 @@ def test_error_rate_of_ranges(make_prober, monkeypatch, truth, dependence):
             else:
                 turned = dependence == "opposed" and round(8 * abs(strength)) % 2
                 count = int(((1 - world if turned else world) < truth(abs(strength))).sum())
-            return {"good": count >= needed[part]}
+            return Probe(good=bool(count >= needed[part]))
 
         good_at(prober, None, monkeypatch)
         monkeypatch.setattr(prober, "probe", is_good)
-        low, high = prober.search(flown)["positions"]
+        low, high = prober.search(flown).positions
         held = [s for s in np.linspace(low, high, 200) if truth(abs(s)) <= 0.9]
         wrong += any(abs(s) > 0 for s in held)
     assert wrong <= 50  # far fewer: the rule's other quantities share the error, too
@@ -170,10 +175,10 @@ def test_blind_policy_in_an_easy_task_has_no_range(make_prober):
         num_cubes=1, first_distance=8.0, front_margin=4.0, cube_size=4.0, lateral_bound=0.5
     )
     prober = make_prober(subject(Blind(0), easy), 200)
-    assert prober.plain["success"] == 1.0
-    assert not prober.plain["good"]
+    assert prober.plain.success == 1.0
+    assert not prober.plain.good
     found = prober.search(AXES["object_color"])
-    assert (found["low"], found["high"], found["flown"]) == (None, None, [])
+    assert (found.low, found.high, found.flown) == (None, None, ())
 
 
 class Undecided(Steering):
@@ -192,33 +197,37 @@ class Undecided(Steering):
 @pytest.mark.parametrize("darkest", [2.0, 0.0])
 def test_fragile_episodes_count_as_failures(make_prober, darkest):
     prober = make_prober(subject(Undecided(darkest)), 200)
-    assert prober.plain["success"] > 0.95 and not prober.plain["bad"]
-    assert prober.plain["good"] == (darkest == 0.0)
+    assert prober.plain.success > 0.95 and not prober.plain.bad
+    assert prober.plain.good == (darkest == 0.0)
 
 
 def test_one_sided_policy_is_bad(make_prober):
     prober = make_prober(subject(Blind(1)), 200)
-    assert prober.plain["bad"] and not prober.plain["good"]
-    assert prober.plain["worst"]["share"] < 0.2
+    assert prober.plain.bad and not prober.plain.good
+    assert prober.plain.worst.share < 0.2
 
 
 def test_sizes_that_the_task_refuses_are_bad(make_prober):
     probed = make_prober(subject(), 1).probe(Condition(task={"cube_size": 9.0}), 1.0)
-    assert (probed["good"], probed["bad"]) == (False, True)
-    assert "sinks cubes" in probed["refused"]
+    assert (probed.good, probed.bad) == (False, True)
+    assert "sinks cubes" in probed.refused
+
+
+def quantity(value, lower, upper, *thresholds):
+    return Quantity(value=value, lower=lower, upper=upper, thresholds=thresholds or (0.0,))
 
 
 def test_certainly_good_needs_all_quantities():
     rule = Rule()
     sure = {
-        "success": Quantity(0.1, 0.05, 0.15, (0.0,)),
-        **{f"offered {s}": Quantity(0.5, 0.4, 0.6, (0.05,)) for s in rule.strata},
-        **{f"collected {s}": Quantity(0.9, 0.8, 1.0, (0.3, 0.7)) for s in rule.strata},
-        **{f"above {name}": Quantity(0.5, 0.4, 0.6, (0.0,)) for name in rule.blind_baselines},
+        "success": quantity(0.1, 0.05, 0.15),
+        **{f"offered {s}": quantity(0.5, 0.4, 0.6, 0.05) for s in rule.strata},
+        **{f"collected {s}": quantity(0.9, 0.8, 1.0, 0.3, 0.7) for s in rule.strata},
+        **{f"above {name}": quantity(0.5, 0.4, 0.6) for name in rule.blind_baselines},
     }
     assert is_surely_good(sure, rule)
     for name, lower in (("success", -0.01), ("collected right", 0.69), ("above forward", -0.01)):
-        assert not is_surely_good({**sure, name: sure[name]._replace(lower=lower)}, rule), name
+        assert not is_surely_good({**sure, name: sure[name].replace(lower=lower)}, rule), name
 
 
 def test_baselines_run_under_the_condition_once_per_task(make_prober, monkeypatch):
@@ -231,7 +240,7 @@ def test_baselines_run_under_the_condition_once_per_task(make_prober, monkeypatc
         lambda condition: flown.append(condition) or blindly(condition),
     )
     shorter = Condition(task={"step_length": 0.5})
-    assert prober.probe(shorter, 1.0)["refused"] is None
+    assert prober.probe(shorter, 1.0).refused is None
     prober.probe(dataclasses.replace(shorter, faults=(dead_rows(1),)), 1.0)
     prober.probe(Condition(), 1.0)
     assert flown == [shorter]
@@ -249,11 +258,11 @@ def test_range_of_fog_ends_at_the_least_visibility(make_prober, monkeypatch):
     )
     good_at(prober, lambda s: s >= 30.0, monkeypatch)
     found = prober.search(fog)
-    assert 30.0 <= found["low"] <= 40.0 and found["high"] is None
-    assert found["positions"][0] == 0.0 and found["positions"][1] == pytest.approx(1 / found["low"])
-    assert (found["low_open"], found["high_open"]) == (False, None)
-    (failed,) = found["failed"]
-    assert failed["end"] == "low" and 25.0 <= failed["value"] < 30.0
+    assert 30.0 <= found.low <= 40.0 and found.high is None
+    assert found.positions[0] == 0.0 and found.positions[1] == pytest.approx(1 / found.low)
+    assert (found.low_open, found.high_open) == (False, None)
+    (failed,) = found.failed
+    assert failed.end == "low" and 25.0 <= failed.value < 30.0
 
 
 def test_impossible_strengths(make_prober):
@@ -263,9 +272,9 @@ def test_impossible_strengths(make_prober):
     blind = dataclasses.replace(
         AXES["dead_rows"], make=lambda s, _: Condition(faults=(dead_rows(5),))
     )
-    told = prober._explain(blind, 1.0, found)
-    assert told["impossible"] and told["oracle"]["share"] < 0.9
-    seen = prober._explain(AXES["noise"], 2.0, found)
-    assert not seen["impossible"] and seen["oracle"]["share"] == 1.0
-    refused = prober._explain(AXES["noise"], 2.0, {**found, "refused": "so it is"})
-    assert (refused["oracle"], refused["impossible"]) == (None, False)
+    told = prober._explain(blind, "high", 1.0, found)
+    assert told.impossible and told.oracle.share < 0.9
+    seen = prober._explain(AXES["noise"], "high", 2.0, found)
+    assert not seen.impossible and seen.oracle.share == 1.0
+    refused = prober._explain(AXES["noise"], "high", 2.0, found.replace(refused="so it is"))
+    assert (refused.oracle, refused.impossible) == (None, False)

@@ -8,11 +8,12 @@ import drone_rl
 from drone_rl.config import AppearanceSettings
 from drone_rl.sim.actions import MOVES_3D
 from drone_rl.sim.tasks import CollectCubes, OracleRule
+from drone_rl.sim.vocabulary import CUBES
 from drone_rl.trust.evaluate import Evaluation
+from drone_rl.trust.results import Figures
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.utils.progress import silent
-from drone_rl.utils.seeding import RootSeed
 from tests.fake_flight import floating
 
 
@@ -37,9 +38,9 @@ def test_evaluation_in_python(good):
         "right",
         "oracle",
     }
-    assert done.figures["oracle"]["mean_goals"] == 2.0
-    assert done.success == done.figures["greedy"]["success"]["share"]
-    assert done.as_dict()["trained"]["frames"] > 0
+    assert done.figures["oracle"].mean_goals == 2.0
+    assert done.success == done.greedy.success.share
+    assert done.trained["frames"] > 0
     assert said[0] == ("most probable actions", 0, 3)
     assert said[-1] == ("evaluated", 3, 3)
     assert "<td>success rate</td>" in done._repr_html_()
@@ -52,29 +53,33 @@ def test_evaluation_without_baselines(good):
 
 def test_table_of_an_evaluation(good):
     def flown(success, left):
-        return {
-            "success": proportion(*success),
-            "shares": {s: mean_bounds(left) for s in ("all", "left", "ahead", "right")},
-            "ends": {"step_limit": proportion(1, 4)},
-            "never_reached": mean_bounds([0.25]),
-            "mean_goals": 1.5,
-            "mean_length": 40.0,
-            "episodes": 4,
-        }
+        return Figures(
+            success=proportion(*success),
+            shares={s: dict(mean_bounds(left)) for s in ("all", "left", "ahead", "right")},
+            ends={"step_limit": proportion(1, 4)},
+            never_reached=mean_bounds([0.25]),
+            mean_goals=1.5,
+            mean_length=40.0,
+            episodes=4,
+        )
 
-    figures = {"greedy": flown((1, 4), [0.5] * 100), "oracle": flown((4, 4), [])}
-    seed = RootSeed(8, is_fixed=False)
-    told = str(Evaluation(good, drone_rl.EvaluateSettings(), figures, seed)).splitlines()
+    ours, best = flown((1, 4), [0.5] * 100), flown((4, 4), [])
+    figures = {"greedy": ours, "sampled": ours, "oracle": best}
+    seed = {"seed": 8, "seed_is_fixed": False}
+    told = str(Evaluation(policy="good", terms=CUBES, **seed, **figures)).splitlines()
     assert told[-1] == "environments: seed 8 (fresh)"
     rows = told[:-1]
-    assert rows[0].split() == ["greedy", "oracle"]
-    assert rows[1].split() == ["success", "rate", "25.0%", "100%"]
-    assert re.split(" {2,}", rows[2].strip()) == ["95% CI", "0.6 to 80.6"]  # of the policy only
-    assert rows[5].split() == ["on", "its", "left", "50.0%", "-"]
-    assert rows[13].split() == ["end:", "step", "limit", "1", "1"]
+    assert rows[0].split() == ["greedy", "sampled", "oracle"]
+    assert rows[1].split() == ["success", "rate", "25.0%", "25.0%", "100%"]
+    assert re.split(" {2,}", rows[2].strip()) == [
+        "95% CI",
+        *["0.6% to 80.6%"] * 2,
+    ]  # of the policy only
+    assert rows[5].split() == ["on", "its", "left", "50.0%", "50.0%", "-"]
+    assert rows[13].split() == ["end:", "step", "limit", "1", "1", "1"]
     whole = [row for row in rows if "95% CI" not in row]
     assert len({len(row) for row in whole}) == 1
-    assert all(len(re.split(" {2,}", row)) == 3 for row in whole)  # no two columns touch
+    assert all(len(re.split(" {2,}", row)) == 4 for row in whole)  # no two columns touch
 
 
 def test_another_appearance_is_named(good):
@@ -84,16 +89,12 @@ def test_another_appearance_is_named(good):
         AppearanceSettings(shadows=1.0),
     )
     done = drone_rl.judge(good, appearance=fog, **few)
-    said = (
-        "It was trained with another appearance: here it flew with appearance.shadows=1 instead of"
-    )
-    assert said in str(done) and said in done.as_dict()["sentence"]
-    assert done.as_dict()["unlike"] == {"appearance.shadows": {"own": 0.0, "flown": 1.0}}
+    said = "It was trained with other settings: here it flew with appearance.shadows=1 instead of"
+    assert said in str(done) and said in done.sentence
+    assert dict(done.unlike["appearance.shadows"]) == {"own": 0.0, "flown": 1.0}
     two = {"episodes": 2, "num_envs": 2, "baselines": False, "progress": silent}
     found = drone_rl.evaluate(good, appearance=fog, **two)
-    assert said in str(found) and "appearance.shadows" in found.as_dict()["unlike"]
-    found = drone_rl.evaluate(good, appearance=fog, dynamics={"mode": "simple_flight"}, **two)
-    assert "with other dynamics and another appearance: " in str(found)
+    assert said in str(found) and "appearance.shadows" in found.unlike
     with pytest.raises(InputError, match="policy=forward sees no images"):
         drone_rl.judge("forward", appearance=fog, **few)
 
@@ -106,18 +107,18 @@ def test_other_dynamics_are_named(good, monkeypatch):
     changed = {"mode": {"own": "computer_vision", "flown": "simple_flight"}}
     assert done.as_dict()["unlike"] == changed
     assert "here it flew with dynamics.mode=simple_flight instead of computer_vision." in str(done)
-    assert "unlike" not in drone_rl.judge(good, **few).as_dict()
+    assert not drone_rl.judge(good, **few).unlike
     luck = drone_rl.judge(
         "forward", task={"num_cubes": 1}, dynamics={"mode": "simple_flight"}, **few
     )
-    assert "unlike" not in luck.as_dict()
+    assert not luck.unlike
     moved = good.in_dynamics(mode="simple_flight", wind=[-5.0, 0.0, 0.0])
     few = {"episodes": 2, "num_envs": 2, "seed": 1, "progress": silent}  # the same placements
     done = drone_rl.evaluate(moved, **few)
     assert "dynamics.wind=[-5, 0, 0] instead of [0, 0, 0]" in str(done)
-    assert done.as_dict()["unlike"]["wind"]["flown"] == [-5.0, 0.0, 0.0]
-    steps = done.figures["forward"]["mean_length"]  # against half a metre of wind a step
-    assert steps > drone_rl.evaluate(good, **few).figures["forward"]["mean_length"]
+    assert done.unlike["wind"].flown == [-5.0, 0.0, 0.0]
+    steps = done.figures["forward"].mean_length  # against half a metre of wind a step
+    assert steps > drone_rl.evaluate(good, **few).figures["forward"].mean_length
 
 
 def test_oracle_of_other_actions_is_refused(good, monkeypatch):

@@ -2,17 +2,16 @@
 
 import json
 import re
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import drone_rl
-from drone_rl.trust.judge import Judgements
-from drone_rl.trust.rule import VerdictKind
+from drone_rl.trust.judge import Judgement, Judgements
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import RootSeed
+from tests.evidence import VERDICT, changed
 from tests.verification.checker.making import of_every_place
 
 
@@ -35,19 +34,17 @@ def refused(*_):
 
 def test_several_policies(good):
     done = drone_rl.judge(["oracle", "left"], episodes=150, progress=silent)
-    assert [one.name for one in done] == ["oracle", "left"] and len(done) == 2
+    assert [one.policy for one in done] == ["oracle", "left"] and len(done) == 2
     assert done[1].verdict.kind == "poor" and done[:1][0] is done[0]
     assert str(done).splitlines()[1].split()[:3] == ["oracle", "good", "yes"]
     assert "<td>poor</td>" in done._repr_html_()
-    seed = done[0].verdict.evidence["seed"]
-    assert (
-        done[1].verdict.evidence["seed"] == seed and not done[1].verdict.evidence["seed_is_fixed"]
-    )
+    seed = done[0].seed
+    assert done[1].seed == seed and not done[1].seed_is_fixed
     fresh = RootSeed(seed, False)
     alone = drone_rl.judge("left", episodes=150, progress=silent, drawn_seed=fresh)
-    assert alone.verdict.evidence == done[1].verdict.evidence
+    assert alone == done[1]
     both = drone_rl.judge((good, "oracle"), episodes=2, sampled=False, progress=silent)
-    assert [one.name for one in both] == ["good", "oracle"]
+    assert [one.policy for one in both] == ["good", "oracle"]
     with pytest.raises(InputError, match=r"policy=\[\] is empty"):
         drone_rl.judge([])
     with pytest.raises(InputError, match="policy=nope does not exist"):
@@ -63,11 +60,11 @@ def test_verdict_with_a_certificate(good, tmp_path):
     how = {"certificate": path, "episodes": 8, "sampled": False, "progress": silent}
     done = drone_rl.judge(good, task={"num_cubes": 1}, certificate_flights=400, **how)
     assert done.verdict.is_proved
-    assert "A certificate states for every placement" in str(done)
-    assert "re-checked by 400 rollouts from fresh placements" in str(done)
-    assert (done.as_dict()["certificate"], done.as_dict()["proof"]["agreeing"]) == (str(path), 8)
+    assert "it collects every cube from every placement." in str(done)
+    assert "400 rollouts from fresh placements" in str(done)
+    assert (done.certificate, done.proof.agreeing) == (str(path), 8)
     again = drone_rl.judge(good, task={"num_cubes": 1}, certificate_flights=50, **how)
-    seeds = [one.as_dict()["proof"]["seed"] for one in (done, again)]
+    seeds = [one.proof.seed for one in (done, again)]
     assert seeds[0] != seeds[1]
     unchecked = drone_rl.judge(good, task={"num_cubes": 1}, certificate_flights=0, **how)
     assert not unchecked.verdict.is_proved
@@ -94,7 +91,7 @@ def test_contradicted_certificate_proves_nothing(tmp_path):
 def test_verdict_on_a_baseline_in_another_task():
     done = drone_rl.judge("left", task={"num_cubes": 1}, episodes=200, progress=silent)
     assert done.verdict.kind == "poor"
-    assert done.as_dict()["num_cubes"] == 1
+    assert done.num_cubes == 1
 
 
 @pytest.mark.parametrize(
@@ -115,14 +112,13 @@ def test_wrong_arguments(change, message):
 def test_seeds_are_fresh_and_reproduce_a_verdict(good):
     how = {"episodes": 12, "sampled": True, "task": {"num_cubes": 1}, "progress": silent}
     one, other = (drone_rl.judge(good, **how) for _ in range(2))
-    first, second = one.verdict.evidence, other.verdict.evidence
-    assert first["seed"] != second["seed"]
-    assert not first["seed_is_fixed"]
+    first, second = one, other
+    assert first.seed != second.seed
+    assert not first.seed_is_fixed
     printed = re.search(r"environments: seed (\d+) \(fresh\)", str(one))
     assert printed is not None
-    again = drone_rl.judge(good, seed=int(printed[1]), **how).verdict.evidence
-    assert again == {**first, "seed_is_fixed": True}
-    assert one.settings.seed == first["seed"]
+    again = drone_rl.judge(good, seed=int(printed[1]), **how)
+    assert again == first.replace(seed_is_fixed=True)
 
 
 def test_changes_are_refused_before_any_episode(good):
@@ -135,28 +131,18 @@ def test_changes_are_refused_before_any_episode(good):
 def test_task_settings_of_a_baseline():
     task = drone_rl.TaskSettings(num_cubes=1)
     done = drone_rl.judge("oracle", task=task, episodes=2, progress=silent)
-    assert done.as_dict()["num_cubes"] == 1
+    assert done.num_cubes == 1
     with pytest.raises(InputError, match=r"^policy=\(ndarray\) is no policy"):
         drone_rl.judge(np.zeros(3), progress=refused)
 
 
-def judged(name, kind, certain, share):
-    success = {"share": share, "lower95": share - 0.05, "upper95": share + 0.05}
-    verdict = SimpleNamespace(kind=kind, certain=certain, evidence={"greedy": {"success": success}})
-    return SimpleNamespace(name=name, verdict=verdict)
-
-
-@pytest.fixture
-def both():
-    return Judgements(
-        (judged("a", VerdictKind.GOOD, True, 0.95), judged("<b>", VerdictKind.POOR, False, 0.1))
-    )
-
-
-def test_table_of_judgements(both):
+def test_table_of_judgements():
+    share = {"share": 0.95, "lower95": 0.9, "upper95": 1.0, "successes": 95, "trials": 100}
+    good = {"kind": "good", "greedy.success": share}
+    judged = {"a": changed(VERDICT, good), "<b>": changed(VERDICT, {"certain": False})}
+    both = Judgements(tuple(Judgement(policy=n, **v) for n, v in judged.items()))
     assert both.rows() == [
         ["policy", "verdict", "certain", "success rate (95% CI)"],
-        ["a", "good", "yes", "95.0% (90.0 to 100.0)"],
-        ["<b>", "poor", "no", "10.0% (5.0 to 15.0)"],
+        ["a", "good", "yes", "95.0% (90.0% to 100%)"],
+        ["<b>", "none of these", "no", "60.0% (58.0% to 62.0%)"],
     ]
-    assert [line.split()[0] for line in str(both).splitlines()] == ["policy", "a", "<b>"]

@@ -5,6 +5,7 @@ from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.sim.tasks import CollectCubes, Goals
 from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.trust.metrics import summarise
+from drone_rl.trust.results import GoalShare
 from drone_rl.utils.intervals import mean_bounds, proportion
 from tests.second_task import End, Posts
 
@@ -39,17 +40,19 @@ def test_episodes_from_the_last_step():
 
 def test_summary_by_hand(episodes):
     summary = summarise(episodes)
-    assert summary["success"] == proportion(1, 3)
-    assert summary["mean_goals"] == 1.0
-    shares = summary["shares"]
-    assert shares["all"] == {**mean_bounds([1.0, 0.5, 0.0]), "goals": 6}
-    assert shares["left"] == {**mean_bounds([1.0, 0.5]), "goals": 4}  # an episode counts once
-    assert shares["right"] == {**mean_bounds([0.0]), "goals": 1}
-    assert summary["never_reached"] == mean_bounds([0.0, 0.0, 0.5])
-    ends = {name: end["successes"] for name, end in summary["ends"].items()}
+    assert summary.success == proportion(1, 3)
+    assert summary.mean_goals == 1.0
+    shares = summary.shares
+    assert shares["all"] == GoalShare(**dict(mean_bounds([1.0, 0.5, 0.0])), goals=6)
+    assert shares["left"] == GoalShare(
+        **dict(mean_bounds([1.0, 0.5])), goals=4
+    )  # an episode counts once
+    assert shares["right"] == GoalShare(**dict(mean_bounds([0.0])), goals=1)
+    assert summary.never_reached == mean_bounds([0.0, 0.0, 0.5])
+    ends = {name: end.successes for name, end in summary.ends.items()}
     none = {"side_boundary": 0, "lost_control": 0}
     assert ends == {"all_cubes": 1, "front_boundary": 1, "step_limit": 1, **none}
-    assert (summary["mean_length"], summary["max_length"]) == (30.0, 60)
+    assert (summary.mean_length, summary.max_length) == (30.0, 60)
 
 
 def test_rate_of_one_stratum(episodes):
@@ -59,9 +62,9 @@ def test_rate_of_one_stratum(episodes):
 
 
 def test_stratum_without_goals_has_no_rate(episodes):
-    ahead = summarise(episodes)["shares"]["ahead"]
-    assert ahead["mean"] is None
-    assert (ahead["lower95"], ahead["upper95"], ahead["count"], ahead["goals"]) == (0, 1, 0, 0)
+    ahead = summarise(episodes).shares["ahead"]
+    assert ahead.mean is None
+    assert (ahead.lower95, ahead.upper95, ahead.count, ahead.goals) == (0, 1, 0, 0)
 
 
 def test_intervals_count_episodes_not_goals():
@@ -80,9 +83,9 @@ def test_intervals_count_episodes_not_goals():
         )
         for cubes in (1, 3)
     ]
-    one, three = (summarise(e)["shares"]["left"] for e in alike)
-    assert (one["lower95"], one["upper95"]) == (three["lower95"], three["upper95"])
-    assert one["lower95"] < proportion(90, 100)["lower95"]
+    one, three = (summarise(e).shares["left"] for e in alike)
+    assert (one.lower95, one.upper95) == (three.lower95, three.upper95)
+    assert one.lower95 < proportion(90, 100).lower95
 
 
 def test_selecting_episodes(episodes):
@@ -103,9 +106,9 @@ def test_summary_of_another_task():
         Posts(), goals, torch.tensor([End.THROUGH, End.TOUCHED]), torch.ones(2).long()
     )
     summary = summarise(flown)
-    assert {n: e["successes"] for n, e in summary["ends"].items()} == {
+    assert {n: e.successes for n, e in summary.ends.items()} == {
         "through": 1, "touched": 1, "time": 0,
     }  # fmt: skip
-    assert {n: s["mean"] for n, s in summary["shares"].items()} == {
+    assert {n: s.mean for n, s in summary.shares.items()} == {
         "all": 0.5, "left": 1.0, "right": 0.5,
     }  # fmt: skip

@@ -13,8 +13,8 @@ LEFT, AHEAD, RIGHT = Side
 
 
 def row(table, by, value):
-    (found,) = [r for r in table["rows"] if (r["by"], r["value"]) == (by, value)]
-    return found["episodes"], found["failed"]
+    (found,) = [r for r in table.rows if (r.by, r.value) == (by, value)]
+    return found.episodes, found.failed
 
 
 @pytest.fixture
@@ -38,17 +38,17 @@ def test_episode_fails_once_at_its_first_miss(episodes):
     assert row(table, "end", "front_boundary") == (3, 1)
     assert row(table, "end", "side_boundary") == (3, 1)
     assert row(table, "end", "step_limit") == (3, 0)
-    assert table["bound"] == proportion(2, 3)
-    assert table["largest"]["value"] == "1.65 to 4 m"
+    assert table.bound == proportion(2, 3)
+    assert table.largest.value == "1.65 to 4 m"
 
 
 def test_failure_intervals_are_simultaneous(episodes):
-    rows = failure_table(episodes)["rows"]
+    rows = failure_table(episodes).rows
     assert len(rows) == 3 + 3 + 4 + 4
     exact = proportion(1, 2, 1 - 0.05 / len(rows))
-    second = next(r for r in rows if r["value"] == "second")
-    assert (second["lower95"], second["upper95"]) == (exact["lower95"], exact["upper95"])
-    assert second["share"] == 0.5
+    second = next(r for r in rows if r.value == "second")
+    assert (second.lower95, second.upper95) == (exact.lower95, exact.upper95)
+    assert second.share == 0.5
 
 
 def test_failures_by_height(make_episodes):
@@ -60,36 +60,36 @@ def test_failures_by_height(make_episodes):
     assert row(table, "height", "level") == (1, 0)
     assert row(table, "height", "lower") == (1, 0)
     level = failure_table(make_episodes([[AHEAD]], [[0]]))
-    assert not [r for r in level["rows"] if r["by"] == "height"]
+    assert not [r for r in level.rows if r.by == "height"]
 
 
 def test_failure_table_without_failures(make_episodes):
     table = failure_table(make_episodes([[LEFT, RIGHT]] * 400, [[1, 1]] * 400))
-    assert table["largest"] is None
-    assert table["bound"]["upper95"] == pytest.approx(1 - 0.025 ** (1 / 400))
+    assert table.largest is None
+    assert table.bound.upper95 == pytest.approx(1 - 0.025 ** (1 / 400))
 
 
 def test_largest_failure_has_the_largest_product(make_episodes):
     """All failures are at first cubes, and all of these ahead: every second one."""
     sides = [[AHEAD if i < 50 else LEFT, RIGHT] for i in range(100)]
     hits = [[i >= 25, i >= 25] for i in range(100)]
-    largest = failure_table(make_episodes(sides, hits))["largest"]
-    assert (largest["by"], largest["value"]) == ("side", "ahead")
-    assert (largest["failed"], largest["episodes"]) == (25, 50)
+    largest = failure_table(make_episodes(sides, hits)).largest
+    assert (largest.by, largest.value) == ("side", "ahead")
+    assert (largest.failed, largest.episodes) == (25, 50)
 
 
 def test_expected_end_is_not_the_largest_failure(make_episodes):
     table = failure_table(make_episodes([[LEFT], [RIGHT]] * 10, [[0], [0]] * 10))
     assert row(table, "end", "front_boundary") == (20, 20)
-    assert table["largest"]["by"] == "cube"
+    assert table.largest.by == "cube"
 
 
 def test_largest_failure_weighs_count_and_rate(make_episodes):
     """100 of 300 on the left and 30 of 40 on the right are 130 of 340 that are as far aside."""
     sides = [[LEFT]] * 300 + [[RIGHT]] * 40 + [[AHEAD]] * 660
     hits = [[i >= 100] for i in range(300)] + [[i >= 30] for i in range(40)] + [[1]] * 660
-    largest = failure_table(make_episodes(sides, hits))["largest"]
-    assert (largest["by"], largest["failed"], largest["episodes"]) == ("sideways", 130, 340)
+    largest = failure_table(make_episodes(sides, hits)).largest
+    assert (largest.by, largest.failed, largest.episodes) == ("sideways", 130, 340)
 
 
 def test_failures_of_another_task():
@@ -101,13 +101,13 @@ def test_failures_of_another_task():
     )
     ends = torch.tensor([End.THROUGH, End.TOUCHED, End.TIME])
     table = failure_table(CompleteEpisodes(Posts(), goals, ends, torch.tensor([7, 2, 12])))
-    assert [(r["by"], r["value"]) for r in table["rows"]] == [
+    assert [(r.by, r.value) for r in table.rows] == [
         ("side", "left"), ("side", "right"), ("end", "touched"), ("end", "time"),
     ]  # fmt: skip
     assert row(table, "side", "left") == (2, 1)
     assert row(table, "side", "right") == (2, 1)
     assert row(table, "end", "touched") == row(table, "end", "time") == (3, 1)
-    assert table["largest"]["by"] == "side"  # of the ends, time is what is expected
+    assert table.largest.by == "side"  # of the ends, time is what is expected
 
 
 def test_all_goals_without_success_is_a_failure():
@@ -118,6 +118,6 @@ def test_all_goals_without_success_is_a_failure():
     )
     ends = torch.tensor([End.THROUGH, End.TOUCHED])
     table = failure_table(CompleteEpisodes(Posts(), goals, ends, torch.tensor([7, 7])))
-    assert table["bound"] == proportion(1, 2)
+    assert table.bound == proportion(1, 2)
     assert row(table, "end", "touched") == (2, 1)
-    assert (table["largest"]["by"], table["largest"]["value"]) == ("end", "touched")
+    assert (table.largest.by, table.largest.value) == ("end", "touched")

@@ -12,12 +12,13 @@ from drone_rl.trust.recorded import (
     record_verdict,
     recorded_verdict,
 )
+from drone_rl.trust.results import Verdict
 from drone_rl.utils.checkpoint import save_checkpoint
+from tests.evidence import VERDICT
 
 
-def verdict(kind, **more):
-    success = {"share": 0.5, "lower95": 0.4, "upper95": 0.6}
-    return {"kind": kind, "certain": True, "greedy": {"success": success}, **more}
+def verdict(kind):
+    return Verdict.read({**VERDICT, "kind": kind})
 
 
 @pytest.fixture
@@ -28,7 +29,7 @@ def trained(tmp_path):
     (folder / "checkpoints").mkdir(parents=True)
     save_checkpoint(folder / "checkpoints" / "last.pt", {**state, "config": {}})
     frames = state["progress"]["frames"]
-    result = {"reason": "solved", "frames": frames, "verdict": verdict("poor")}
+    result = {"reason": "solved", "frames": frames, "verdict": verdict("poor").as_dict()}
     path = folder / "result.json"
     path.write_text(json.dumps(result))
     os.utime(path, (100, 100))
@@ -47,13 +48,13 @@ def record(policy, outputs, name, kind, when):
 
 
 def test_the_newest_of_a_run_and_of_commands_counts(trained, tmp_path):
-    assert describe(newest(trained, tmp_path)) == ("poor", "50.0% (40.0 to 60.0)")
+    assert describe(newest(trained, tmp_path)) == ("poor", "60.0% (58.0% to 62.0%)")
     record(trained, tmp_path, "verdict/runs/1", "good", 90)  # before the training ended
-    assert newest(trained, tmp_path)["kind"] == "poor"
+    assert newest(trained, tmp_path).kind == "poor"
     record(trained, tmp_path, "export/runs/1", "good", 110)
-    assert newest(trained, tmp_path)["kind"] == "good"
+    assert newest(trained, tmp_path).kind == "good"
     record(trained, tmp_path, "explain/runs/1/0_one", "one-sided (left)", 120)
-    assert newest(trained, tmp_path)["kind"] == "one-sided (left)"
+    assert newest(trained, tmp_path).kind == "one-sided (left)"
 
 
 def test_verdicts_on_others_or_in_other_conditions_do_not_count(trained, tmp_path):
@@ -62,13 +63,15 @@ def test_verdicts_on_others_or_in_other_conditions_do_not_count(trained, tmp_pat
     record(trained.in_dynamics(mode="simple_flight"), tmp_path, "verdict/runs/3", "good", 200)
     (tmp_path / "verdict" / "runs" / "4").mkdir()
     (tmp_path / "verdict" / "runs" / "4" / "verdict.json").write_text("[")
-    assert newest(trained, tmp_path)["kind"] == "poor"
+    assert newest(trained, tmp_path).kind == "poor"
 
 
 def test_a_damaged_verdict_is_passed_over(trained, tmp_path):
     record(trained, tmp_path, "verdict/runs/1", "good", 110)
-    record(trained, tmp_path, "verdict/runs/2", "\x1b[2Jsplendid", 120)
-    assert newest(trained, tmp_path)["kind"] == "good"
+    record(trained, tmp_path, "verdict/runs/2", "poor", 120)
+    path = tmp_path / "verdict" / "runs" / "2" / "verdict.json"
+    path.write_text(path.read_text().replace('"poor"', '"splendid"', 1))
+    assert newest(trained, tmp_path).kind == "good"
 
 
 def test_a_judgement_is_found(tmp_path):
@@ -77,4 +80,4 @@ def test_a_judgement_is_found(tmp_path):
     done.save(tmp_path / "verdict" / "runs" / "1" / "verdict.json")
     os.utime(tmp_path / "verdict" / "runs" / "1" / "verdict.json", (1e11, 1e11))
     policy = drone_rl.load_policy("right_and_forward")
-    assert newest(policy, tmp_path)["greedy"]["episodes"] == 50
+    assert newest(policy, tmp_path).greedy.episodes == 50

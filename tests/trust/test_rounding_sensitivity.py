@@ -53,14 +53,14 @@ def test_an_honest_policy_takes_the_same_actions_in_both_implementations():
     assert [len(a) for a in log.actions] == flown.length.tolist()
     assert (found.compared, found.compared_episodes, found.unexplained) == ("PyTorch", EPISODES, 0)
     assert found.frames == int(flown.length.sum())
-    assert not found.is_excessive
+    assert not found.excessive
     assert found.arithmetic == "float32 on cpu, fused kernel"
 
 
 def test_a_policy_that_acts_by_the_order_of_sums_is_found():
     found, _, _ = examined(with_unit(1000.0))
     assert found.fragile == found.frames
-    assert found.is_excessive
+    assert found.excessive
     assert found.differing == EPISODES
     assert found.unexplained == 0  # the bound knows
 
@@ -87,7 +87,7 @@ def test_callables_that_act_by_more_than_the_frame_are_refused(kind):
 
 def test_a_callable_that_acts_by_the_frame_passes():
     found, _, _ = examined(policy_from(lambda x: x[:, 0, 10:13, 5] * 100))
-    assert not found.is_bound
+    assert not found.bound
     assert found.unexplained == 0
 
 

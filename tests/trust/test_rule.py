@@ -58,16 +58,20 @@ def test_kinds_by_hand(found, kind):
     assert decide(found) is kind
 
 
+def quantity(value, lower=0.0, upper=1.0):
+    return Quantity(value=value, lower=lower, upper=upper, thresholds=(0.3, 0.7))
+
+
 def test_level_at_a_threshold():
     assert [level(x, (0.3, 0.7)) for x in (0.29, 0.3, 0.31, 0.7, 0.71)] == [0, 0, 1, 1, 2]
-    assert Quantity(0.7 + 1e-12, 0.0, 1.0, (0.3, 0.7)).level == 1  # rounding
-    assert Quantity(None, 0.0, 1.0, (0.3, 0.7)).level == 0
+    assert quantity(0.7 + 1e-12).level == 1  # rounding
+    assert quantity(None).level == 0
 
 
 def test_levels_of_an_interval():
-    assert Quantity(0.5, 0.4, 0.6, (0.3, 0.7)).levels == (1, 1)
-    assert Quantity(0.5, 0.3, 0.7, (0.3, 0.7)).levels == (0, 2)  # ends are within it
-    assert Quantity(0.9, 0.0, 1.0, (0.3, 0.7)).levels == (0, 2)
+    assert quantity(0.5, 0.4, 0.6).levels == (1, 1)
+    assert quantity(0.5, 0.3, 0.7).levels == (0, 2)  # ends are within it
+    assert quantity(0.9).levels == (0, 2)
 
 
 def test_thresholds_of_every_quantity():

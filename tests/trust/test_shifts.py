@@ -1,7 +1,5 @@
 """Flights under other conditions from Python: a policy, a liar, mistakes."""
 
-import json
-
 import pytest
 import torch
 
@@ -21,29 +19,27 @@ def done():
 
 
 def test_shifts_in_python(done):
-    numbers = done.numbers
-    assert [*numbers["axes"]] == ["brightness", "late_frames"]
-    assert numbers["policy"] == "good" and numbers["settings"]["episodes"] == 12
-    dark = numbers["axes"]["brightness"]["levels"][0]
-    assert dark["value"] == 0.1 and dark["modes"]["constant"]["success"]["share"] < 0.5
-    assert numbers["plain"]["success"]["share"] == 1.0
-    assert done.area == pytest.approx(
-        sum(a["areas"]["constant"] for a in numbers["axes"].values()) / 2
-    )
-    assert [len(strip) for strip in done.pictures.values()] == [6, 6]
+    numbers = done
+    assert [*numbers.axes] == ["brightness", "late_frames"]
+    assert numbers.policy == "good" and numbers.settings.episodes == 12
+    dark = numbers.axes["brightness"].levels[0]
+    assert dark.value == 0.1 and dark.modes["constant"].success.share < 0.5
+    assert numbers.plain.success.share == 1.0
+    assert done.area == pytest.approx(sum(a.areas["constant"] for a in numbers.axes.values()) / 2)
+    assert [len(done.frames(name)) for name in done.axes] == [6, 6]
 
 
 def test_few_episodes_give_no_range(done):
     """Twenty flights are too few to be certain of anything."""
-    domain = done.numbers["domain"]
-    assert not domain["plain"]["good"] and not domain["plain"]["bad"]
+    domain = done.domain
+    assert not domain.plain.good and not domain.plain.bad
     assert "no range" in done.sentence and "Good with" not in done.sentence
 
 
 def test_shifts_files(done, tmp_path):
     done.save(tmp_path)
-    kept = json.loads((tmp_path / "shifts.json").read_text())
-    assert kept["axes"].keys() == done.numbers["axes"].keys() and "settings" in kept
+    kept = drone_rl.Shifts.read_json(tmp_path / "shifts.json")
+    assert kept.axes == done.axes and kept.versions
     for name in ("shifts.png", "strips.png"):
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
     text = str(done)
@@ -61,8 +57,8 @@ def test_blind_policy_has_no_range():
     )
     told = {**FEW, "domain_episodes": 400, "axes": ["noise", "object_size"]}
     found = drone_rl.shifts(blind, modes=["constant"], **told)
-    assert found.numbers["plain"]["success"]["share"] == 1.0
-    assert all(r["positions"] is None for r in found.numbers["domain"]["ranges"].values())
+    assert found.plain.success.share == 1.0
+    assert all(r.positions is None for r in found.domain.ranges.values())
     assert "no range" in found.sentence and "Good with" not in found.sentence
 
 
@@ -90,8 +86,8 @@ def test_task_without_an_oracle_has_no_range(monkeypatch):
     with pytest.raises(InputError, match="has no oracle to compare with; give domain=false"):
         drone_rl.shifts("good", **told)
     found = drone_rl.shifts("good", domain=False, **told)
-    assert found.numbers["plain"]["oracle"] is None and found.numbers["domain"] is None
-    assert found.numbers["axes"]["noise"]["levels"][0]["impossible"] is None
+    assert found.plain.oracle is None and found.domain is None
+    assert found.axes["noise"].levels[0].impossible is None
 
 
 def test_shifts_with_other_dynamics():
@@ -105,7 +101,7 @@ def test_shifts_with_other_dynamics():
         **{**FEW, "episodes": 2},
     )
     assert "dynamics.mode=simple_flight instead of computer_vision" in str(found)
-    assert found.numbers["network"]["description"]["dynamics"]["mode"] == "simple_flight"
+    assert found.network.description["dynamics"]["mode"] == "simple_flight"
 
 
 def test_derived_task_is_refused():

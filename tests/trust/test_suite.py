@@ -30,46 +30,46 @@ def test_the_area_under_a_curve_by_hand():
 
 def test_axis_by_strength(suite):
     found = suite.run([AXES["object_size"], AXES["object_color"]], [1, 5], silent)
-    plain = found["plain"]["success"]["share"]
+    plain = found["plain"].success.share
     along = found["axes"]["object_size"]
-    assert (along["group"], along["unit"], along["neutral"]) == ("object size", "m", 2.5)
-    assert [level["number"] for level in along["levels"]] == [1, 5]
-    assert [level["value"] for level in along["levels"]] == [2.25, 1.25]
-    small = along["levels"][1]
-    assert set(small["modes"]) == {"constant", "onset"}  # a size does not drift
-    figures = small["modes"]["constant"]
-    assert figures["success"]["share"] < plain  # what is smaller is hit less often
-    difference = figures["success"]["share"] - plain
-    assert figures["difference"]["mean"] == pytest.approx(difference)
-    shares = figures["shares"]
+    assert (along.group, along.unit, along.neutral) == ("object size", "m", 2.5)
+    assert [level.number for level in along.levels] == [1, 5]
+    assert [level.value for level in along.levels] == [2.25, 1.25]
+    small = along.levels[1]
+    assert set(small.modes) == {"constant", "onset"}  # a size does not drift
+    figures = small.modes["constant"]
+    assert figures.success.share < plain  # what is smaller is hit less often
+    difference = figures.success.share - plain
+    assert figures.difference.mean == pytest.approx(difference)
+    shares = figures.shares
     assert set(shares) == {"all", "left", "ahead", "right"}
-    assert shares["left"]["mean"] == shares["right"]["mean"] == 0.0 < shares["ahead"]["mean"]
-    assert sum(figures["ends"].values()) == figures["success"]["trials"] == 20
-    assert found["plain"]["oracle"]["share"] == 1.0 and small["impossible"] is False
-    drifting = found["axes"]["object_color"]["levels"][1]["modes"]["drifting"]
-    assert drifting["success"]["share"] == plain and not drifting["unchanged"]
-    assert found["axes"]["object_color"]["areas"]["constant"] == pytest.approx(plain)
+    assert shares["left"].mean == shares["right"].mean == 0.0 < shares["ahead"].mean
+    assert sum(figures.ends.values()) == figures.success.trials == 20
+    assert found["plain"].oracle.share == 1.0 and small.impossible is False
+    drifting = found["axes"]["object_color"].levels[1].modes["drifting"]
+    assert drifting.success.share == plain and not drifting.unchanged
+    assert found["axes"]["object_color"].areas["constant"] == pytest.approx(plain)
     # a size of 3/4 at the third strength, which this policy minds, and colors, which it does not
-    assert found["together"]["modes"]["constant"]["success"]["share"] <= plain
+    assert found["together"].modes["constant"].success.share <= plain
 
 
 def test_unchanged_episodes_are_noticed(suite):
     level = suite.level(Condition())
-    assert level["modes"]["constant"]["unchanged"]
-    assert level["modes"]["constant"]["difference"]["mean"] == 0.0
+    assert level.modes["constant"].unchanged
+    assert level.modes["constant"].difference.mean == 0.0
     tinted = suite.level(AXES["object_color"].make(0.3, suite._evaluator.subject))
-    assert not tinted["modes"]["constant"]["unchanged"]
+    assert not tinted.modes["constant"].unchanged
 
 
 def test_impossible_condition(suite):
     level = suite.level(Condition(faults=(dead_rows(5),)))
-    assert level["impossible"] and level["oracle"]["upper95"] < 0.9
+    assert level.impossible and level.oracle.upper95 < 0.9
 
 
 def test_refused_condition(suite):
     level = suite.level(Condition(task={"cube_size": 9.0}))
-    assert level["refused"].startswith("task.altitude=2.5") and level["modes"] == {}
-    assert level["impossible"] is None
+    assert level.refused.startswith("task.altitude=2.5") and level.modes == {}
+    assert level.impossible is None
 
 
 def test_strip_has_every_strength():

@@ -19,41 +19,41 @@ QUICK = settings(max_examples=30, deadline=None)
 def test_clopper_pearson_by_known_values():
     # the rule of three's exact form: no failure in n gives a lower end of (alpha/2)^(1/n)
     result = proportion(1000, 1000)
-    assert result["lower95"] == pytest.approx(0.025 ** (1 / 1000))
-    assert result["upper95"] == 1.0
+    assert result.lower95 == pytest.approx(0.025 ** (1 / 1000))
+    assert result.upper95 == 1.0
     five = proportion(5, 10)
-    assert (five["lower95"], five["upper95"]) == pytest.approx((0.1871, 0.8129), abs=1e-4)
+    assert (five.lower95, five.upper95) == pytest.approx((0.1871, 0.8129), abs=1e-4)
     none = proportion(0, 10)
-    assert (none["lower95"], none["upper95"]) == pytest.approx((0.0, 0.3085), abs=1e-4)
+    assert (none.lower95, none.upper95) == pytest.approx((0.0, 0.3085), abs=1e-4)
 
 
 def test_low_confidence_by_hand():
     """The tail is 0.3 on either side."""
-    assert proportion(1, 1, confidence=0.4)["lower95"] == pytest.approx(0.3)
-    assert mean_bounds([1.0], confidence=0.4)["lower95"] == pytest.approx(1.5 / (2 / 0.3 - 0.5))
+    assert proportion(1, 1, confidence=0.4).lower95 == pytest.approx(0.3)
+    assert mean_bounds([1.0], confidence=0.4).lower95 == pytest.approx(1.5 / (2 / 0.3 - 0.5))
     assert median_bounds(range(10), confidence=0.4) == (3.0, 6.0)  # 176 of 1024 are outside
 
 
 def test_proportion_without_trials():
     result = proportion(0, 0)
-    assert result["share"] is None
-    assert (result["lower95"], result["upper95"]) == (0.0, 1.0)
+    assert result.share is None
+    assert (result.lower95, result.upper95) == (0.0, 1.0)
 
 
 def test_mean_bounds_without_values_and_of_equal_values():
-    assert mean_bounds([]) == {"mean": None, "lower95": 0.0, "upper95": 1.0, "count": 0}
+    assert mean_bounds([]) == Mean(mean=None, lower95=0.0, upper95=1.0, count=0)
     ones = mean_bounds(np.ones(400))
-    assert ones["upper95"] == 1.0
-    assert 0.98 < ones["lower95"] < 0.025 ** (1 / 400)  # can't beat the exact interval
+    assert ones.upper95 == 1.0
+    assert 0.98 < ones.lower95 < 0.025 ** (1 / 400)  # can't beat the exact interval
     mirrored = mean_bounds(-np.ones(400), -1.0, 1.0)
-    assert mirrored["upper95"] == pytest.approx(-(2 * ones["lower95"] - 1))
+    assert mirrored.upper95 == pytest.approx(-(2 * ones.lower95 - 1))
 
 
 def test_mean_bounds_contain_the_exact_interval_of_a_share():
     values = np.repeat([1.0, 0.0], [360, 40])
     bounds, exact = mean_bounds(values), proportion(360, 400)
-    assert bounds["lower95"] < exact["lower95"] < 0.9 < exact["upper95"] < bounds["upper95"]
-    assert bounds["upper95"] - bounds["lower95"] < 2 * (exact["upper95"] - exact["lower95"])
+    assert bounds.lower95 < exact.lower95 < 0.9 < exact.upper95 < bounds.upper95
+    assert bounds.upper95 - bounds.lower95 < 2 * (exact.upper95 - exact.lower95)
     assert mean_bounds(values[::-1]) == bounds
 
 
@@ -67,7 +67,7 @@ def test_mean_bounds_cover_a_rare_disaster():
     rng = np.random.default_rng(0)
     draws = np.where(rng.random((400, 12)) < 0.97, 1.0, 0.0)  # a bootstrap covers 31% here
     found = [mean_bounds(row) for row in draws]
-    assert np.mean([f["lower95"] <= 0.97 <= f["upper95"] for f in found]) >= 0.95
+    assert np.mean([f.lower95 <= 0.97 <= f.upper95 for f in found]) >= 0.95
 
 
 def test_median_bounds_are_order_statistics():
@@ -80,7 +80,7 @@ def test_median_bounds_are_order_statistics():
 def test_coverage_of_proportion_summed_over_all_outcomes(trials):
     intervals = [proportion(k, trials) for k in range(trials + 1)]
     for p in np.linspace(0, 1, 101):
-        held = [i["lower95"] <= p <= i["upper95"] for i in intervals]
+        held = [i.lower95 <= p <= i.upper95 for i in intervals]
         assert binom.pmf(range(trials + 1), trials, p)[held].sum() >= 0.95 - 1e-12
 
 
@@ -89,16 +89,16 @@ def test_coverage_of_proportion_summed_over_all_outcomes(trials):
 def test_proportion_is_monotone_and_symmetric(successes, failures, confidence):
     trials = successes + failures
     here, mirrored = proportion(successes, trials), proportion(failures, trials)
-    assert here["lower95"] == pytest.approx(1 - mirrored["upper95"])
-    assert (here["successes"], here["trials"]) == (successes, trials)
+    assert here.lower95 == pytest.approx(1 - mirrored.upper95)
+    assert (here.successes, here.trials) == (successes, trials)
     if trials:
-        assert here["lower95"] <= here["share"] == successes / trials <= here["upper95"]
+        assert here.lower95 <= here.share == successes / trials <= here.upper95
     if failures:
         more = proportion(successes + 1, trials)
-        assert more["lower95"] > here["lower95"] and more["upper95"] >= here["upper95"]
+        assert more.lower95 > here.lower95 and more.upper95 >= here.upper95
     level = proportion(successes, trials, confidence)
-    assert (level["lower95"] <= here["lower95"]) or confidence < 0.95
-    assert (level["upper95"] <= here["upper95"]) or confidence > 0.95
+    assert (level.lower95 <= here.lower95) or confidence < 0.95
+    assert (level.upper95 <= here.upper95) or confidence > 0.95
 
 
 @pytest.mark.parametrize("trials", [1, 4, 13])
@@ -106,7 +106,7 @@ def test_coverage_of_mean_bounds_summed_over_all_outcomes(trials):
     rows = [np.repeat([1.0, 0.0], [k, trials - k]) for k in range(trials + 1)]
     found = [mean_bounds(row) for row in rows]
     for p in np.linspace(0.01, 0.99, 99):
-        held = [f["lower95"] <= p <= f["upper95"] for f in found]
+        held = [f.lower95 <= p <= f.upper95 for f in found]
         assert binom.pmf(range(trials + 1), trials, p)[held].sum() >= 0.95
 
 
@@ -119,11 +119,13 @@ def test_mean_bounds_are_invariant_to_scale_and_reflection(values, low, width):
     z = np.array(values)
     plain, moved = mean_bounds(z), mean_bounds(low + width * z, low, low + width)
     for key in ("mean", "lower95", "upper95"):
-        assert moved[key] == pytest.approx(low + width * plain[key], abs=1e-6 * width)
+        assert getattr(moved, key) == pytest.approx(
+            low + width * getattr(plain, key), abs=1e-6 * width
+        )
     mirrored = mean_bounds(1 - z)
-    assert mirrored["lower95"] == pytest.approx(1 - plain["upper95"], abs=1e-9)
-    assert plain["lower95"] <= plain["mean"] + 1e-9 and plain["mean"] <= plain["upper95"] + 1e-9
-    assert plain["mean"] == pytest.approx(z.mean()) and plain["count"] == len(values)
+    assert mirrored.lower95 == pytest.approx(1 - plain.upper95, abs=1e-9)
+    assert plain.lower95 <= plain.mean + 1e-9 and plain.mean <= plain.upper95 + 1e-9
+    assert plain.mean == pytest.approx(z.mean()) and plain.count == len(values)
 
 
 @given(VALUES, st.integers(0, 11), st.floats(0, 1))
@@ -133,35 +135,35 @@ def test_mean_bounds_rise_with_each_value_and_narrow_with_less_confidence(values
     higher = z.copy()
     higher[place % len(z)] = max(higher[place % len(z)], raised)
     here, there = mean_bounds(z), mean_bounds(higher)
-    assert there["lower95"] >= here["lower95"] - 1e-9
-    assert there["upper95"] >= here["upper95"] - 1e-9
+    assert there.lower95 >= here.lower95 - 1e-9
+    assert there.upper95 >= here.upper95 - 1e-9
     loose = mean_bounds(z, confidence=0.8)
-    assert here["lower95"] <= loose["lower95"] + 1e-12
-    assert loose["upper95"] <= here["upper95"] + 1e-12
-    assert here["upper95"] - here["lower95"] > loose["upper95"] - loose["lower95"]
+    assert here.lower95 <= loose.lower95 + 1e-12
+    assert loose.upper95 <= here.upper95 + 1e-12
+    assert here.upper95 - here.lower95 > loose.upper95 - loose.lower95
 
 
 def test_mean_bounds_of_one_value_by_hand():
     """Half of the capital is staked wholly, half by half: (1 / m + (1 + 1 / m) / 2) / 2 = 40."""
     one = mean_bounds([1.0])
-    assert (one["lower95"], one["upper95"]) == (pytest.approx(1.5 / 79.5), 1.0)
-    assert mean_bounds([0.5])["lower95"] == pytest.approx(0.5 * 1.5 / 79.5)
-    assert mean_bounds([1.0], confidence=0.8)["lower95"] == pytest.approx(1.5 / 19.5)
+    assert (one.lower95, one.upper95) == (pytest.approx(1.5 / 79.5), 1.0)
+    assert mean_bounds([0.5]).lower95 == pytest.approx(0.5 * 1.5 / 79.5)
+    assert mean_bounds([1.0], confidence=0.8).lower95 == pytest.approx(1.5 / 19.5)
     zero = {"mean": 0.0, "lower95": 0.0, "upper95": pytest.approx(1 - 1.5 / 79.5), "count": 1}
-    assert mean_bounds([0.0]) == zero
+    assert dict(mean_bounds([0.0])) == zero
 
 
 def test_mean_bounds_of_four_values_by_hand():
     """Stakes 1 and 1/2, each with half of the capital: their mean reaches 40 at the lower end."""
-    lower = mean_bounds(np.ones(4))["lower95"]
+    lower = mean_bounds(np.ones(4)).lower95
     assert (lower**-4 + (0.5 + 0.5 / lower) ** 4) / 2 == pytest.approx(40)
-    lower = mean_bounds(np.ones(17))["lower95"]  # beyond 16 values also 1/4 and 1/8
+    lower = mean_bounds(np.ones(17)).lower95  # beyond 16 values also 1/4 and 1/8
     stakes = [1, 1 / 2, 1 / 4, 1 / 8]
     assert sum((1 - s + s / lower) ** 17 for s in stakes) / 4 == pytest.approx(40)
 
 
 def test_rounding_errors_at_the_ends_are_in_range():
-    assert mean_bounds([1 + 1e-12, -1e-12])["mean"] == pytest.approx(0.5)
+    assert mean_bounds([1 + 1e-12, -1e-12]).mean == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("confidence", [0.9, 0.95])
@@ -181,7 +183,7 @@ def test_each_episode_counts_once():
     episode = np.array([0, 0, 1, 1, 1, 1, 2])
     assert episode_means(values, episode).tolist() == [0.5, 1.0]
     found = mean_interval(values, episode)
-    assert found == Mean(**mean_bounds([0.5, 1.0]))
+    assert found == mean_bounds([0.5, 1.0])
     assert (found.mean, found.count) == (0.75, 2)
 
 

@@ -12,7 +12,7 @@ from drone_rl.collectors.complete_episodes import CompleteEpisodes, run_episodes
 from drone_rl.policies.zoo import certificate_path
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes import CubeGoals, CubesEnd
-from drone_rl.trust.rounding_sensitivity import Rounding
+from drone_rl.trust.results import Proof, Rounding
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import RootSeed
 from drone_rl.verification.checker.certificate import parse_certificate
@@ -52,88 +52,75 @@ ALL, BEHIND = CubesEnd.ALL_CUBES.value, CubesEnd.FRONT_BOUNDARY.value
 
 
 def test_certificate_of_every_placement(good):
-    found = claim(good).as_evidence(flown([[0.0, 1.0], [-6.0, 5.0], [2.0, 2.0]], [ALL] * 3))
-    assert found == {
-        "refused": None,
-        "every": True,
-        "share": 1.0,
-        "lost": 0.0,
-        "undecided": 0.0,
-        "finished": True,
-        "checked": 0,
-        "wrong_at_most": None,
-        "seed": None,
-        "seed_is_fixed": True,
-        "agreeing": 3,
-    }
+    found = claim(good).quote(flown([[0.0, 1.0], [-6.0, 5.0], [2.0, 2.0]], [ALL] * 3))
+    assert found == Proof(every=True, share=1.0, agreeing=3)
 
 
 def test_undecided_placements(good):
-    some = claim(good, undecided=True).as_evidence(flown([[0.0, 1.0], [4.0, 5.0]], [ALL, BEHIND]))
-    assert (some["every"], some["share"], some["undecided"]) == (False, 0.75, 0.25)
-    assert some["agreeing"] == 1
+    some = claim(good, undecided=True).quote(flown([[0.0, 1.0], [4.0, 5.0]], [ALL, BEHIND]))
+    assert (some.every, some.share, some.undecided) == (False, 0.75, 0.25)
+    assert some.agreeing == 1
 
 
 def test_placements_at_a_border_do_not_count(good):
     """The cube stands at 3.0000001 m, where nothing is stated; the episode records 3 m."""
     place = float(torch.tensor(3.0000001, dtype=torch.float32))
     assert place == 3.0
-    found = claim(good, undecided=True).as_evidence(
-        flown([[place, 0.0], [2.0, 0.0]], [BEHIND, ALL])
-    )
-    assert (found["refused"], found["agreeing"]) == (None, 1)
+    found = claim(good, undecided=True).quote(flown([[place, 0.0], [2.0, 0.0]], [BEHIND, ALL]))
+    assert (found.refused, found.agreeing) == (None, 1)
 
 
 def test_placements_rounded_out_of_bounds(good):
     place = float(torch.tensor(5.3, dtype=torch.float32))
     assert place > 5.3
     narrow = good.in_task(lateral_bound=5.3)
-    found = claim(narrow).as_evidence(flown([[place, 0.0]], [ALL]))
-    assert (found["refused"], found["agreeing"]) == (None, 1)
+    found = claim(narrow).quote(flown([[place, 0.0]], [ALL]))
+    assert (found.refused, found.agreeing) == (None, 1)
 
 
 @pytest.mark.parametrize(("fragile", "is_refused"), [(20, False), (21, True)])
 def test_certificate_is_not_quoted_if_rounding_decides(good, fragile, is_refused):
-    found = Rounding("float32", True, 1000, fragile, 5, 1, "PyTorch", 5, 0, 0)
-    evidence = claim(good).as_evidence(flown([[0.0, 1.0]], [ALL]), rounding=found)
-    assert (evidence["refused"] is not None) == is_refused
+    counts = {"episodes": 5, "fragile_episodes": 1, "compared_episodes": 5, "unexplained": 0}
+    found = Rounding(
+        arithmetic="float32", frames=1000, fragile=fragile, compared="PyTorch", **counts
+    )
+    evidence = claim(good).quote(flown([[0.0, 1.0]], [ALL]), rounding=found)
+    assert (evidence.refused is not None) == is_refused
 
 
 def test_lost_placements(good):
-    found = claim(good, end="front_boundary").as_evidence(flown([[0.0, 1.0]], [BEHIND]))
-    assert (found["every"], found["share"], found["lost"]) == (False, 0, 1.0)
+    found = claim(good, end="front_boundary").quote(flown([[0.0, 1.0]], [BEHIND]))
+    assert (found.every, found.share, found.lost) == (False, 0, 1.0)
 
 
 def test_one_other_end_refuses_the_certificate(good):
     places = [[0.0, 1.0], [1.0, 5.0], [2.0, 2.0]]
-    found = claim(good).as_evidence(flown(places, [ALL, BEHIND, ALL]))
-    assert found == {
-        "refused": "1 of 3 greedy flights of this verdict ended otherwise than it states"
-    }
+    found = claim(good).quote(flown(places, [ALL, BEHIND, ALL]))
+    why = "1 of 3 greedy flights of this verdict ended otherwise than it states"
+    assert found == Proof(refused=why)
     side = CubesEnd.SIDE_BOUNDARY.value
-    lost = claim(good, end="front_boundary").as_evidence(flown(places[:1], [side]))
-    assert lost["refused"] is not None
+    lost = claim(good, end="front_boundary").quote(flown(places[:1], [side]))
+    assert lost.refused is not None
 
 
 def test_other_cubes_are_another_end(good):
     episodes = flown([[0.0, 1.0]], [BEHIND])
     episodes.goals.reached = torch.tensor([[True, False]])
-    assert claim(good, end="front_boundary").as_evidence(episodes)["refused"] is not None
+    assert claim(good, end="front_boundary").quote(episodes).refused is not None
 
 
 def test_refused_certificate_stays_refused(good):
-    assert Claim(PATH, None, "it is damaged").as_evidence(flown([[0.0, 1.0]], [ALL])) == {
-        "refused": "it is damaged"
-    }
+    damaged = Claim(PATH, None, "it is damaged")
+    assert damaged.quote(flown([[0.0, 1.0]], [ALL])) == Proof(refused="it is damaged")
 
 
 def test_rechecking_rollouts_are_reported(good):
     checked = Claim(
         PATH, claim(good).certificate, flights=7, uniform=5, seed=3, seed_is_fixed=False
     )
-    told = checked.as_evidence(flown([[0.0, 1.0]], [ALL]))
-    assert (told["checked"], told["seed"], told["seed_is_fixed"]) == (7, 3, False)
-    assert told["wrong_at_most"] == pytest.approx(0.4507, abs=1e-4)  # 0.5493 ** 5 is 0.05
+    told = checked.quote(flown([[0.0, 1.0]], [ALL]))
+    assert (told.checked, told.seed, told.seed_is_fixed) == (7, 3, False)
+    assert told.wrong_at_most == pytest.approx(0.4507, abs=1e-4)  # 0.5493 ** 5 is 0.05
 
 
 def test_bound_of_rechecking():
@@ -224,8 +211,8 @@ def test_tampered_certificates_prove_nothing(poor, truth, tmp_path):
         episodes = run_episodes(env, actor, 20)
     for name, content in tampered(truth).items():
         (tmp_path / "mine.certificate.json").write_bytes(content)
-        quoted = find_claim(poor, flights=20).as_evidence(episodes)
-        assert quoted["refused"] or not (quoted["every"] or quoted["lost"] < 1), name
+        quoted = find_claim(poor, flights=20).quote(episodes)
+        assert quoted.refused or not (quoted.every or quoted.lost < 1), name
 
 
 def test_certificate_must_be_a_path(poor):

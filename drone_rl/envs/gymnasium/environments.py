@@ -27,7 +27,7 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
     i samples the same episodes as a single one after `reset(seed=7 + i)`.
     """
 
-    metadata = {**METADATA, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012 (Gymnasium's)
+    metadata = {**METADATA, "autoreset_mode": AutoresetMode.NEXT_STEP}
 
     def __init__(
         self,

@@ -1,71 +1,36 @@
 """Report sections: verdict, robustness, what is left out, rollouts, flaws."""
 
-from collections.abc import Mapping
 from typing import Any
 
 from PIL import Image
 
 from drone_rl.explanations.report.part import Figures, Part
-from drone_rl.explanations.results import Explanation, Flaws, QuotedShifts
-from drone_rl.trust import charts, shifts_text
+from drone_rl.explanations.results import Explanation, Flaws
+from drone_rl.trust import charts
+from drone_rl.trust.axes_table import NAMES
 from drone_rl.trust.plots import images
-from drone_rl.trust.verdict_text import SENTENCES, depends_on_rounding
-from drone_rl.utils.text import say, seed_line
+from drone_rl.trust.shifts_results import SavedShifts
 
 MAX_PAIRS = 4  # pairs of each kind that are shown
 
 
-def evidence(explanation: Explanation) -> dict[str, Any]:
-    """Return verdict and robustness for the sentences of `drone_rl.trust`."""
-    quoted = explanation.shifts
-    header = {"seed": explanation.seed, "seed_is_fixed": explanation.seed_is_fixed}
-    measured = {"shifts": quoted.measured} if quoted else {}
-    return {"verdict": explanation.verdict, **measured, **header}
-
-
-def describe_verdict(verdict: Mapping[str, Any], explanation: Explanation) -> dict[str, Any]:
-    """Return the verdict in words."""
-    return {
-        "text": say(SENTENCES, verdict),
-        "depends_on_rounding": depends_on_rounding(verdict),
-        "untested": shifts_text.not_evaluated(evidence(explanation)),
-        "seed": seed_line(evidence(explanation)),
-    }
-
-
-def is_quoted(explanation: Explanation) -> bool:
-    """Return whether the robustness is shown."""
-    return shifts_text.is_quoted(evidence(explanation))
-
-
-def why_not_quoted(explanation: Explanation) -> str | None:
-    """Return the reason why the robustness is not shown, or None."""
-    return shifts_text.why_not(evidence(explanation))
-
-
-def robust_axes(explanation: Explanation) -> list[str]:
-    """Return the axes with a range in which the policy is good."""
-    measured = explanation.shifts.measured if explanation.shifts else {}
-    return [shifts_text.NAMES[name] for name in shifts_text.wide(measured)]
-
-
-def draw_shifts(quoted: QuotedShifts, explanation: Explanation) -> Figures:
+def draw_shifts(saved: SavedShifts, explanation: Explanation) -> Figures:
     """Draw curves and rows of frames, unless the measurement is refused."""
-    if not is_quoted(explanation):
+    if (shifts := explanation.robustness) is None:
         return {}
     frames = {
-        f"conditions_{name}": charts.conditions(quoted.measured, name, [*strip])
-        for name, strip in quoted.frames.items()
+        f"conditions_{n}": charts.conditions(shifts, n, shifts.frames(n)) for n in shifts.axes
     }
-    return {"shifts": charts.curves(quoted.measured), **frames}
+    return {"shifts": charts.curves(shifts), **frames}
 
 
-def describe_shifts(quoted: QuotedShifts, explanation: Explanation) -> dict[str, Any]:
+def describe_shifts(saved: SavedShifts, explanation: Explanation) -> dict[str, Any]:
     """Return the robustness in words, and as a table."""
+    shifts = explanation.robustness
     return {
-        "text": say(shifts_text.QUOTED, evidence(explanation)),
-        "rows": shifts_text.rows(quoted.measured) if is_quoted(explanation) else [],
-        "names": charts.NAMES,
+        "text": saved.text(explanation.verdict) if explanation.verdict else "",
+        "rows": shifts.rows() if shifts else [],
+        "names": NAMES,
     }
 
 
@@ -84,7 +49,7 @@ def draw_pairs(flaws: Flaws, explanation: Explanation) -> dict[str, dict[str, Im
     return drawn
 
 
-VERDICT_PART = Part(title="Verdict", label="Verdict", values=describe_verdict)
+VERDICT_PART = Part(title="Verdict", label="Verdict")
 SHIFTS_PART = Part(title="Robustness", label="Robustness", draw=draw_shifts, values=describe_shifts)
 LEFT_OUT_PART = Part(title="What is left out, and why", label="Left out")
 DATASET_PART = Part(title="Recorded rollouts", label="Rollouts")

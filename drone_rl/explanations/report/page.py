@@ -19,9 +19,8 @@ from drone_rl.explanations.report import (
 )
 from drone_rl.explanations.report.part import METHOD_NAMES, Figures, Part
 from drone_rl.explanations.results import Explanation
+from drone_rl.trust.axes_table import NAMES
 from drone_rl.trust.plots.saving import save_drawn
-from drone_rl.trust.shifts_text import not_evaluated
-from drone_rl.trust.verdict_text import is_proved
 from drone_rl.utils.display import content_security_policy, page_environment, static_text
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import newest, to_file_name
@@ -151,16 +150,13 @@ def _environment() -> jinja2.Environment:
     """Return the templates of this page, compiled once."""
     environment = page_environment("drone_rl.explanations.report")
     environment.filters |= {
-        "is_proved": is_proved,
+        "axis": NAMES.__getitem__,
         "json": functools.partial(json.dumps, indent=1),
         "listed": listed,
         "method": METHOD_NAMES.__getitem__,
-        "not_evaluated": lambda e: not_evaluated(behavior.evidence(e)),
         "percent": percent,
         "plural": plural,
         "rate": rate,
-        "robust_axes": behavior.robust_axes,
-        "why_not_quoted": behavior.why_not_quoted,
     }
     return environment
 

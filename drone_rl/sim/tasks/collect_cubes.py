@@ -92,7 +92,7 @@ class CollectCubes(PropTask[WorldState]):
         self.largest_reward = float(settings.num_cubes)
         self.drone_size = settings.drone_size
         self.origin = (0.0, 0.0, settings.altitude)
-        self.vocabulary = dataclasses.replace(CUBES, tested=some_cubes(settings.values()))
+        self.vocabulary = CUBES.replace(tested=some_cubes(settings.values()))
         actions = MOVES_3D if settings.must_climb else MOVES
         self.oracle = OracleRule(("drone", "cube_positions", "next_cube"), self.line_up, actions)
 

@@ -92,7 +92,7 @@ class Pillars(common.PropTask[FieldState]):
             f"{plural(s.num_rows, 'row')} of pillars {s.width:g} m wide, {s.density:g} per metre "
             f"of row width, {s.spacing:g} m from row to row"
         )
-        self.vocabulary = dataclasses.replace(PILLARS, tested=tested)
+        self.vocabulary = PILLARS.replace(tested=tested)
         self.oracle = OracleRule(("drone", "rows", "next_row"), self.lanes.fly_through, MOVES)
 
     @property

@@ -141,17 +141,17 @@ def find_wrong_step_counts(
         here, missing = steps[owner == i], missing_steps(outcome)
         for number, stated in sorted(outcome.steps.items()):
             share = proportion(int((here == number).sum()), len(steps), 1 - DOUBT)
-            if share["upper95"] < stated or share["lower95"] > stated + missing:
+            if share.upper95 < stated or share.lower95 > stated + missing:
                 yield (
                     f"outcome {i} ({outcome}) is said to take {number} steps from a share of "
-                    f"{stated:.6g}, which {share['successes']} of {share['trials']} random flights "
+                    f"{stated:.6g}, which {share.successes} of {share.trials} random flights "
                     "refute"
                 )
         is_other = ~np.isin(here, list(outcome.steps))
         share = proportion(int(is_other.sum()), len(steps), 1 - DOUBT)
-        if share["lower95"] > missing:
+        if share.lower95 > missing:
             yield (
                 f"outcome {i} ({outcome}) is said to take other numbers of steps than those stated "
-                f"from a share of {missing:.6g}, which {share['successes']} of {share['trials']} "
+                f"from a share of {missing:.6g}, which {share.successes} of {share.trials} "
                 "random flights refute"
             )

@@ -8,7 +8,7 @@ from drone_rl.explanations.report import attribution, behavior, class_models, em
 from drone_rl.explanations.report.truth import changes, truth_charts
 from drone_rl.utils.palette import GOOD, MUTED, css
 from tests.evidence import SHIFTS
-from tests.explanations.example import STEPS, changed_explanation, mean, median
+from tests.explanations.example import PICTURED, STEPS, changed_explanation, mean, median
 
 
 @pytest.fixture
@@ -46,15 +46,13 @@ def test_pairs_are_limited_and_left_and_right_take_turns(explanation):
 
 
 def test_a_robustness_evaluation_is_drawn_unless_it_is_refused():
-    frames = {name: np.zeros((6, 5, 16, 3), np.uint8) for name in SHIFTS["axes"]}
-    shifts = {"measured": SHIFTS, "frames": frames}
-    good = {"verdict.kind": "good", "shifts": shifts}
-    quoted = changed_explanation(good)
-    drawn = behavior.draw_shifts(quoted.shifts, quoted)
+    good = {"verdict.kind": "good", "shifts": PICTURED}
+    shown = changed_explanation(good)
+    drawn = behavior.draw_shifts(shown.shifts, shown)
     assert [*drawn] == ["shifts", *(f"conditions_{name}" for name in SHIFTS["axes"])]
-    refused = {"measured": {"refused": "it is of another task"}, "frames": {}}
-    for change in ({"shifts": refused}, {"shifts": shifts, "verdict.kind": "poor"}):
-        other = changed_explanation(change)
+    refused = {"path": "shifts.json", "refused": "it is of another task"}
+    for change in ({"shifts": refused}, {"verdict.kind": "poor"}):
+        other = changed_explanation({**good, **change})
         assert behavior.draw_shifts(other.shifts, other) == {}
 
 

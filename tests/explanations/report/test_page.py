@@ -14,8 +14,7 @@ from drone_rl.explanations.report import write_report
 from drone_rl.explanations.report.page import PARTS, find_explanations, render_section
 from drone_rl.explanations.results import Explanation
 from drone_rl.utils.errors import InputError
-from tests.evidence import SHIFTS
-from tests.explanations.example import CONTENT, changed_explanation
+from tests.explanations.example import CONTENT, PICTURED, changed_explanation
 from tests.explanations.quick import ALL_SECTIONS, quick_figures
 from tests.explanations.report.conftest import NASTY
 
@@ -131,9 +130,7 @@ def test_figures_are_saved(report):
 
 
 def test_a_robustness_evaluation_is_shown(tmp_path):
-    frames = {name: np.zeros((6, 5, 16, 3), np.uint8) for name in SHIFTS["axes"]}
-    shifts = {"measured": SHIFTS, "frames": frames}
-    good = {"verdict.kind": "good", "shifts": shifts}
+    good = {"verdict.kind": "good", "shifts": PICTURED}
     with quick_figures():
         text = render_section("shifts", [changed_explanation(good)], tmp_path)
     assert "the sun at 21.1 to 60 degrees" in text and text.count("data:image/svg") == 3 + 1

@@ -5,11 +5,11 @@ import re
 import pytest
 
 from drone_rl.explanations.report import page
-from tests.evidence import PROOF, SHIFTS
-from tests.explanations.example import changed_explanation, mean
+from tests.evidence import PROOF
+from tests.explanations.example import PICTURED, changed_explanation, mean
 
 GOOD = {"verdict.kind": "good", "verdict.certain": True, "verdict.exit_code": 0}
-MEASURED = {**GOOD, "shifts": {"measured": SHIFTS, "frames": {}}}
+MEASURED = {**GOOD, "shifts": PICTURED}
 NONE_TRUSTED = {
     "truth.trusted": None,
     "truth.methods.saliency.trusted": False,
@@ -44,10 +44,10 @@ def text(tmp_path, monkeypatch):
     [
         ("summary", "Good. This verdict is wrong with at most 5%", {"verdict.certain": False}, GOOD),
         ("summary", "in 60.0% (95% CI 58.0% to 62.0%) of 400", {"verdict": None}, {}),
-        ("summary", "2 of 3 perturbations", {"shifts.measured.domain": None}, MEASURED),
+        ("summary", "2 of 3 perturbations", {"shifts.shifts.domain": None}, MEASURED),
         ("summary", "Not measured", MEASURED, {}),
         ("summary", "another task", MEASURED,
-         {"shifts": {"measured": {"refused": "it is of another task"}, "frames": {}}}),
+         {"shifts": {"path": "a", "refused": "it is of another task"}}),
         ("summary", "re-checked by 1,000 rollouts", {"verdict.proof.wrong_at_most": None},
          {"verdict.proof": PROOF}),
         ("summary", "1 of 2 methods passed the tests: trust saliency.", NONE_TRUSTED, {}),

@@ -1,0 +1,271 @@
+"""Results of judging a policy: figures of episodes, failures, and the verdict."""
+
+from typing import Any
+
+import pydantic
+
+from drone_rl.sim.vocabulary import CUBES, TaskVocabulary
+from drone_rl.trust.rule import Quantity, VerdictKind
+from drone_rl.utils.intervals import Mean, Share
+from drone_rl.utils.models import Seeded, Stored
+from drone_rl.utils.text import render
+
+MAX_WRONG = 0.01
+"""Largest fraction of placements with a wrong statement in a proof, with 95% confidence."""
+FREQUENT = 0.02
+"""Fraction of episodes above which the text mentions an end."""
+MAX_FRAGILE = 0.02
+"""Largest fraction of fragile frames for a certain verdict; honest policies have at most 0.003."""
+MAX_FRAGILE_EPISODES = 0.25
+"""Largest fraction of episodes with a fragile frame. Honest policies have at most 0.15."""
+MAX_UNEXPLAINED = 0.04
+"""Largest fraction of episodes that may end differently in another implementation if there is no
+bound on rounding, actions are continuous, or drones have flight dynamics. Otherwise an episode may
+take other actions only in or after a fragile frame."""
+
+
+class GoalShare(Mean):
+    """Mean fraction of goals reached."""
+
+    goals: int | None = None
+    """Number of these goals."""
+
+
+class Figures(Stored):
+    """Figures of an evaluation, with 95% intervals over episodes."""
+
+    episodes: int
+    success: Share
+    """Success rate."""
+    shares: dict[str, GoalShare]
+    """Mean fractions of goals reached: of "all", and by stratum over the episodes that offered such
+    a goal (None if there are none). Goals that never came up count as missed among all."""
+    never_reached: Mean | None = None
+    """Fraction of goals that never came up."""
+    ends: dict[str, Share] = {}
+    """Fractions of episodes by the name of the end."""
+    mean_goals: float | None = None
+    """Goals reached in an episode."""
+    mean_length: float | None = None
+    """Steps of an episode."""
+    max_length: int | None = None
+
+    @property
+    def strata(self) -> dict[str, GoalShare]:
+        """`shares` by stratum, from left to right."""
+        return {name: share for name, share in self.shares.items() if name != "all"}
+
+
+class Failure(Stored):
+    """First failures of a class of goals or at an end."""
+
+    by: str
+    """Variable that classifies the goals, or "end"."""
+    value: str
+    episodes: int
+    """Episodes that offered such a goal at or before their first failure."""
+    failed: int
+    """Those whose first failure it was."""
+    share: float | None
+    """None without such episodes."""
+    lower95: float
+    upper95: float
+    """The intervals of all rows hold at once."""
+
+
+class Failures(Stored):
+    """First failures by class of goal and by how the episode ended."""
+
+    rows: tuple[Failure, ...]
+    largest: Failure | None
+    """The row with the greatest product of failures and lower bound, None if nothing failed; the
+    end to which every missed goal leads only if no other row has failures."""
+    expected_end: str | None = None
+    """That end, None if the task has none."""
+    bound: Share
+    """The fraction of episodes that failed."""
+
+    @property
+    def other_ends(self) -> list[Failure]:
+        """Ends by which many episodes fail, except the expected one and the largest row."""
+        ends = (row for row in self.rows if row.by == "end" and row.lower95 > FREQUENT)
+        return [row for row in ends if row.value != self.expected_end and row != self.largest]
+
+
+class Rounding(Stored):
+    """How far some episodes depend on rounding."""
+
+    arithmetic: str
+    """Arithmetic that computed the episodes, such as "float32 on cpu, fused kernel"."""
+    bound: bool = True
+    """Whether the rounding error is bounded, not estimated."""
+    frames: int
+    fragile: int
+    """Frames in which rounding can change the action."""
+    episodes: int
+    fragile_episodes: int
+    """Episodes with such a frame."""
+    compared: str
+    """Implementation that ran the episodes again."""
+    compared_episodes: int
+    differing: int = 0
+    """Episodes in which it took other actions; with continuous actions or flight dynamics, episodes
+    that ended differently."""
+    unexplained: int
+    """Differing episodes without a fragile frame up to the first other action, or at all if
+    outcomes were compared."""
+    decides: bool = False
+    """Whether the verdict would be certain but for this."""
+
+    @pydantic.computed_field
+    @property
+    def fragile_rate(self) -> float:
+        """Fraction of fragile frames."""
+        return self.fragile / max(1, self.frames)
+
+    @pydantic.computed_field
+    @property
+    def excessive(self) -> bool:
+        """Whether too much is fragile or unexplained for any verdict to be certain."""
+        allowed = 0.0 if self.bound else MAX_UNEXPLAINED
+        return self.frames > 0 and (
+            self.fragile > MAX_FRAGILE * self.frames
+            or self.fragile_episodes > MAX_FRAGILE_EPISODES * self.episodes
+            or self.unexplained > allowed * self.compared_episodes
+        )
+
+
+class Proof(Stored):
+    """What a certificate of the policy states, or why a verdict does not quote it."""
+
+    refused: str | None = None
+    """The reason; None if it is quoted."""
+    every: bool = False
+    """Whether it states success from every placement."""
+    share: float = 0.0
+    """Fraction of placements from which all cubes are collected."""
+    lost: float = 0.0
+    """Fraction from which they are not."""
+    undecided: float = 0.0
+    finished: bool = True
+    """Whether the proof was not stopped early."""
+    checked: int = 0
+    """Rollouts that re-checked it."""
+    wrong_at_most: float | None = None
+    """Upper bound on the fraction of placements with a wrong statement, with 95% confidence; None
+    without rollouts."""
+    seed: int | None = None
+    """Of the rollouts' placements."""
+    seed_is_fixed: bool = True
+    agreeing: int = 0
+    """The verdict's own episodes with a stated end."""
+
+    @property
+    def is_enough(self) -> bool:
+        """Whether enough rollouts re-checked it."""
+        return self.wrong_at_most is not None and self.wrong_at_most <= MAX_WRONG
+
+
+class Difference(Stored):
+    """A setting that differs from the policy's training."""
+
+    own: Any
+    """Its value in training."""
+    flown: Any
+
+
+class Verdict(Seeded):
+    """The kind of a policy, whether that is certain, and why; as in `verdict.json`."""
+
+    kind: VerdictKind
+    certain: bool
+    exit_code: int
+    """Exit code of the kind if it is certain, else `exit_codes.NOT_CERTAIN`."""
+    rule: str = ""
+    """The rule as text."""
+    error_rate: float
+    """Largest probability of a certain and wrong verdict."""
+    good_share: float
+    """Fraction of the oracle's success rate that a good policy exceeds."""
+    terms: TaskVocabulary = CUBES
+    num_cubes: int = 0
+    """Goals of an episode."""
+    rounding: Rounding | None = None
+    """None if it was not checked."""
+    proof: Proof | None = None
+    """None if the policy has no certificate."""
+    greedy: Figures
+    """Of episodes with the most probable actions."""
+    sampled: Figures | None = None
+    """Of episodes with sampled actions."""
+    baselines: dict[str, Figures]
+    """Of the task's random and constant baselines, and of the oracle."""
+    skill: dict[str, Mean] = {}
+    """By baseline, the difference of the fractions of goals reached, paired."""
+    drawing: Mean | None = None
+    """Difference of the success rates of sampled and most probable actions, paired."""
+    failures: Failures
+    quantities: dict[str, Quantity] = {}
+    """The rule's quantities."""
+    enough: int | None = None
+    """About how many episodes certainty needs; None if that is not known."""
+    unlike: dict[str, Difference] = {}
+    """Settings that differ from the training, by name."""
+
+    @pydantic.computed_field
+    @property
+    def sentence(self) -> str:
+        """The verdict as text."""
+        return render("drone_rl.trust", "verdict.j2", v=self)
+
+    @property
+    def quoted(self) -> Proof | None:
+        """The certificate if it is not refused."""
+        return None if self.proof is None or self.proof.refused else self.proof
+
+    @property
+    def is_proved(self) -> bool:
+        """Whether a re-checked certificate states success from every placement."""
+        return self.quoted is not None and self.quoted.every and self.quoted.is_enough
+
+    @property
+    def is_open_by_rounding(self) -> bool:
+        """Whether the episodes are enough, but too many decisions depend on rounding."""
+        return self.rounding is not None and self.rounding.decides
+
+    @property
+    def failing_side(self) -> str | None:
+        """Stratum in which a one-sided policy fails."""
+        first, *_, last = self.greedy.strata or ("", "")
+        ends = {VerdictKind.ONE_SIDED_LEFT: last, VerdictKind.ONE_SIDED_RIGHT: first}
+        return ends.get(self.kind)
+
+    @property
+    def best_baseline(self) -> str:
+        """Random or constant baseline that reaches most goals."""
+        return max(self._blind, key=lambda name: self._blind[name].shares["all"].mean or 0.0)
+
+    @property
+    def most_successful(self) -> str:
+        """Random or constant baseline with the highest success rate."""
+        return max(self._blind, key=lambda name: self._blind[name].success.share or 0.0)
+
+    @property
+    def is_trivial(self) -> bool:
+        """Whether that baseline is as good as a good policy has to be."""
+        best, oracle = self.baselines[self.most_successful], self.baselines["oracle"]
+        share = best.success.share or 0.0
+        return share > 0 and share >= self.good_share * (oracle.success.share or 0.0)
+
+    @property
+    def _blind(self) -> dict[str, Figures]:
+        return {name: of for name, of in self.baselines.items() if name != "oracle"}
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values, as in `verdict.json`."""
+        return self.model_dump(mode="json")
+
+    @property
+    def line(self) -> str:
+        """Its kind, whether that is certain, and the sentence."""
+        return f"{self.kind.value}{'' if self.certain else ' (not certain)'}: {self.sentence}"

@@ -1,0 +1,143 @@
+"""A claim of a verdict or robustness evaluation disappears when the result contradicts it."""
+
+import pytest
+
+from drone_rl.trust.results import Verdict
+from drone_rl.trust.shifts_results import Robustness, SavedShifts, inward
+from tests.evidence import PROOF, SAVED_SHIFTS, SHIFTS, VERDICT, changed
+
+KINDS = {"verdict": (Verdict, VERDICT), "shifts": (Robustness, SHIFTS)}
+TRIVIAL = {"baselines.forward.success.share": 0.95}
+WIND = {"unlike": {"wind": {"own": [0.0, 0.0, 0.0], "flown": [5.0, 0.0, 0.0]}}}
+NEVER_FAILED = {"failures.largest": None, "failures.bound.successes": 0}
+PROVED = {"proof": PROOF}
+NOWHERE_GOOD = {"domain.plain.good": False, **{
+    f"domain.ranges.{axis}.positions": None for axis in ("sun", "blur", "brightness")
+}}  # fmt: skip
+DARK = SHIFTS["domain"]["ranges"]["brightness"]["failed"][0]
+NEAR = {"domain.ranges.brightness.failed": [{**DARK, "bad": False, "fragile": 31}]}
+CLAIMS = [
+    ("verdict", "neither good nor poor nor one-sided: it collects every cube in 60.0% of", {},
+     {"certain": False}),
+    ("verdict", "400 episodes are too few to be certain (about 1,600 would do)",
+     {"certain": False, "enough": 1600}, {"certain": True}),
+    ("verdict", "Not certain: decisions depend on rounding. In 8 of 16,000 frames (0.1%)",
+     {"certain": False, "rounding.decides": True}, {"rounding.decides": False}),
+    ("verdict", "does its task: it collects", {"kind": "good"}, {"kind": "poor"}),
+    ("verdict", "it is hardly better than flying straight on", {"kind": "poor"},
+     {"greedy.shares.all.mean": 0.2}),
+    ("verdict", "can't be trusted with cubes on its left", {"kind": "one-sided (right)"},
+     {"kind": "one-sided (left)"}),
+    ("verdict", "Flying straight on is good by this rule, too",
+     {"kind": "good, but trivial", **TRIVIAL}, {"kind": "good"}),
+    ("verdict", "here it flew with dynamics.wind=[5, 0, 0] instead of [0, 0, 0]", WIND,
+     {"unlike": {}}),
+    ("verdict", "Fixed seed 0: a policy could have been fitted to these environments.", {},
+     {"seed_is_fixed": False}),
+    ("verdict", "it collects every cube from every placement.", PROVED, {"proof.every": False}),
+    ("verdict", "from >99.9% of all placements, from 0% it does not, and <0.1% is undecided",
+     {"proof": {**PROOF, "every": False, "undecided": 1e-12}}, {"proof.share": 0.9}),
+    ("verdict", "which is too much for a proof", {"proof": {**PROOF, "wrong_at_most": 0.0101}},
+     {"proof.wrong_at_most": 0.01}),
+    ("verdict", "so it proves nothing here", {"proof": {**PROOF, "wrong_at_most": None}},
+     {"proof.wrong_at_most": 0.01}),
+    ("verdict", "All 400 greedy episodes", PROVED, {"proof.agreeing": 0}),
+    ("verdict", "A certificate is not quoted: it is old.", {"proof": {"refused": "it is old"}},
+     {"proof": None}),
+    ("verdict", "It collects 50.0% of the cubes on its left, 100% of those ahead, 90.0% of", {},
+     {f"greedy.shares.{side}.mean": 1.0 for side in ("left", "right")}),
+    ("verdict", "flying straight on 33.3% and the oracle 100%", {}, TRIVIAL),
+    ("verdict", "This task is trivial: flying straight on collects", TRIVIAL,
+     {"baselines.forward.success.share": 0.89}),
+    ("verdict", "Even the oracle", {"baselines.oracle.success.upper95": 0.49},
+     {"baselines.oracle.success.upper95": 0.5}),
+    ("verdict", "on its left: in 150 of 300 episodes that offered it (50.0%); 10.0% of all end at",
+     {}, {"failures.rows.1.lower95": 0.02}),
+    ("verdict", "It failed in none of 400 episodes, so it fails in at most 45.0% (95% CI).",
+     NEVER_FAILED, {"failures.bound.successes": 1}),
+    ("verdict", "with sampled actions it collects every cube in 40.0%", {},
+     {"drawing.upper95": 0.05}),
+    ("verdict", "Whether rounding could change actions was not checked", {"rounding": None},
+     {"rounding": VERDICT["rounding"]}),
+    ("verdict", "effects of rounding were estimated", {"rounding.bound": False},
+     {"rounding.bound": True}),
+    ("shifts", "Good with the sun at 21.1 to 60 degrees (no more was tried) and blur of up to 1.5 "
+     "pixels (95% confidence for each range).", {}, {"domain.ranges.sun.high_open": False}),
+    ("shifts", "and blur of", {}, {"axes.blur.levels.1.modes.constant.unchanged": True}),
+    ("shifts", "blur of up to 1.5 pixels (no more is possible)",
+     {"domain.ranges.blur.failed": [{**DARK, "end": "high", "impossible": True}]},
+     {"domain.ranges.blur.failed.0.impossible": False}),
+    ("shifts", "Not with brightness at 0.8 times: cubes on its right 47.0%.", {},
+     {"domain.ranges.brightness.failed.0.impossible": True}),
+    ("shifts", "whether it is good with brightness at 0.8 times (40.0% succeed; rounding can "
+     "change 31).", NEAR, {"domain.ranges.brightness.failed.0.bad": True}),
+    ("shifts", "there is no range in which it is", NOWHERE_GOOD, {"domain.plain.good": True}),
+    ("shifts", "Not tested: blur (no effect)",
+     {"axes.blur.levels.1.modes.constant.unchanged": True},
+     {"axes.blur.levels.1.modes.constant.unchanged": False}),
+    ("shifts", "elevation of the sun at 0 degrees, 45.0%", {},
+     {"axes.sun.levels.1.impossible": False}),
+    ("shifts", "it succeeds in 1.5% of episodes, the oracle in 90.0%", {},
+     {"together.refused": "too dark"}),
+    ("shifts", "Tested within each range", {}, {"domain": None}),
+    ("shifts", "Without the camera faults of its training (noise)",
+     {"network": {"weights": "", "description": {"transforms": [{"name": "noise"}]}}},
+     {"network": None}),
+    ("shifts", "Fixed seed 0", {}, {"seed_is_fixed": False}),
+]  # fmt: skip
+"""Result, a part of its text, what it needs, and what contradicts it."""
+
+
+@pytest.mark.parametrize("row", CLAIMS, ids=lambda row: row[1])
+def test_a_contradicted_claim_is_not_made(row):
+    kind, part, needed, against = row
+    model, example = KINDS[kind]
+    result = changed(example, needed)
+    assert part in model.read(result).sentence
+    assert part not in model.read(changed(result, against)).sentence
+
+
+def test_a_policy_is_proved_by_enough_rollouts_for_every_placement():
+    def is_proved(**changes):
+        return Verdict.read({**VERDICT, "proof": {**PROOF, **changes}}).is_proved
+
+    assert is_proved(wrong_at_most=0.01)
+    assert not is_proved(wrong_at_most=0.0101) and not is_proved(wrong_at_most=None)
+    assert not is_proved(every=False) and not is_proved(refused="it is old")
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high"),
+    [(1.876, "1.88", "1.87"), (21.01, "21.1", "21"), (60.0, "60", "60"), (0.0, "0", "0")],
+)
+def test_limits_are_rounded_inwards(value, low, high):
+    assert (inward(value, up=True), inward(value, up=False)) == (low, high)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "saved", "why"),
+    [
+        ({}, {"shifts": None, "refused": "it is of another task"}, "it is of another task"),
+        ({"good_share": 0.99}, {}, "it requires 0.9 of the oracle's success rate"),
+        ({"kind": "poor"}, {}, "this verdict does not"),
+    ],
+)
+def test_contradicting_evaluations_are_not_quoted(verdict, saved, why):
+    judged = Verdict.read({**VERDICT, "kind": "good", **verdict})
+    measured = SavedShifts.read({**SAVED_SHIFTS, **saved})
+    assert why in measured.why_not(judged)
+    assert measured.text(judged).startswith("A robustness evaluation is not quoted: ")
+    assert measured.not_evaluated(judged) == ["colors", "light", "sizes"]
+
+
+def test_an_evaluation_is_quoted_in_full_and_in_brief():
+    measured = SavedShifts.read(SAVED_SHIFTS)
+    unsure = Verdict.read({**VERDICT, "certain": False})
+    assert "400 (ranges) and 200 episodes at each strength (seed 0) of elev" in measured.text(
+        unsure
+    )
+    brief = measured.text(unsure, brief=True)
+    assert brief.startswith("Read from shifts.json, dated 2026-01-31 12:00, not measured again")
+    assert brief.endswith("blur of up to 1.5 pixels. Fixed seed 0: a policy could have been fitted "
+                          "to these environments.")  # fmt: skip
+    assert measured.not_evaluated(unsure) == ["colors", "sizes"]
