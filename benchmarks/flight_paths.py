@@ -5,18 +5,12 @@ import math
 from typing import Any
 
 import torch
-from torch import Tensor
 
 from benchmarks.benchmark import Setup
 from drone_rl.config import DynamicsSettings
 from drone_rl.flight.commands.command import Command, Hover, period_ticks
-from drone_rl.flight.commands.path_following import (
-    PathCommand,
-    braking_time,
-    distance_from,
-    make_paths,
-)
-from drone_rl.sim.dynamics import FlightState, Obstacles, Quadrotor
+from drone_rl.flight.commands.path_following import Path, PathCommand, braking_time
+from drone_rl.sim.dynamics import FlightState, Quadrotor
 
 HEIGHT = 5.0
 """Height of the first point of paths in metres."""
@@ -35,22 +29,16 @@ def square_error(side: float = 10.0, speed: float = 2.0) -> tuple[float, float]:
     """
     quadrotor = Quadrotor(DynamicsSettings(mode="simple_flight"))
     corners = [(0, 0), (side, 0), (side, side), (0, side), (0, 0)]
-    points = torch.tensor([[(x, y, HEIGHT) for x, y in corners]], dtype=torch.float64)
-    body = quadrotor.start(points[:, 0].clone())
-    command = PathCommand(
-        body,
-        points[:, 1:],
-        torch.tensor([speed], dtype=torch.float64),
-        3.0 * 4 * side / speed + 20.0,
-        braking=braking_time(quadrotor.settings),
-    )
-    states, last = fly_command(quadrotor, body, command)
-    positions = torch.cat([state.position for state in states])
-    distances = distance_from(make_paths(points.repeat(len(states), 1, 1)), positions)
-    end = int(last[0])
+    points = [(x, y, HEIGHT) for x, y in corners]
+    body = quadrotor.start(torch.tensor(points[:1], dtype=torch.float64))
+    braking = braking_time(quadrotor.settings)
+    command = PathCommand(body, points[1:], speed, 3.0 * 4 * side / speed + 20.0, braking=braking)
+    states, end = fly_command(quadrotor, body, command)
+    path = Path(points)
+    distances = [path.distance_from(state.position[0]) for state in states[: end + 1]]
     step = period_ticks(quadrotor.settings) * quadrotor.settings.tick
     seconds = end * step if end < len(states) else math.inf
-    return float(distances[: end + 1].mean()), seconds
+    return sum(distances) / len(distances), seconds
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,20 +51,17 @@ class HoverError:
     """Largest distance over all the time."""
 
 
-def hover_error(
-    settings: DynamicsSettings, *, seconds: float = 30.0, num_drones: int = 8, seed: int = 0
-) -> HoverError:
+def hover_error(settings: DynamicsSettings, *, seconds: float = 30.0, seed: int = 0) -> HoverError:
     """Hover 5 m above the ground, starting at rest in moving air.
 
     Args:
         settings: Settings of drone and air.
         seconds: Duration.
-        num_drones: Number of drones, each with its own gusts.
-        seed: Seed of the first drone's gusts; the others have the following seeds.
+        seed: Seed of the gusts.
     """
     quadrotor = Quadrotor(settings)
-    place = torch.tensor([[0.0, 0.0, 5.0]], dtype=torch.float64).repeat(num_drones, 1)
-    body = quadrotor.start(place, torch.arange(seed, seed + num_drones))
+    place = torch.tensor([[0.0, 0.0, 5.0]], dtype=torch.float64)
+    body = quadrotor.start(place, torch.tensor([seed]))
     states, _ = fly_command(quadrotor, body, Hover(body, seconds))
     distances = (torch.stack([state.position for state in states]) - place).norm(dim=-1)
     return HoverError(float(distances[len(distances) // 2 :].mean()), float(distances.max()))
@@ -109,30 +94,25 @@ def bench_flight_paths(setup: Setup) -> dict[str, Any]:
 def _wind_error(number: int) -> HoverError:
     angle = 2.0 * math.pi * number / _DIRECTIONS
     wind = (WIND * math.cos(angle), WIND * math.sin(angle), 0.0)
-    return hover_error(DynamicsSettings(mode="simple_flight", wind=wind), num_drones=1)
+    return hover_error(DynamicsSettings(mode="simple_flight", wind=wind))
 
 
 def fly_command(
-    quadrotor: Quadrotor,
-    body: FlightState,
-    command: Command,
-    seconds: float = math.inf,
-    obstacles: Obstacles | None = None,
-) -> tuple[list[FlightState], Tensor]:
-    """Run one command until all drones are complete; drones that are complete continue.
+    quadrotor: Quadrotor, body: FlightState, command: Command, seconds: float = math.inf
+) -> tuple[list[FlightState], int]:
+    """Run a command of one drone until it is complete.
 
     It ends after `seconds`, or the command's own limit, at the latest.
 
     Returns:
-        The state at the start and after each of T - 1 control periods, and the index of the first
-        one at which each drone was complete, of shape (num_envs,), int64; T if it never was.
+        The state at the start and after each of T - 1 control periods, and the index of the one at
+        which the command was complete; T if it never was.
     """
     ticks = period_ticks(quadrotor.settings)
     states = [body]
-    completed = torch.full((len(body),), -1)
     most = int(min(seconds, command.limit) / (ticks * quadrotor.settings.tick))
-    while len(states) <= most and bool((completed < 0).any()):
-        body = quadrotor.fly(body, command.goals(body), ticks, obstacles)
-        completed = torch.where((completed < 0) & command.is_complete(body), len(states), completed)
-        states.append(body)
-    return states, torch.where(completed < 0, len(states), completed)
+    while len(states) <= most:
+        states.append(quadrotor.fly(states[-1], command.goals(states[-1]), ticks))
+        if command.is_complete(states[-1]):
+            return states, len(states) - 1
+    return states, len(states)

@@ -56,7 +56,6 @@ if TYPE_CHECKING:
     from drone_rl.flight.commands.pilot import Pilot as Pilot
     from drone_rl.flight.commands.pilot import Sticks as Sticks
     from drone_rl.flight.commands.state import PilotState as PilotState
-    from drone_rl.flight.commands.state import Sensors as Sensors
     from drone_rl.flight.commands.state import Trajectory as Trajectory
     from drone_rl.flight.fly_page.server import FlyPage as FlyPage
     from drone_rl.flight.fly_page.server import fly as fly
@@ -69,6 +68,7 @@ if TYPE_CHECKING:
     from drone_rl.policies.policy import load_policy as load_policy
     from drone_rl.policies.sb3 import Sb3Logits as Sb3Logits
     from drone_rl.policies.sb3 import Sb3Trunk as Sb3Trunk
+    from drone_rl.sim.sensors import Sensors as Sensors
     from drone_rl.sim.tasks import register_task as register_task
     from drone_rl.training.demonstrations import Demonstration as Demonstration
     from drone_rl.training.demonstrations import FlightConditions as FlightConditions

@@ -29,7 +29,7 @@ def test_the_hover_error_follows_from_the_lean_angle():
     wind.
     """
     settings = DynamicsSettings(mode="simple_flight", wind=(5.0, 0.0, 0.0))
-    error = hover_error(settings, seconds=20.0, num_drones=1)
+    error = hover_error(settings, seconds=20.0)
     lean = 0.00538 * 1.225 * 25.0 / 9.81
     metres = lean / (0.2 * math.pi / 5.5) / (0.25 * 6.0)
     assert error.mean == pytest.approx(metres, rel=0.05)

@@ -11,9 +11,11 @@ STUB = Path(__file__).with_name("stub_firmware.py")
 
 
 @pytest.fixture(scope="session")
-def own_network():
+def own_network(tmp_path_factory):
     """Skips where a program can't have a network of its own: ports would be shared by tests."""
+    folder = tmp_path_factory.mktemp("network")
     with FirmwareProcess() as process:
+        process.start(["/bin/true"], folder, folder / "log")
         if process.shared:
             pytest.skip(f"no network namespaces here: {process.shared}")
 

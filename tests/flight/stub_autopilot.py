@@ -1,7 +1,6 @@
 """An autopilot of a thread: it speaks MAVLink and holds a height by a few gains."""
 
 import math
-import os
 import socket
 import threading
 
@@ -80,12 +79,5 @@ def on_tcp(port, **kwargs):
     link.settimeout(None)
     stub = StubAutopilot(lambda: link.recv(65536), link.sendall, **kwargs)
     stub.link = link
-    stub.start()
-    return stub
-
-
-def on_file(number, **kwargs):
-    """A stub on the far end of a pseudo-terminal."""
-    stub = StubAutopilot(lambda: os.read(number, 65536), lambda d: os.write(number, d), **kwargs)
     stub.start()
     return stub

@@ -11,7 +11,6 @@ import torch
 import drone_rl
 from drone_rl.envs import worlds_of
 from drone_rl.flight import sitl_evaluation as looped
-from drone_rl.flight.betaflight.process import FirmwareProcess
 from drone_rl.flight.in_the_loop.drone import FlightControllerError, NotReadyError
 from drone_rl.flight.sitl_evaluation import evaluate_in_the_loop
 from drone_rl.trust.bodies import chart
@@ -23,11 +22,8 @@ STUB = Path(__file__).parent / "stub_firmware.py"
 
 
 @pytest.fixture(scope="module")
-def program(tmp_path_factory):
-    """The stub as a program of its own, where it can have a network of its own."""
-    with FirmwareProcess() as keeping:
-        if keeping.shared:
-            pytest.skip(f"no network namespaces here: {keeping.shared}")
+def program(own_network, tmp_path_factory):
+    """The stub as a program of its own."""
     path = tmp_path_factory.mktemp("program") / "stub"
     path.write_text(f"#!/bin/sh\nexec {shlex.join([sys.executable, '-I', str(STUB), ''])}\n")
     path.chmod(0o755)

@@ -43,7 +43,7 @@ class CameraState:
     def capture(self, kind: ImageType) -> Capture:
         """Return the size and field of view of images of a type."""
         capture = self.captures.get(kind, _DEFAULT)
-        return capture if self.fov is None else dataclasses.replace(capture, fov=self.fov)
+        return capture if self.fov is None else capture._replace(fov=self.fov)
 
     def mounting(self, capture: Capture, vertical_fov: float) -> Mounting | None:
         """Return how it differs from the model's camera; None if it does not.
@@ -86,13 +86,11 @@ def make_cameras(
 
 
 def _camera(spec: Any, captures: Mapping[ImageType, Capture], choice: CameraChoice) -> CameraState:
-    offset = choice.offset
-    x, y, z = known(to_world((offset.x, offset.y, offset.z)), spec.pos)
-    attitude = _attitude(spec.name, offset)
+    x, y, z = known(to_world(choice.position), spec.pos)
+    attitude = _attitude(spec.name, choice)
     return CameraState(spec.name, {**captures, **choice.captures}, (x, y, z), attitude)
 
 
 def _attitude(name: str, offset: Offset) -> Tensor:
     """Return a camera's attitude in the drone's frame, at AirSim's angles where given. (4,)."""
-    angles = (offset.roll, offset.pitch, offset.yaw)
-    return attitude_of(*known(angles, _BASES.get(name, (0.0, 0.0, 0.0))))
+    return attitude_of(*known(offset.angles, _BASES.get(name, (0.0, 0.0, 0.0))))

@@ -1,7 +1,6 @@
 """Recordings: the vehicles' poses and images over time, as AirSim records them."""
 
 import contextlib
-import dataclasses
 import datetime
 import io
 import logging
@@ -15,10 +14,8 @@ from PIL import Image
 from torch import Tensor
 
 from drone_rl.flight.airsim.messages import Pose
-from drone_rl.flight.image_types import ImageType
-from drone_rl.sim.entities import find_camera
+from drone_rl.flight.airsim.settings_file import RecordedImage, RecordingChoice
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Flag, Real, Text, Whole
 
 _log = logging.getLogger(__name__)
 
@@ -27,82 +24,7 @@ _COLUMNS = (
 )
 
 
-@dataclasses.dataclass(frozen=True)
-class RecordedImage:
-    """An image in each row of a recording."""
-
-    camera: str
-    """One of our names of cameras."""
-    label: str
-    """The camera as the file calls it."""
-    kind: ImageType
-    as_float: bool
-    compress: bool
-    vehicle: str | None = None
-    """Its vehicle; None for the first one."""
-
-
-@dataclasses.dataclass(frozen=True)
-class RecordingChoice:
-    """Which rows and images recordings have."""
-
-    on_move: bool = False
-    """Whether rows of vehicles that have not moved are left out."""
-    interval: float = 0.05
-    """Mean simulated seconds between two rows, which are whole control periods apart."""
-    folder: str = ""
-    """Folder; "" for that of the server."""
-    is_enabled: bool = False
-    """Whether to record from the start."""
-    images: tuple[RecordedImage, ...] | None = None
-    """None for the scene in the front camera of each vehicle."""
-
-
-RECORDING = {
-    "RecordOnMove": Flag(),
-    "RecordInterval": Real(0.0, 1e6),
-    "Folder": Text(),
-    "Enabled": Flag(),
-}
-"""Keys of AirSim's settings, and their kinds."""
-RECORDED = {
-    "CameraName": Text(),
-    "ImageType": Whole(0, len(ImageType) - 1),
-    "PixelsAsFloat": Flag(),
-    "Compress": Flag(),
-    "VehicleName": Text(),
-}
-"""Those of one image."""
-_USUAL = (RecordedImage("front_center", "0", ImageType.SCENE, False, True),)
 _ORIGIN = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
-
-
-def read_choice(settings: Mapping[str, Any], file: str) -> RecordingChoice:
-    """Return the choice of settings with the keys of `RECORDING`, and a list `Cameras`.
-
-    Raises an `InputError` that names the file if a camera is unknown.
-    """
-    try:
-        images = [
-            RecordedImage(
-                find_camera(item.get("CameraName", "0")).name,
-                item.get("CameraName", "0"),
-                ImageType(item.get("ImageType", 0)),
-                item.get("PixelsAsFloat", False),
-                item.get("Compress", True),
-                item.get("VehicleName"),
-            )
-            for item in settings.get("Cameras", [])
-        ]
-    except InputError as error:
-        raise InputError(f"{file}: Recording.Cameras: {error}") from error
-    return RecordingChoice(
-        settings.get("RecordOnMove", False),
-        float(settings.get("RecordInterval", RecordingChoice.interval)),
-        settings.get("Folder", ""),
-        settings.get("Enabled", False),
-        tuple(images) if "Cameras" in settings else None,
-    )
 
 
 class Recording:
@@ -135,7 +57,9 @@ class Recording:
         """Return whether rows of this simulated time are due; if so, the next are due later."""
         if time < self._next - 1e-9:
             return False
-        self._next = max(self._next + self.choice.interval, time)  # late rows are not made up for
+        self._next = max(
+            self._next + self.choice.record_interval, time
+        )  # late rows are not made up for
         return True
 
     def write(
@@ -151,10 +75,11 @@ class Recording:
         first = next(iter(poses))
         try:
             for name, pose in poses.items():
-                if not self.choice.on_move or self._poses.get(name, _ORIGIN) != pose:
+                if not self.choice.record_on_move or self._poses.get(name, _ORIGIN) != pose:
                     self._poses[name] = pose
-                    chosen = [i for i in self.choice.images or () if name == (i.vehicle or first)]
-                    images = [*_USUAL] if self.choice.images is None else chosen
+                    images = [RecordedImage()]
+                    if (chosen := self.choice.cameras) is not None:
+                        images = [i for i in chosen if name == (i.vehicle_name or first)]
                     self._write_row(stamp, name, pose, images, render)
         except OSError as error:
             _log.error("the recording ends: it can't be written (%s)", error.strerror)
@@ -177,7 +102,7 @@ class Recording:
         files = []
         for image in images:
             ending = "pfm" if image.as_float else "png" if image.compress else "ppm"
-            files.append(f"img_{letters}_{image.label}_{image.kind.value}_{stamp}.{ending}")
+            files.append(f"img_{letters}_{image.label}_{image.image_type}_{stamp}.{ending}")
             _save(render(name, image), self.path / "images" / files[-1])
         values = (*pose.position, *pose.attitude)
         word = re.sub(r"[\s#]", "_", name) or "Vehicle"  # a column of numpy has no spaces

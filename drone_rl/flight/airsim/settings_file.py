@@ -4,32 +4,33 @@ The file may have single quotes, comments and trailing commas, as in the chapter
 that this package does not know are ignored; those that are like known ones are warned about.
 """
 
-import dataclasses
+import functools
 import json
 import logging
 import math
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, NamedTuple
 
-from drone_rl.flight.airsim.recording import RECORDED, RECORDING, RecordingChoice, read_choice
+import pydantic
+from pydantic import Field
+from pydantic.alias_generators import to_pascal
+
 from drone_rl.flight.image_types import ImageType
 from drone_rl.sim.coordinates import HOME, GeoPoint
 from drone_rl.sim.entities import find_camera
 from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.files import read_bytes
-from drone_rl.utils.schema import Flag, OneOf, Real, Text, Whole, shown
+from drone_rl.utils.models import Model
+from drone_rl.utils.schema import shown
 
 _log = logging.getLogger(__name__)
 
 PORT, ADDRESS = 41451, "127.0.0.1"
-SIM_MODES = ("Multirotor", "ComputerVision")
 FLYING, POSING, PX4 = "SimpleFlight", "ComputerVision", "PX4Multirotor"
 """Vehicle types: with dynamics and SimpleFlight's controller, without dynamics, and of PX4."""
 MAX_BYTES = 2**20
-_TYPES = (FLYING, POSING, PX4)
-_STATES = ("Armed", "Disarmed")
 _USUAL = ("SettingsVersion", "SimMode", "Vehicles")
 """Keys by which a file is recognized as AirSim's."""
 _COMMENT = r"//[^\n]*(?![^\n])|/\*(?:(?!\*/).)*(?:\*/|\Z)"
@@ -42,8 +43,7 @@ _TOKEN = re.compile(
 )
 
 
-@dataclasses.dataclass(frozen=True)
-class Capture:
+class Capture(NamedTuple):
     """Size and field of view of images of one type from one camera."""
 
     width: int = 256
@@ -53,103 +53,199 @@ class Capture:
     """Horizontal, degrees."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Offset:
+class _Section(Model):
+    """A part of the file with AirSim's keys, in which null, NaN and "" mean the default."""
+
+    model_config = pydantic.ConfigDict(
+        extra="ignore", strict=True, alias_generator=to_pascal, validate_by_name=True
+    )
+
+    @pydantic.model_validator(mode="before")
+    @classmethod
+    def _known(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping):
+            return data
+        names = [str(field.alias) for field in cls.model_fields.values()]
+        for key in data:
+            if key not in (*names, *cls.model_fields) and (meant := did_you_mean(key, names)):
+                _log.warning("settings: %s is unknown and ignored%s", key, meant)
+        return {k: v for k, v in data.items() if v not in (None, "") and v == v}
+
+
+_Coordinate = Annotated[float, Field(ge=-1e9, le=1e9)]
+_Pixels = Annotated[int, Field(ge=1, le=4096)]
+_Degrees = Annotated[float, Field(ge=1.0, le=170.0)]
+_Wind = Annotated[float, Field(ge=-50.0, le=50.0)]
+
+
+class Offset(_Section):
     """A pose in NED; metres and degrees. NaN components keep what is there."""
 
-    x: float = math.nan
-    y: float = math.nan
-    z: float = math.nan
-    roll: float = math.nan
-    pitch: float = math.nan
-    yaw: float = math.nan
+    x: _Coordinate = math.nan
+    y: _Coordinate = math.nan
+    z: _Coordinate = math.nan
+    roll: _Coordinate = math.nan
+    pitch: _Coordinate = math.nan
+    yaw: _Coordinate = math.nan
+
+    @property
+    def position(self) -> tuple[float, float, float]:
+        """Metres."""
+        return self.x, self.y, self.z
+
+    @property
+    def angles(self) -> tuple[float, float, float]:
+        """Roll, pitch and yaw, degrees."""
+        return self.roll, self.pitch, self.yaw
 
 
-@dataclasses.dataclass(frozen=True)
-class CameraChoice:
+class _CaptureSettings(_Section):
+    image_type: Annotated[int, Field(ge=-1, le=9)] = 0
+    width: _Pixels | None = None
+    height: _Pixels | None = None
+    fov: Annotated[_Degrees | None, Field(alias="FOV_Degrees")] = None
+
+
+class CameraChoice(Offset):
     """Where a camera is mounted, relative to the vehicle, and its images."""
 
-    offset: Offset = Offset()
-    captures: Mapping[ImageType, Capture] = dataclasses.field(default_factory=dict)
-    """By type, where they differ from the defaults."""
+    capture_settings: list[_CaptureSettings] = Field(default_factory=list)
+
+    @property
+    def captures(self) -> dict[ImageType, Capture]:
+        """Images by type, where they differ from the defaults."""
+        captures: dict[ImageType, Capture] = {}
+        for item in self.capture_settings:
+            for kind in ImageType:
+                if item.image_type in (-1, kind):
+                    changes = item.model_dump(exclude={"image_type"}, exclude_none=True)
+                    captures[kind] = captures.get(kind, Capture())._replace(**changes)
+        return captures
 
 
-@dataclasses.dataclass(frozen=True)
-class VehicleChoice:
-    """A vehicle to create."""
+class VehicleChoice(Offset):
+    """A vehicle to create, and its start pose in the world."""
 
-    name: str
-    kind: str = FLYING
-    """One of SimpleFlight, ComputerVision and PX4Multirotor."""
-    start: Offset = Offset()
-    """Start pose in the world."""
-    is_armed: bool = True
-    has_api_control: bool = False
-    cameras: Mapping[str, CameraChoice] = dataclasses.field(default_factory=dict)
+    vehicle_type: str = ""
+    """SimpleFlight, ComputerVision or PX4Multirotor; "" for that of the simulation's mode."""
+    default_vehicle_state: Literal["Armed", "Disarmed"] = "Armed"
+    auto_create: bool = True
+    has_api_control: Annotated[bool, Field(alias="AllowAPIAlways")] = False
+    cameras: dict[str, CameraChoice] = Field(default_factory=dict)
     """By our names of cameras."""
 
+    @pydantic.field_validator("cameras")
+    @classmethod
+    def _named(cls, cameras: dict[str, CameraChoice]) -> dict[str, CameraChoice]:
+        return {find_camera(name).name: camera for name, camera in cameras.items()}
 
-@dataclasses.dataclass(frozen=True)
-class AirsimSettings:
+
+class RecordedImage(_Section):
+    """An image in each row of a recording."""
+
+    label: Annotated[str, Field(alias="CameraName")] = "0"
+    """The camera as the file calls it."""
+    image_type: Annotated[int, Field(ge=0, lt=len(ImageType))] = 0
+    as_float: Annotated[bool, Field(alias="PixelsAsFloat")] = False
+    compress: bool = True
+    vehicle_name: str | None = None
+    """Its vehicle; None for the first one."""
+
+    @pydantic.field_validator("label")
+    @classmethod
+    def _exists(cls, label: str) -> str:
+        find_camera(label)
+        return label
+
+
+class RecordingChoice(_Section):
+    """Which rows and images recordings have."""
+
+    record_on_move: bool = False
+    """Whether rows of vehicles that have not moved are left out."""
+    record_interval: Annotated[float, Field(ge=0.0, le=1e6)] = 0.05
+    """Mean simulated seconds between two rows, which are whole control periods apart."""
+    folder: str = ""
+    """Folder; "" for that of the server."""
+    enabled: bool = False
+    """Whether to record from the start."""
+    cameras: list[RecordedImage] | None = None
+    """None for the scene in the front camera of each vehicle."""
+
+
+class _Origin(_Section):
+    latitude: Annotated[float, Field(ge=-90.0, le=90.0)] = HOME.latitude
+    longitude: Annotated[float, Field(ge=-180.0, le=180.0)] = HOME.longitude
+    altitude: Annotated[float, Field(ge=-1000.0, le=10_000.0)] = HOME.altitude
+
+
+class _WindSettings(_Section):
+    x: _Wind = 0.0
+    y: _Wind = 0.0
+    z: _Wind = 0.0
+
+
+class _SegmentationSettings(_Section):
+    init_method: Literal["CommonObjectsRandomIDs", "None"] = "CommonObjectsRandomIDs"
+
+
+class AirsimSettings(_Section):
     """Content of a settings file."""
 
-    sim_mode: str = SIM_MODES[0]
-    address: str = ADDRESS
-    port: int = PORT
-    clock_speed: float = 1.0
+    settings_version: float | None = None
+    sim_mode: Literal["Multirotor", "ComputerVision"] = "Multirotor"
+    usage_scenario: str = ""
+    address: Annotated[str, Field(alias="LocalHostIp")] = ADDRESS
+    port: Annotated[int, Field(alias="ApiServerPort", ge=0, le=65535)] = PORT
+    clock_speed: Annotated[float, Field(gt=0.0, le=1000.0)] = 1.0
     """Simulated seconds per second of real time."""
-    home: GeoPoint = HOME
-    """Place on Earth of the world's origin."""
-    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    origin_geopoint: _Origin = _Origin()
+    wind: _WindSettings = _WindSettings()
     """Metres per second, NED."""
-    captures: Mapping[ImageType, Capture] = dataclasses.field(default_factory=dict)
-    """Of all cameras, by type."""
-    vehicles: tuple[VehicleChoice, ...] = ()
-    segmentation: str = "CommonObjectsRandomIDs"
-    """How segmentation ids are assigned at the start; "None" for 0 everywhere."""
-    recording: RecordingChoice = dataclasses.field(default_factory=RecordingChoice)
+    camera_defaults: CameraChoice = CameraChoice()
+    """Of all cameras; only its captures apply."""
+    vehicles: dict[str, VehicleChoice] = Field(default_factory=dict)
+    segmentation_settings: _SegmentationSettings = _SegmentationSettings()
+    recording: RecordingChoice = RecordingChoice()
     text: str = "{}"
     """The file, as JSON."""
 
+    @property
+    def is_posing(self) -> bool:
+        """Whether no vehicle has dynamics."""
+        return POSING in (self.sim_mode, self.usage_scenario)
 
-_NUMBER = Real(-1e9, 1e9)
-_POSE = dict.fromkeys(("X", "Y", "Z", "Roll", "Pitch", "Yaw"), _NUMBER)
-_CAPTURE = {
-    "ImageType": Whole(-1, 9),
-    "Width": Whole(1, 4096),
-    "Height": Whole(1, 4096),
-    "FOV_Degrees": Real(1.0, 170.0),
-}
-_CAMERA = {**_POSE, "CaptureSettings": [_CAPTURE]}
-_VEHICLE = {
-    **_POSE,
-    "VehicleType": OneOf(_TYPES, also=("ArduCopter", "PhysXCar", "ArduRover")),
-    "DefaultVehicleState": OneOf(_STATES, also=("",)),
-    "AutoCreate": Flag(),
-    "AllowAPIAlways": Flag(),
-    "Cameras": {"": _CAMERA},
-}
-_FILE = {
-    "SettingsVersion": _NUMBER,
-    "SimMode": OneOf(SIM_MODES, also=("Car", "car", "")),
-    "UsageScenario": Text(),
-    "ApiServerPort": Whole(0, 65535),
-    "ApiServerEndpoint": Text(),  # unused
-    "LocalHostIp": Text(),
-    "ClockSpeed": Real(0.0, 1000.0, is_above=True),
-    "ClockType": Text(),  # unused
-    "OriginGeopoint": {
-        "Latitude": Real(-90.0, 90.0),
-        "Longitude": Real(-180.0, 180.0),
-        "Altitude": Real(-1000.0, 10_000.0),
-    },
-    "Wind": dict.fromkeys(("X", "Y", "Z"), Real(-50.0, 50.0)),
-    "CameraDefaults": _CAMERA,
-    "Vehicles": {"": _VEHICLE},
-    "Recording": {**RECORDING, "Cameras": [RECORDED]},
-    "SegmentationSettings": {"InitMethod": OneOf(("CommonObjectsRandomIDs", "None"), also=("",))},
-}
-"""Keys of the file, with the kinds of their values; "" is any key, a list has one kind of items."""
+    @property
+    def home(self) -> GeoPoint:
+        """Place on Earth of the world's origin."""
+        return GeoPoint(**self.origin_geopoint.model_dump())
+
+    @functools.cached_property
+    def choices(self) -> dict[str, VehicleChoice]:
+        """The vehicles to create, with their types; one if the file has none."""
+        usual, choices = POSING if self.is_posing else FLYING, dict[str, VehicleChoice]()
+        for name, choice in self.vehicles.items():
+            kind = choice.vehicle_type or usual
+            if choice.auto_create and kind not in (FLYING, POSING, PX4):
+                raise InputError(
+                    f"Vehicles.{name}.VehicleType={kind} is not supported; give one of "
+                    f"{FLYING}, {POSING}, {PX4}"
+                )
+            if choice.auto_create:
+                kind = POSING if self.is_posing else kind
+                choices[name] = choice.model_copy(update={"vehicle_type": kind})
+            if choice.auto_create and kind == PX4:
+                _log.warning(
+                    "settings: Vehicles.%s.VehicleType=%s: there is no PX4; SimpleFlight's "
+                    "controller flies it",
+                    *(name, kind),
+                )
+        return choices or {usual: VehicleChoice(vehicle_type=usual)}
+
+    @pydantic.model_validator(mode="after")
+    def _check(self) -> "AirsimSettings":
+        _ = self.choices
+        return self
 
 
 def find_settings() -> AirsimSettings | None:
@@ -171,7 +267,7 @@ def find_settings() -> AirsimSettings | None:
                     "%s: LocalHostIp=%s is ignored; give settings=FILE or address=",
                     *(path, shown(settings.address)),
                 )
-            return dataclasses.replace(settings, address=ADDRESS)
+            return settings.model_copy(update={"address": ADDRESS})
     return None
 
 
@@ -206,38 +302,8 @@ def _read_text(path: Path) -> str:
 def parse_settings(text: str, name: str = "settings.json") -> AirsimSettings:
     """Read settings from the text of a file; see `read_settings` for errors."""
     data = _load(text, name)
-    settings = _read(_FILE, data, "", name) or {}
-    if settings.get("SimMode", "").lower() == "car":
-        raise InputError(f"{name}: SimMode=Car is not supported; give {' or '.join(SIM_MODES)}")
-    scenario = settings.get("UsageScenario", "")
-    posed = "ComputerVision" in (scenario, settings.get("SimMode"))
-    mode = SIM_MODES[1] if posed else SIM_MODES[0]
-    defaults = settings.get("CameraDefaults", {})
-    vehicles = [
-        _vehicle(vehicle, values, mode, name)
-        for vehicle, values in settings.get("Vehicles", {}).items()
-        if values.get("AutoCreate", True)
-    ]
-    default = VehicleChoice(_kind(mode), _kind(mode))
-    origin, wind = settings.get("OriginGeopoint", {}), settings.get("Wind", {})
-    return AirsimSettings(
-        sim_mode=mode,
-        address=settings.get("LocalHostIp") or ADDRESS,
-        port=settings.get("ApiServerPort", PORT),
-        clock_speed=float(settings.get("ClockSpeed", 1.0)),
-        home=GeoPoint(
-            float(origin.get("Latitude", HOME.latitude)),
-            float(origin.get("Longitude", HOME.longitude)),
-            float(origin.get("Altitude", HOME.altitude)),
-        ),
-        wind=(float(wind.get("X", 0)), float(wind.get("Y", 0)), float(wind.get("Z", 0))),
-        captures=_captures(defaults),
-        vehicles=tuple(vehicles) or (default,),
-        segmentation=settings.get("SegmentationSettings", {}).get("InitMethod")
-        or AirsimSettings.segmentation,
-        recording=read_choice(settings.get("Recording", {}), name),
-        text=json.dumps(data),
-    )
+    settings = AirsimSettings.read(data, name)
+    return settings.model_copy(update={"text": json.dumps(data)})
 
 
 def _load(text: str, name: str) -> Any:
@@ -268,92 +334,3 @@ def _as_json(text: str) -> Iterator[str]:
 
 def _is_closed(comment: str) -> bool:
     return comment.startswith("//") or (len(comment) > 3 and comment.endswith("*/"))
-
-
-def _read(kind: Any, value: Any, where: str, name: str) -> Any:
-    """Return a value of a kind, or of a table of kinds, without keys that mean nothing here.
-
-    None stands for null and NaN, which mean the default. Keys like known ones are warned about; a
-    wrong value is an `InputError` with the key's path.
-    """
-    if value is None or (isinstance(value, float) and math.isnan(value)):
-        return None
-    path = f"{name}: {where or 'the file'}"
-    if isinstance(kind, list):
-        if not isinstance(value, list):
-            raise InputError(f"{path} is not a list; write [...]")
-        return [_read(kind[0], item, f"{where}[{i}]", name) or {} for i, item in enumerate(value)]
-    if not isinstance(kind, Mapping):
-        return kind.read(value, path)
-    if not isinstance(value, Mapping):
-        raise InputError(f"{path} is not an object; write {{...}}")
-    return _read_table(kind, value, where, name)
-
-
-def _read_table(
-    kind: Mapping[str, Any], value: Mapping[str, Any], where: str, name: str
-) -> dict[str, Any]:
-    table: dict[str, Any] = {}
-    for key, item in value.items():
-        inner = f"{where}.{key}" if where else key
-        if key in kind or "" in kind:
-            content = _read(kind.get(key) or kind[""], item, inner, name)
-            if content is not None:
-                table[key] = content
-        elif meant := did_you_mean(key, kind):
-            _log.warning("%s: %s is unknown and ignored%s", name, inner, meant)
-    return table
-
-
-def _kind(mode: str) -> str:
-    return FLYING if mode == SIM_MODES[0] else POSING
-
-
-def _vehicle(vehicle: str, settings: Mapping[str, Any], mode: str, name: str) -> VehicleChoice:
-    kind = settings.get("VehicleType") or _kind(mode)
-    if kind not in _TYPES:
-        raise InputError(
-            f"{name}: Vehicles.{vehicle}.VehicleType={kind} is not supported; give one of "
-            f"{', '.join(_TYPES)}"
-        )
-    if kind == PX4:
-        _log.warning(
-            "%s: Vehicles.%s.VehicleType=%s: there is no PX4; SimpleFlight's controller flies it",
-            *(name, vehicle, kind),
-        )
-    cameras: dict[str, CameraChoice] = {}
-    for camera, values in settings.get("Cameras", {}).items():
-        try:
-            spec = find_camera(camera)
-        except InputError as error:
-            raise InputError(f"{name}: Vehicles.{vehicle}.Cameras.{camera}: {error}") from error
-        cameras[spec.name] = CameraChoice(_offset(values), _captures(values))
-    return VehicleChoice(
-        name=vehicle,
-        kind=POSING if mode == SIM_MODES[1] else kind,
-        start=_offset(settings),
-        is_armed=settings.get("DefaultVehicleState") != "Disarmed",
-        has_api_control=bool(settings.get("AllowAPIAlways", False)),
-        cameras=cameras,
-    )
-
-
-def _offset(settings: Mapping[str, Any]) -> Offset:
-    return Offset(*(float(settings.get(key, math.nan)) for key in _POSE))
-
-
-def _captures(settings: Mapping[str, Any]) -> dict[ImageType, Capture]:
-    captures: dict[ImageType, Capture] = {}
-    for item in settings.get("CaptureSettings", []):
-        kind = item.get("ImageType", 0)
-        kinds = (
-            list(ImageType) if kind == -1 else [ImageType(kind)] if kind < len(ImageType) else []
-        )
-        for one in kinds:
-            old = captures.get(one, Capture())
-            captures[one] = Capture(
-                item.get("Width") or old.width,
-                item.get("Height") or old.height,
-                float(item.get("FOV_Degrees") or old.fov),
-            )
-    return captures

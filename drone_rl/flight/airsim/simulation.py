@@ -22,17 +22,19 @@ from drone_rl.flight.airsim.messages import (
     to_world,
 )
 from drone_rl.flight.airsim.messages import pose as pose_map
-from drone_rl.flight.airsim.recording import RecordedImage, Recording
+from drone_rl.flight.airsim.recording import Recording
 from drone_rl.flight.airsim.settings_file import (
     FLYING,
     POSING,
     AirsimSettings,
-    Offset,
+    RecordedImage,
     VehicleChoice,
 )
 from drone_rl.flight.airsim.stage import Stage
 from drone_rl.flight.airsim.vehicle import Vehicle
+from drone_rl.flight.image_types import ImageType
 from drone_rl.sim.coordinates import Attitude
+from drone_rl.sim.entities import find_camera
 from drone_rl.utils.errors import InputError, did_you_mean
 
 _MOST_VEHICLES = 100
@@ -74,21 +76,20 @@ class Simulation:
         self.settings, self.clock, self.seed = settings, chosen.clock, chosen.seed
         self.raw_channels = chosen.raw_channels
         self.stage = Stage(chosen.scene, chosen.seed, renderer=chosen.renderer)
-        if settings.segmentation == "None":
+        if settings.segmentation_settings.init_method == "None":
             self.stage.clear_ids()
-        x, y, z = settings.wind
+        wind = settings.wind
         self._dynamics = DynamicsSettings().replace(
-            mode="simple_flight", camera_mount="body", wind=(x, -y, -z)
+            mode="simple_flight", camera_mount="body", wind=to_world((wind.x, wind.y, wind.z))
         )
-        posing = settings.sim_mode == POSING
-        self._origin = self.stage.start_height if posing else self._dynamics.radius
+        self._origin = self.stage.start_height if settings.is_posing else self._dynamics.radius
         """Height at which vehicles start, and z is 0 for clients, metres."""
         self._start = time.time_ns() if self.clock == "wall" else read_date(chosen.date)
         self._ticks = 0
         """Physics ticks that have passed."""
         self.vehicles: dict[str, Vehicle] = {}
-        for choice in settings.vehicles:
-            self.add(choice)
+        for name, choice in settings.choices.items():
+            self.add(name, choice)
         self.is_paused = False
         self.recording: Recording | None = None
         self._recordings = recordings
@@ -99,7 +100,7 @@ class Simulation:
         """Seconds by which the last such call lasted too long, which the next one lasts less."""
         self._anchor = (time.monotonic(), 0.0)
         """A time of `time.monotonic`, and the simulated seconds then."""
-        if settings.recording.is_enabled:
+        if settings.recording.enabled:
             self.start_recording()
 
     @property
@@ -117,14 +118,15 @@ class Simulation:
         """The present time stamp: nanoseconds since 1970."""
         return self._start + nanoseconds(self.time)
 
-    def add(self, choice: VehicleChoice) -> Vehicle:
+    def add(self, name: str, choice: VehicleChoice) -> Vehicle:
         """Create a vehicle; an `InputError` if its name is taken, or there are too many."""
-        if choice.name in self.vehicles:
-            raise InputError(f"vehicle {choice.name!r} is there already; give another name")
+        if name in self.vehicles:
+            raise InputError(f"vehicle {name!r} is there already; give another name")
         if len(self.vehicles) >= _MOST_VEHICLES:
             raise InputError(f"there are {_MOST_VEHICLES} vehicles; no more can be added")
         names, home = self.stage.names[1:], self.settings.home
         vehicle = Vehicle(
+            name,
             choice,
             self._dynamics,
             self.stage.worlds,
@@ -135,8 +137,8 @@ class Simulation:
             seed=(self.seed + len(self.vehicles)) % 2**31,
         )
         vehicle.epoch = self.stamp
-        self.vehicles[choice.name] = vehicle
-        vehicle.cameras = make_cameras(self.settings.captures, choice.cameras)
+        self.vehicles[name] = vehicle
+        vehicle.cameras = make_cameras(self.settings.camera_defaults.captures, choice.cameras)
         return vehicle
 
     def add_named(self, name: str, kind: str, pose: Pose) -> bool:
@@ -147,9 +149,9 @@ class Simulation:
         angles = Attitude(0.0, 0.0, 0.0)
         if not any(map(math.isnan, pose.attitude)):
             angles = Attitude.of(attitude_to_world(pose.attitude).tolist())
-        x, y, z = pose.position
-        start = Offset(x, y, z, angles.roll, angles.pitch, angles.yaw)
-        self.add(VehicleChoice(name, vehicle_kind, start))
+        turn = {"roll": angles.roll, "pitch": angles.pitch, "yaw": angles.yaw}
+        place = dict(zip("xyz", pose.position, strict=True))
+        self.add(name, VehicleChoice(vehicle_type=vehicle_kind, **place, **turn))
         return True
 
     def find(self, name: str, *, is_sim_api: bool = False) -> Vehicle:
@@ -201,7 +203,7 @@ class Simulation:
         self.teleport(vehicle, pose._replace(position=place), ignore_collision=ignore_collision)
 
     def teleport(self, vehicle: Vehicle, pose: Pose, *, ignore_collision: bool) -> None:
-        """Put a vehicle somewhere, see `Airframe.set_airsim_pose`; it touches cubes on its way."""
+        """Put a vehicle somewhere, see `Vehicle.set_airsim_pose`; it touches cubes on its way."""
         before = None if ignore_collision else vehicle.body.position[0].clone()
         others = (one for one in self._flying() if one is not vehicle)
         vehicle.set_airsim_pose(pose, ignore_collision=ignore_collision, others=others)
@@ -374,8 +376,9 @@ class Simulation:
 
     def _recorded(self, name: str, image: RecordedImage) -> Tensor:
         vehicle = self.vehicles[name]
-        (shot,) = self.stage.render(vehicle.body, vehicle.cameras[image.camera], [image.kind])
-        return self.stage.image(image.kind, shot, as_float=image.as_float)
+        camera, kind = vehicle.cameras[find_camera(image.label).name], ImageType(image.image_type)
+        (shot,) = self.stage.render(vehicle.body, camera, [kind])
+        return self.stage.image(kind, shot, as_float=image.as_float)
 
     def stop_recording(self) -> None:
         """End a recording."""

@@ -1,110 +1,125 @@
-"""A firmware's process and its sockets, through `drone_rl.flight.betaflight.supervisor`."""
+"""A firmware's process and its sockets; see `drone_rl.flight.betaflight.launcher`."""
 
 import contextlib
-import json
 import logging
+import os
 import socket
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
+from drone_rl.flight.betaflight import launcher
+from drone_rl.flight.betaflight.launcher import CLI_PORT, RC_PORT, ROTOR_PORT, STATE_PORT
 from drone_rl.flight.in_the_loop.drone import FlightControllerError
 from drone_rl.utils.errors import InputError
 
-STATE_PORT, RC_PORT, ROTOR_PORT, CLI_PORT = 9003, 9004, 9002, 5761
-"""UDP into the firmware: state, RC channels; UDP out of it: rotors; TCP: its command line."""
-_SUPERVISOR = Path(__file__).with_name("supervisor.py")
 _log = logging.getLogger(__name__)
 
 
 class FirmwareProcess:
-    """Runs at most one firmware, which ends with this object however this ends."""
+    """Runs at most one firmware, which ends with this object or with the thread that started it."""
+
+    rotors: socket.socket
+    """Receives the rotor commands of the last firmware."""
+    state: socket.socket
+    """Sends states to it."""
+    sticks: socket.socket
+    """Sends RC channels to it."""
+    cli: socket.socket
+    """For its command line; see `connect`."""
 
     def __init__(self, *, isolated: bool = True, patience: float = 10.0) -> None:
-        """Start the supervisor, each of whose answers must come within `patience` seconds.
+        """Take whether each firmware has its own network namespace, if the system allows it.
 
-        With `isolated` the firmware has its own network namespace if the system allows it; else it
-        uses this machine's network, with a warning.
+        Else it uses this machine's network, with a warning. A firmware must start within `patience`
+        seconds.
+        """
+        self._network, self._patience = "own" if isolated else "shared", patience
+        self._process: subprocess.Popen[bytes] | None = None
+        self._sockets = contextlib.ExitStack()
+        self.shared = ""
+        """Reason why the last firmware has no own network; empty if it has."""
+
+    def start(self, program: Sequence[str], folder: Path, log: Path) -> None:
+        """Start the firmware, after stopping the previous one; its output is appended to a log.
 
         Raises:
             InputError: Without a namespace, a port that the firmware needs is in use.
-            FlightControllerError: The supervisor doesn't answer.
-        """
-        ours, theirs = socket.socketpair()
-        self._link = ours
-        with theirs:
-            number = theirs.fileno()
-            command = [sys.executable, "-I", str(_SUPERVISOR), str(number)]
-            command.append("own" if isolated else "shared")
-            self._process = subprocess.Popen(command, pass_fds=[number])
-        try:
-            ours.settimeout(patience)
-            self.shared = str(self._reply()[0]["shared"])
-            """Reason why the firmware has no own network; empty if it has."""
-            if self.shared:
-                check_ports()
-                _log.warning(
-                    "the firmware listens on this machine's network (UDP %d and %d, TCP from %d), "
-                    "not in a namespace: %s",
-                    *(STATE_PORT, RC_PORT, CLI_PORT, self.shared),
-                )
-        except BaseException:
-            self.close()
-            raise
-
-    def start(self, program: Sequence[str], folder: Path, log: Path) -> int:
-        """Start the firmware, after stopping the previous one, and return its process id.
-
-        Its output is appended to a log.
-
-        Raises:
             FlightControllerError: It can't be started.
         """
-        values = {"program": list(program), "folder": str(folder), "log": str(log)}
-        return self._ask("start", **values)[0]["pid"]
+        self.close()
+        ours, theirs = socket.socketpair()
+        with ours, log.open("ab") as file:
+            with theirs:
+                descriptor = theirs.fileno()
+                launch = [sys.executable, "-I", launcher.__file__, str(descriptor), self._network]
+                self._process = subprocess.Popen(
+                    [*launch, *program],
+                    cwd=folder,
+                    stdin=subprocess.DEVNULL,
+                    stdout=file,
+                    stderr=subprocess.STDOUT,
+                    pass_fds=[descriptor],
+                )
+            ours.settimeout(self._patience)
+            try:
+                self._note(ours.recv(4096).decode())
+                ours.sendall(b"\n")
+                _, descriptors, _, _ = socket.recv_fds(ours, 1, 4)
+                sockets = [socket.socket(fileno=descriptor) for descriptor in descriptors]
+            except BaseException:
+                self.close()
+                raise
+            if len(sockets) < 4:
+                raise FlightControllerError(f"the firmware can't be started; see its log {log}")
+            for sock in sockets:
+                self._sockets.enter_context(sock)
+            self.rotors, self.state, self.sticks, self.cli = sockets
+
+    def _note(self, reason: str) -> None:
+        reason = reason.strip()
+        if reason and reason != self.shared:
+            check_ports()
+            _log.warning(
+                "the firmware listens on this machine's network (UDP %d and %d, TCP from %d), "
+                "not in a namespace: %s",
+                *(STATE_PORT, RC_PORT, CLI_PORT, reason),
+            )
+        self.shared = reason
 
     def status(self) -> int | None:
-        """Return the firmware's exit status; None while it runs."""
-        return self._ask("poll")[0]["status"]
+        """Return the firmware's exit status; None while it runs, 0 before the first start."""
+        return self._process.poll() if self._process else 0
 
-    def connect(self, kind: str, port: int) -> socket.socket:
-        """Open a socket in the firmware's network; see `supervisor.make_socket`."""
-        _, descriptors = self._ask("connect", kind=kind, port=port)
-        sock = socket.socket(fileno=descriptors[0])
-        sock.setblocking(True)
-        return sock
-
-    def connect_within(self, kind: str, port: int, patience: float) -> socket.socket:
-        """Open a socket, as `connect` does, to a firmware that is starting.
+    def connect(self, patience: float) -> socket.socket:
+        """Connect to the command line of a firmware that is starting.
 
         Raises:
             FlightControllerError: Not in so many seconds, or the firmware has ended.
         """
         end = time.monotonic() + patience
-        while True:
-            try:
-                return self.connect(kind, port)
-            except FlightControllerError:
-                status = self.status()
-                if status is not None:
-                    raise FlightControllerError(
-                        f"the firmware ended with status {status}"
-                    ) from None
-                if time.monotonic() > end:
-                    raise
+        while error := self.cli.connect_ex(("127.0.0.1", CLI_PORT)):
+            status = self.status()
+            if status is not None:
+                raise FlightControllerError(f"the firmware ended with status {status}")
+            if time.monotonic() > end:
+                raise FlightControllerError(f"can't connect: {os.strerror(error)}")
             time.sleep(0.02)
+        return self.cli
 
     def close(self) -> None:
-        """Stop the firmware and the supervisor."""
-        self._link.close()
-        try:
-            self._process.wait(5.0)
-        except subprocess.TimeoutExpired:
-            self._process.kill()  # the firmware is killed with it
-            self._process.wait()
+        """Stop the firmware."""
+        self._sockets.close()
+        if self._process is not None and self._process.poll() is None:
+            self._process.terminate()
+            try:
+                self._process.wait(1.0)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
 
     def __enter__(self) -> Self:
         """Return itself."""
@@ -113,34 +128,6 @@ class FirmwareProcess:
     def __exit__(self, *exception: object) -> None:
         """See `close`."""
         self.close()
-
-    def _ask(self, request: str, **values: Any) -> tuple[dict[str, Any], list[int]]:
-        text = json.dumps({"request": request, **values}).encode() + b"\n"
-        try:
-            self._link.sendall(text)
-        except OSError as error:
-            raise FlightControllerError(f"the firmware's supervisor is gone: {error}") from error
-        reply, descriptors = self._reply()
-        if "error" in reply:
-            raise FlightControllerError(
-                f"the firmware's supervisor can't {request}: {reply['error']}"
-            )
-        return reply, descriptors
-
-    def _reply(self) -> tuple[dict[str, Any], list[int]]:
-        text, descriptors = b"", []
-        while not text.endswith(b"\n"):
-            try:
-                part, more, _, _ = socket.recv_fds(self._link, 4096, 1)
-            except OSError as error:
-                self._link.close()  # a late answer must not be taken for that of another request
-                raise FlightControllerError(
-                    f"the firmware's supervisor doesn't answer: {error}"
-                ) from error
-            if not part:
-                raise FlightControllerError("the firmware's supervisor is gone")
-            text, descriptors = text + part, descriptors + more
-        return json.loads(text), descriptors
 
 
 def check_ports() -> None:

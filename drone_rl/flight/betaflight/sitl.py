@@ -27,13 +27,7 @@ import torch
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.dynamics import GRAVITY
 from drone_rl.flight.betaflight.build import find_firmware
-from drone_rl.flight.betaflight.process import (
-    CLI_PORT,
-    RC_PORT,
-    ROTOR_PORT,
-    STATE_PORT,
-    FirmwareProcess,
-)
+from drone_rl.flight.betaflight.process import FirmwareProcess
 from drone_rl.flight.in_the_loop.control import FULL_ANGLE, FULL_YAW_RATE, LOWEST, RcSticks
 from drone_rl.flight.in_the_loop.drone import TICK, DroneInTheLoop, FlightControllerError
 from drone_rl.flight.in_the_loop.instruments import Readings, Vector
@@ -129,9 +123,6 @@ class Betaflight:
             self._process = stack.enter_context(FirmwareProcess(isolated=self.isolated))
             if not (self.folder / MEMORY).exists():
                 self._set_up()
-            self._hear = stack.enter_context(self._process.connect("bound", ROTOR_PORT))
-            self._state = stack.enter_context(self._process.connect("udp", STATE_PORT))
-            self._sticks = stack.enter_context(self._process.connect("udp", RC_PORT))
             self._start()
             self._open = stack.pop_all()
         return self
@@ -149,12 +140,12 @@ class Betaflight:
         """
         if readings.time >= self._next_sticks:
             self._next_sticks = readings.time + STICKS_EVERY
-            self._send(self._sticks, pack_sticks(readings.time, sticks.channels))
+            self._send(self._process.sticks, pack_sticks(readings.time, sticks.channels))
         self._drop_late_answers()
-        self._send(self._state, pack_state(readings))
+        self._send(self._process.state, pack_state(readings))
         begin = time.monotonic()
         try:
-            self._rotors = unpack_rotors(self._hear.recv(64))
+            self._rotors = unpack_rotors(self._process.rotors.recv(64))
             self._silence = 0.0
         except TimeoutError:
             self.missed += 1
@@ -175,11 +166,11 @@ class Betaflight:
             sock.send(packet)
 
     def _drop_late_answers(self) -> None:
-        self._hear.setblocking(False)
+        self._process.rotors.setblocking(False)
         with contextlib.suppress(BlockingIOError):
             while True:
-                self._hear.recv(64)
-        self._hear.settimeout(self.answer_within)
+                self._process.rotors.recv(64)
+        self._process.rotors.settimeout(self.answer_within)
 
     def _start(self) -> None:
         """Start the firmware and wait until it steps.
@@ -198,10 +189,10 @@ class Betaflight:
     def _answers(self) -> bool:
         for _ in range(_AWAKE):
             self._drop_late_answers()
-            self._send(self._state, pack_state(_STANDING))
-            self._hear.settimeout(_WAKES_WITHIN)  # packets before it listens are lost
+            self._send(self._process.state, pack_state(_STANDING))
+            self._process.rotors.settimeout(_WAKES_WITHIN)  # packets before it listens are lost
             try:
-                self._hear.recv(64)
+                self._process.rotors.recv(64)
             except TimeoutError:
                 return False
         return True
@@ -211,13 +202,13 @@ class Betaflight:
         angle = round(float(np.degrees(FULL_ANGLE)))
         yaw = round(float(np.degrees(FULL_YAW_RATE)) / 10.0)
         try:
-            with self._process.connect_within("tcp", CLI_PORT, self.patience) as cli:
-                cli.settimeout(self.patience)
-                _command(cli, b"#")
-                for line in SETUP:
-                    _command(cli, line.format(angle=angle, yaw=yaw).encode() + b"\n")
-                cli.sendall(b"save\n")
-                self._wait_for_end()
+            cli = self._process.connect(self.patience)
+            cli.settimeout(self.patience)
+            _command(cli, b"#")
+            for line in SETUP:
+                _command(cli, line.format(angle=angle, yaw=yaw).encode() + b"\n")
+            cli.sendall(b"save\n")
+            self._wait_for_end()
         except (OSError, FlightControllerError) as error:
             (self.folder / MEMORY).unlink(missing_ok=True)  # partial settings must not be reused
             raise FlightControllerError(f"the firmware can't be set up: {error}") from error

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import torch
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
@@ -55,8 +54,8 @@ def time_limit(timeout: float | None, length: float, speed: float) -> float:
     return 10.0 + 3.0 * length / speed if timeout is None else DURATION.read(timeout, "timeout")
 
 
-def path(points: Any) -> Tensor:
-    """Return the points (x, y, z) of a path, metres, world frame. Shape: (1, P, 3), float64.
+def path(points: Any) -> list[list[float]]:
+    """Return the points (x, y, z) of a path, metres, world frame.
 
     Raises:
         InputError: The path is empty or a point is invalid.
@@ -71,7 +70,7 @@ def path(points: Any) -> Tensor:
         COORDINATE.read(x, f"path[{number}].x")
         COORDINATE.read(y, f"path[{number}].y")
         height(z, f"path[{number}].z")
-    return torch.from_numpy(places)[None]
+    return places.tolist()
 
 
 def quadrotor(

@@ -2,11 +2,10 @@
 
 import abc
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.sim.dynamics import FlightGoals, FlightState, Mode
@@ -34,7 +33,10 @@ class PilotError(InputError):
 
 
 class Command(abc.ABC):
-    """A command that a batch of drones starts at the same time. An instance is used once."""
+    """A command of one drone. An instance is used once.
+
+    Poses to hold are x, y, heading and z, as in `FlightState.reference`.
+    """
 
     limit: float = math.inf
     """Seconds after which the command ends."""
@@ -45,49 +47,36 @@ class Command(abc.ABC):
     def goals(self, body: FlightState) -> FlightGoals:
         """Return the goals for the next control period."""
 
-    def is_complete(self, body: FlightState) -> Tensor:
-        """Return which drones have completed the command. Shape: (num_envs,), bool.
+    def is_complete(self, body: FlightState) -> bool:
+        """Return whether the command is complete.
 
         Called once in each control period, so that a command may count periods.
         """
-        return torch.zeros(len(body), dtype=torch.bool)
+        return False
 
-    def rest(self, body: FlightState) -> Tensor | None:
-        """Return the pose to hold after success, or None if the command sets no position.
-
-        Shape: (num_envs, 4), as in `FlightState.reference`.
-        """
+    def rest(self, body: FlightState) -> list[float] | None:
+        """Return the pose to hold after success, or None if the command sets no position."""
         del body
         return None
 
 
-def goals_of(
-    body: FlightState,
-    modes: Modes,
-    x: float | Tensor,
-    y: float | Tensor,
-    heading: float | Tensor,
-    z: float | Tensor,
-) -> FlightGoals:
-    """Build goals from scalars (for all drones) or tensors of shape (num_envs,).
+def goals_of(modes: Modes, *values: float, climb: float = 0.0) -> FlightGoals:
+    """Build the goals of one drone: x, y, heading and z.
 
-    A value is what its mode says: a position, velocity, angle or rate.
+    A value is what its mode says: a position, velocity, angle or rate. A height changes by `climb`,
+    metres per second.
     """
-    goals, count = (x, y, heading, z), len(body)
-    if count == 1 and body.numbers.device.type == "cpu":
-        row = np.array([[float(value) for value in goals]])
-        return FlightGoals(modes, torch.from_numpy(row))  # a tenth of the time, in each period
-    values = (torch.as_tensor(value, dtype=torch.float64) for value in goals)
-    return FlightGoals(modes, torch.stack([value.expand(count) for value in values], -1))
+    drift = torch.tensor([[0.0, 0.0, 0.0, climb]], dtype=torch.float64) if climb else None
+    return FlightGoals(modes, torch.from_numpy(np.array([values], dtype=np.float64)), drift)
 
 
-def hold(reference: Tensor) -> FlightGoals:
-    """Return goals that hold a pose. Shape: (num_envs, 4), as in `FlightState.reference`."""
-    return FlightGoals(HOLD, reference)
+def hold(pose: Sequence[float]) -> FlightGoals:
+    """Return goals that hold a pose; see `Command`."""
+    return goals_of(HOLD, *pose)
 
 
 def all_rotors(thrust: float) -> FlightGoals:
-    """Return goals for one drone whose rotors all have this fraction of full thrust."""
+    """Return goals of rotors that all have this fraction of full thrust."""
     return rotor_goals(torch.full((1, 4), thrust, dtype=torch.float64))
 
 
@@ -112,14 +101,14 @@ class Hover(Command):
 
     def __init__(self, body: FlightState, duration: float) -> None:
         """Take the state at the start and the duration in seconds."""
-        self.reference, self.limit = body.reference.clone(), duration
+        self.reference, self.limit = body.reference[0].tolist(), duration
 
     def goals(self, body: FlightState) -> FlightGoals:
         """See `Command`."""
         del body
         return hold(self.reference)
 
-    def rest(self, body: FlightState) -> Tensor:
+    def rest(self, body: FlightState) -> list[float] | None:
         """See `Command`."""
         del body
         return self.reference
@@ -137,15 +126,13 @@ class RotateToCommand(Hover):
         heading error of at most the margin.
         """
         super().__init__(body, limit)
-        self.heading, self.margin = heading, margin
-        self.reference[:, 2] = heading
+        self.reference[2], self.margin = heading, margin
 
-    def is_complete(self, body: FlightState) -> Tensor:
-        """Return which drones have the heading and do not turn."""
-        missing = self.heading - body.heading
-        missing = torch.atan2(missing.sin(), missing.cos())
-        is_still = body.angular_velocity[:, 2].abs() <= _STILL
-        return (missing.abs() <= self.margin) & is_still
+    def is_complete(self, body: FlightState) -> bool:
+        """Return whether the drone has the heading and does not turn."""
+        missing = math.remainder(self.reference[2] - float(body.heading[0]), math.tau)
+        is_still = abs(float(body.angular_velocity[0, 2])) <= _STILL
+        return abs(missing) <= self.margin and is_still
 
 
 class RotateByCommand(Hover):
@@ -158,36 +145,41 @@ class RotateByCommand(Hover):
 
     def goals(self, body: FlightState) -> FlightGoals:
         """See `Command`."""
-        x, y, _, z = self.reference.unbind(-1)
-        modes = (Mode.POSITION, Mode.POSITION, Mode.RATE, Mode.POSITION)
-        return goals_of(body, modes, x, y, self.rate, z)
+        x, y, _, z = self.reference
+        return goals_of(
+            (Mode.POSITION, Mode.POSITION, Mode.RATE, Mode.POSITION), x, y, self.rate, z
+        )
 
-    def rest(self, body: FlightState) -> Tensor:
+    def rest(self, body: FlightState) -> list[float]:
         """Return the position with the heading that the drone has now."""
-        after = self.reference.clone()
-        after[:, 2] = body.heading
-        return after
+        x, y, _, z = self.reference
+        return [x, y, float(body.heading[0]), z]
 
 
-class Land(Command):
+class Land(Hover):
     """Descends at the reference position until the drone stands."""
 
-    def __init__(self, body: FlightState, limit: float) -> None:
-        """Take the state at the start and the time limit in seconds."""
-        self.limit, self.reference = limit, body.reference.clone()
-        self._stopped = torch.zeros(len(body), dtype=torch.int64)
+    succeeds_at_limit = False
+
+    def __init__(self, body: FlightState, limit: float, pose: list[float] | None = None) -> None:
+        """Take the state at the start, the time limit in seconds, and a pose other than its own."""
+        super().__init__(body, limit)
+        self.reference = pose or self.reference
+        self._stopped = 0
 
     def goals(self, body: FlightState) -> FlightGoals:
         """See `Command`."""
-        x, y, heading, _ = self.reference.unbind(-1)
         modes = (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.VELOCITY)
-        return goals_of(body, modes, x, y, heading, -LANDING_SPEED)
+        return goals_of(modes, *self.reference[:3], -LANDING_SPEED)
 
-    def is_complete(self, body: FlightState) -> Tensor:
+    def is_complete(self, body: FlightState) -> bool:
         """Count periods without sinking; see `Command`."""
-        is_still = body.velocity[:, 2].abs() <= _STOPPED
-        self._stopped = torch.where(is_still, self._stopped + 1, 0)
+        is_still = abs(float(body.velocity[0, 2])) <= _STOPPED
+        self._stopped = self._stopped + 1 if is_still else 0
         return self._stopped > _STOPPED_PERIODS
+
+    def rest(self, body: FlightState) -> None:
+        """See `Command`."""
 
 
 class FlightFuture:

@@ -23,7 +23,7 @@ from drone_rl.flight.commands.command import (
     period_ticks,
 )
 from drone_rl.flight.commands.path_following import GoHomeCommand
-from drone_rl.flight.commands.state import LandedState, PilotState, Sensors, Trajectory
+from drone_rl.flight.commands.state import LandedState, PilotState, Trajectory
 from drone_rl.flight.image_types import ImageRequest, images
 from drone_rl.sim.coordinates import attitude_of
 from drone_rl.sim.dynamics import FlightGoals, FlightState, Obstacles, Quadrotor
@@ -31,6 +31,7 @@ from drone_rl.sim.dynamics import state as fs
 from drone_rl.sim.dynamics.state import twist_about_z
 from drone_rl.sim.entities import FRONT_CENTER, find_camera
 from drone_rl.sim.rendering.view import Modality
+from drone_rl.sim.sensors import Sensors
 from drone_rl.sim.tasks import State
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
@@ -136,7 +137,7 @@ class Drone:
         """Remaining ticks of the period."""
         self._coasting = 0
         """Ticks for which the last goals hold after a command that set no position."""
-        self._place: Tensor | None = None
+        self._place: list[float] | None = None
         """Pose to hold without a command."""
 
     def __enter__(self) -> Self:
@@ -328,7 +329,7 @@ class Drone:
             self._place = None
             return None
         if self._place is None:
-            self._place = self.body.settled().reference.clone()
+            self._place = self.body.settled().reference[0].tolist()
         return hold(self._place)
 
     def _fly(self, goals: FlightGoals | None, ticks: int) -> None:
@@ -379,7 +380,7 @@ class Drone:
         command = future.command
         if self._is_lost:
             self._end(False)
-        elif bool(command.is_complete(self.body)[0]):
+        elif command.is_complete(self.body):
             self._end(True)
         elif future.elapsed >= command.limit - 1e-9:
             self._end(command.succeeds_at_limit)
@@ -398,6 +399,6 @@ class Drone:
         if success and isinstance(command, Land | GoHomeCommand):
             self._settle()
         if self._place is not None:
-            self.body.reference[:] = self._place
+            self.body.reference[0] = torch.tensor(self._place)
         if self._place is not None or not self._is_flying:
             self._coasting = 0

@@ -1,20 +1,19 @@
 """Path following by pure pursuit to a lookahead point on a polyline; heading control on the way.
 
-All functions are batched over `num_envs` paths of P points each (the last point may be repeated).
-Positions are in metres in the world frame; `along` is an arc length in metres.
+Positions are in metres in the world frame, shape (3,); `along` is an arc length in metres.
 """
 
 import dataclasses
 import enum
 import math
 
-import torch
-from torch import Tensor
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.dynamics import GRAVITY
-from drone_rl.flight.commands.checks import degrees
-from drone_rl.flight.commands.command import ACCURACY, PERIOD, Command, Land
+from drone_rl.flight.commands.checks import degrees, time_limit
+from drone_rl.flight.commands.command import ACCURACY, PERIOD, Command, Land, goals_of
 from drone_rl.sim.coordinates import to_simulator
 from drone_rl.sim.dynamics import FlightGoals, FlightState, Mode
 from drone_rl.utils.errors import InputError
@@ -93,22 +92,63 @@ class YawControl:
             )
         self.mode = Mode.RATE if is_rate else Mode.ANGLE
         """Goal mode of the heading."""
-        self._heading = body.heading.clone()
+        self._heading = float(body.heading[0])
 
-    def goal(self, travel: Tensor) -> Tensor:
-        """Return the heading goals, radians (per second). Shape: (num_envs,).
+    def goal(self, x: float, y: float) -> float:
+        """Return the heading goal, radians (per second).
 
-        `travel` is a displacement or velocity in the world frame, shape (num_envs, 3); up to a
-        horizontal length of `ACCURACY` the previous goal is kept.
+        x and y are of a displacement or velocity in the world frame; up to a length of `ACCURACY`
+        the previous goal is kept.
         """
         *_, wanted = to_simulator(0.0, 0.0, math.radians(self.yaw_mode.yaw_or_rate))
         if not self.is_forward:
             holds = self.yaw_mode.is_rate and self.mode is Mode.ANGLE
-            return self._heading if holds else torch.full_like(travel[:, 0], wanted)
-        x, y, _ = travel.unbind(-1)
-        along = torch.atan2(y, x) + wanted
-        self._heading = torch.where(torch.hypot(x, y) > ACCURACY, along, self._heading)
+            return self._heading if holds else wanted
+        if math.hypot(x, y) > ACCURACY:
+            self._heading = math.atan2(y, x) + wanted
         return self._heading
+
+
+class Path:
+    """A polyline."""
+
+    def __init__(self, points: ArrayLike) -> None:
+        """Take the waypoints, at least two; some may be equal. Shape: (P, 3)."""
+        self.points: NDArray[np.float64] = np.array(points, dtype=np.float64)
+        steps = np.diff(self.points, axis=0)
+        lengths = np.linalg.norm(steps, axis=-1)
+        self.along = np.concatenate([[0.0], np.cumsum(lengths)])
+        """Arc length at each waypoint. Shape: (P,)."""
+        self.directions = steps / np.maximum(lengths, 1e-12)[:, None]
+        """Unit vectors from each waypoint to the next; zeros between equal ones. (P - 1, 3)."""
+        self.length = float(self.along[-1])
+
+    def place_at(self, along: float) -> NDArray[np.float64]:
+        """Return the point at an arc length, clamped to the ends."""
+        line = self._line_at(along)
+        rest = min(along, self.length) - self.along[line]
+        return self.points[line] + rest * self.directions[line]
+
+    def direction_at(self, along: float) -> NDArray[np.float64]:
+        """Return the unit tangent at an arc length, of the later segment at a waypoint."""
+        return self.directions[self._line_at(along)]
+
+    def nearest(self, position: ArrayLike, first: float = 0.0, last: float = math.inf) -> float:
+        """Return the arc length of the nearest point between two arc lengths."""
+        starts = self.along[:-1]
+        low, high = np.maximum(starts, first), np.minimum(self.along[1:], last)
+        away = np.asarray(position) - self.points[:-1]
+        along = np.clip((away * self.directions).sum(-1) + starts, low, np.maximum(low, high))
+        missing = away - (along - starts)[:, None] * self.directions
+        distance = np.where(low > high, np.inf, np.linalg.norm(missing, axis=-1))
+        return float(along[distance.argmin()])
+
+    def distance_from(self, position: ArrayLike) -> float:
+        """Return the distance of a position."""
+        return float(np.linalg.norm(np.asarray(position) - self.place_at(self.nearest(position))))
+
+    def _line_at(self, along: float) -> int:
+        return int((self.along[1:-1] <= along).sum())
 
 
 class PathCommand(Command):
@@ -117,89 +157,83 @@ class PathCommand(Command):
     def __init__(
         self,
         body: FlightState,
-        points: Tensor,
-        speed: float | Tensor,
-        limit: float,
+        points: ArrayLike,
+        speed: float,
+        timeout: float | None = None,
         *,
         yaw_control: YawControl | None = None,
         lookahead: float = AUTOMATIC,
         adaptive: float = 1.0,
         braking: float = 1.8,
     ) -> None:
-        """Take the state at the start and the waypoints, metres. Shape: (num_envs, P, 3).
+        """Take the state at the start and the waypoints, metres. Shape: (P, 3).
 
-        The speed is in metres per second, for all drones or for each, shape (num_envs,); the
-        command fails after `limit` seconds. See `lookahead_of` for `lookahead` and `adaptive`, and
-        `braking_time`. A lookahead that is too short is an `InputError`.
+        The speed is in metres per second; for `timeout` see `time_limit`, for `lookahead` and
+        `adaptive` `lookahead_of`, and `braking_time`. A lookahead that is too short is an
+        `InputError`.
         """
-        self.limit, self.adaptive = limit, adaptive
-        self.paths = make_paths(torch.cat([body.position[:, None], points], 1))
-        """The paths, from the position at the start through all waypoints."""
-        self.speed = torch.as_tensor(speed, dtype=torch.float64).expand(len(points))
-        ahead = [lookahead_of(pace, lookahead, adaptive) for pace in self.speed.tolist()]
-        self.lookahead = self._ahead = self.speed.new_tensor(ahead)
+        self.path = Path([body.position[0].tolist(), *np.asarray(points)])
+        """From the position at the start through all waypoints."""
+        self.limit = time_limit(timeout, self.path.length, speed)
+        self.speed, self.adaptive = speed, adaptive
+        self.lookahead = self._ahead = lookahead_of(speed, lookahead, adaptive)
         self.yaw_control = yaw_control or YawControl(body)
-        self.along = torch.zeros(len(body), dtype=torch.float64)
-        last = direction_at(self.paths, (self.paths.lengths - 1e-6).clamp(min=0.0))
-        level = last[:, :2].norm(dim=-1)
+        self.along = 0.0
+        last = self.path.direction_at(max(self.path.length - 1e-6, 0.0))
+        level = math.hypot(*last[:2])
         self.braking = level * braking + (1.0 - level) * _VERTICAL_BRAKING
 
     def goals(self, body: FlightState) -> FlightGoals:
         """See `Command`."""
-        position, paths = body.position, self.paths
-        self.along = nearest(paths, position, self.along, self.along + self._ahead)
-        place = place_at(paths, self.along)
-        self._ahead = self.lookahead + self.adaptive * (position - place).norm(dim=-1)
-        ahead = place_at(paths, self.along + self._ahead) - position
-        pace = torch.maximum(self._pace(self._left(body)), self.speed.clamp(max=_SLOWEST))
-        sideways = ahead[:, :2] * (pace / ahead.norm(dim=-1).clamp(min=1e-9))[:, None]
-        heading = self.yaw_control.goal(ahead)
-        values = torch.cat([sideways, heading[:, None], place[:, 2:]], 1)
-        drift = torch.zeros_like(values)
-        climb = self._pace(paths.lengths - self.along)
-        drift[:, 3] = climb * direction_at(paths, self.along)[:, 2]
+        position, path = body.position[0].numpy(), self.path
+        self.along = path.nearest(position, self.along, self.along + self._ahead)
+        place = path.place_at(self.along)
+        self._ahead = self.lookahead + self.adaptive * math.dist(position, place)
+        ahead = path.place_at(self.along + self._ahead) - position
+        pace = max(self._pace(self._left(position)), min(self.speed, _SLOWEST))
+        x, y, _ = ahead * (pace / max(math.hypot(*ahead), 1e-9))
+        climb = self._pace(path.length - self.along) * float(path.direction_at(self.along)[2])
         modes = (Mode.VELOCITY, Mode.VELOCITY, self.yaw_control.mode, Mode.POSITION)
-        return FlightGoals(modes, values, drift)
+        return goals_of(modes, x, y, self.yaw_control.goal(*ahead[:2]), place[2], climb=climb)
 
-    def is_complete(self, body: FlightState) -> Tensor:
-        """Return which drones are near the last point, with the end of the path in lookahead."""
-        is_last = self.along + self._ahead >= self.paths.lengths
-        return is_last & ((self.paths.ends - body.position).norm(dim=-1) <= ACCURACY)
+    def is_complete(self, body: FlightState) -> bool:
+        """Return whether the last point is near, and the end of the path in lookahead."""
+        is_last = self.along + self._ahead >= self.path.length
+        return is_last and math.dist(self.path.points[-1], body.position[0].numpy()) <= ACCURACY
 
-    def rest(self, body: FlightState) -> Tensor:
-        """Return the last points, with the commanded heading if there is one."""
-        heading = body.heading
-        if self.yaw_control.mode == Mode.ANGLE:
-            heading = self.yaw_control.goal(torch.zeros_like(self.paths.ends))
-        x, y, z = self.paths.ends.unbind(-1)
-        return torch.stack([x, y, heading, z], -1)
+    def rest(self, body: FlightState) -> list[float]:
+        """Return the last point, with the commanded heading if there is one."""
+        is_angle = self.yaw_control.mode is Mode.ANGLE
+        heading = self.yaw_control.goal(0.0, 0.0) if is_angle else float(body.heading[0])
+        x, y, z = self.path.points[-1].tolist()
+        return [x, y, heading, z]
 
-    def _pace(self, left: Tensor) -> Tensor:
+    def _pace(self, left: float) -> float:
         """Return the speed, m/s, at a distance from the end."""
-        return torch.minimum(left / self.braking, self.speed)
+        return min(left / self.braking, self.speed)
 
-    def _left(self, body: FlightState) -> Tensor:
+    def _left(self, position: NDArray[np.float64]) -> float:
         """Return the distance to the end along the path, near it at least the straight distance."""
-        beyond = (self.paths.ends - body.position).norm(dim=-1)
-        left = self.paths.lengths - self.along
-        return torch.where(left > self._ahead, left, torch.maximum(left, beyond))
+        left = self.path.length - self.along
+        beyond = math.dist(self.path.points[-1], position)
+        return left if left > self._ahead else max(left, beyond)
 
 
 class TakeoffCommand(PathCommand):
     """Climbs straight up."""
 
-    def __init__(self, body: FlightState, limit: float) -> None:
-        """Take the state at the start and the time limit in seconds."""
-        up = body.position.new_tensor([0.0, 0.0, TAKEOFF_HEIGHT])
-        super().__init__(body, (body.position + up)[:, None], TAKEOFF_SPEED, limit)
+    def __init__(self, body: FlightState, timeout: float | None = None) -> None:
+        """Take the state at the start; see `PathCommand`."""
+        x, y, z = body.position[0].tolist()
+        super().__init__(body, [(x, y, z + TAKEOFF_HEIGHT)], TAKEOFF_SPEED, timeout)
 
-    def is_complete(self, body: FlightState) -> Tensor:
-        """Return which drones have reached the height."""
-        return body.position[:, 2] >= self.paths.ends[:, 2] - _TAKEOFF_MARGIN
+    def is_complete(self, body: FlightState) -> bool:
+        """Return whether the drone has reached the height."""
+        return float(body.position[0, 2]) >= self.path.points[-1, 2] - _TAKEOFF_MARGIN
 
 
 class GoHomeCommand(Command):
-    """Follows a path and lands once every drone has reached its end."""
+    """Follows a path and lands at its end."""
 
     def __init__(self, path: PathCommand, landing_limit: float) -> None:
         """Take the path, and the seconds that may be added to its time limit for the landing."""
@@ -211,15 +245,13 @@ class GoHomeCommand(Command):
         """See `Command`."""
         return (self._landing or self._path).goals(body)
 
-    def is_complete(self, body: FlightState) -> Tensor:
-        """Return which drones have landed; switch to landing at the end of the path."""
+    def is_complete(self, body: FlightState) -> bool:
+        """Return whether the drone has landed; switch to landing at the end of the path."""
         if self._landing is not None:
             return self._landing.is_complete(body)
-        there = self._path.is_complete(body)
-        if bool(there.all()):
-            self._landing = Land(body, self.limit)
-            self._landing.reference[:] = self._path.rest(body)
-        return torch.zeros_like(there)
+        if self._path.is_complete(body):
+            self._landing = Land(body, self.limit, self._path.rest(body))
+        return False
 
 
 def lookahead_of(speed: float, lookahead: float = AUTOMATIC, adaptive: float = 1.0) -> float:
@@ -247,72 +279,3 @@ def braking_time(settings: DynamicsSettings) -> float:
     """
     pull = GRAVITY * settings.velocity_gain * settings.angle_limit
     return min(2.0 / max(pull, 1e-3), 20.0)
-
-
-@dataclasses.dataclass(frozen=True)
-class Paths:
-    """A batch of polylines."""
-
-    points: Tensor  # (num_envs, P, 3) float64
-    """Waypoints in order."""
-    along: Tensor  # (num_envs, P) float64
-    """Arc length at each waypoint."""
-    directions: Tensor  # (num_envs, P - 1, 3) float64
-    """Unit vectors from each waypoint to the next; zeros between equal waypoints."""
-
-    @property
-    def ends(self) -> Tensor:
-        """The last points. Shape: (num_envs, 3)."""
-        return self.points[:, -1]
-
-    @property
-    def lengths(self) -> Tensor:
-        """Lengths of the paths. Shape: (num_envs,)."""
-        return self.along[:, -1]
-
-
-def make_paths(points: Tensor) -> Paths:
-    """Build paths through points. Shape: (num_envs, P, 3), P at least 2."""
-    steps = points.diff(dim=1)
-    lengths = steps.norm(dim=-1)
-    along = torch.nn.functional.pad(lengths.cumsum(-1), (1, 0))
-    return Paths(points, along, steps / lengths.clamp(min=1e-12)[..., None])
-
-
-def place_at(paths: Paths, along: Tensor) -> Tensor:
-    """Return the points at arc lengths, clamped to the ends. Shape: (num_envs, 3)."""
-    row, line = _segments_at(paths, along)
-    rest = (torch.minimum(along, paths.lengths) - paths.along[row, line])[:, None]
-    return paths.points[row, line] + rest * paths.directions[row, line]
-
-
-def direction_at(paths: Paths, along: Tensor) -> Tensor:
-    """Return the unit tangents at arc lengths. Shape: (num_envs, 3)."""
-    return paths.directions[_segments_at(paths, along)]
-
-
-def nearest(paths: Paths, position: Tensor, first: Tensor, last: Tensor) -> Tensor:
-    """Return the arc lengths of the nearest points between `first` and `last`.
-
-    Shapes: (num_envs, 3) of the position, else (num_envs,).
-    """
-    low = torch.maximum(paths.along[:, :-1], first[:, None])
-    high = torch.minimum(paths.along[:, 1:], last[:, None])
-    away = position[:, None] - paths.points[:, :-1]
-    reach = (away * paths.directions).sum(-1) + paths.along[:, :-1]
-    lengths = torch.minimum(torch.maximum(reach, low), high)
-    rest = (lengths - paths.along[:, :-1])[..., None] * paths.directions
-    distance = (away - rest).norm(dim=-1).masked_fill(low > high, torch.inf)
-    return lengths.gather(1, distance.argmin(1, keepdim=True))[:, 0]
-
-
-def distance_from(paths: Paths, position: Tensor) -> Tensor:
-    """Return the distances of positions from whole paths. Shape: (num_envs,)."""
-    along = nearest(paths, position, torch.zeros_like(paths.lengths), paths.lengths)
-    return (position - place_at(paths, along)).norm(dim=-1)
-
-
-def _segments_at(paths: Paths, along: Tensor) -> tuple[Tensor, Tensor]:
-    """Return row and index of the segment at each arc length; the later one at a waypoint."""
-    line = (paths.along[:, 1:-1] <= along[:, None]).sum(-1)
-    return torch.arange(len(line), device=line.device), line

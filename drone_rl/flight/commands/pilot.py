@@ -22,7 +22,6 @@ from drone_rl.flight.commands.command import (
 from drone_rl.flight.commands.computer_vision import SceneDrone
 from drone_rl.flight.commands.path_following import (
     AUTOMATIC,
-    TAKEOFF_HEIGHT,
     TAKEOFF_SPEED,
     Drivetrain,
     GoHomeCommand,
@@ -118,8 +117,7 @@ class Pilot(SceneDrone):
             raise PilotError(
                 f"can't take off while moving at {speed:.2g} m/s; wait until the drone stands still"
             )
-        limit = checks.time_limit(timeout, TAKEOFF_HEIGHT, TAKEOFF_SPEED)
-        return self._start("take_off", TakeoffCommand(self.body, limit), wait)
+        return self._start("take_off", TakeoffCommand(self.body, timeout), wait)
 
     def land(self, timeout: float | None = None, *, wait: bool = True) -> bool | FlightFuture:
         """Descend at 0.2 m/s until the drone stands."""
@@ -132,11 +130,9 @@ class Pilot(SceneDrone):
     ) -> bool | FlightFuture:
         """Fly to the starting position at the present height and land there."""
         pace = checks.SPEED.read(speed, "speed")
-        position = self.body.position
-        over = torch.cat([self.home[:2], position[0, 2:]])[None, None]
-        away, height = float((over[0] - position).norm()), float(position[0, 2])
-        limit, braking = checks.time_limit(timeout, away, pace), braking_time(self.settings)
-        path = PathCommand(self.body, over, pace, limit, braking=braking)
+        (x, y, _), height = self.home.tolist(), float(self.body.position[0, 2])
+        braking = braking_time(self.settings)
+        path = PathCommand(self.body, [(x, y, height)], pace, timeout, braking=braking)
         landing = checks.time_limit(None, height, LANDING_SPEED) if timeout is None else 0.0
         return self._run("go_home", GoHomeCommand(path, landing), wait)
 
@@ -169,11 +165,11 @@ class Pilot(SceneDrone):
         tilt = checks.radians(roll, "roll", 90.0), checks.radians(pitch, "pitch", 90.0)
         name, value = ("yaw", yaw) if yaw_rate is None else ("yaw_rate", yaw_rate)
         x, y, wanted = to_simulator(*tilt, checks.radians(0.0 if value is None else value, name))
-        turn = self.body.heading if value is None else wanted
+        turn = float(self.body.heading[0]) if value is None else wanted
         turn_mode = Mode.ANGLE if yaw_rate is None else Mode.RATE
         lift_mode, lift = self._lift(z, throttle)
         modes: Modes = (Mode.ANGLE, Mode.ANGLE, turn_mode, lift_mode)
-        goals = goals_of(self.body, modes, x, y, turn, lift)
+        goals = goals_of(modes, x, y, turn, lift)
         return self._hold("move_by_angle", goals, duration, wait)
 
     def move_by_rates(
@@ -191,7 +187,7 @@ class Pilot(SceneDrone):
         named = ((roll, "roll"), (pitch, "pitch"), (yaw, "yaw"))
         x, y, turn = to_simulator(*(checks.radians(value, name) for value, name in named))
         lift_mode, lift = self._lift(z, throttle)
-        goals = goals_of(self.body, (Mode.RATE, Mode.RATE, Mode.RATE, lift_mode), x, y, turn, lift)
+        goals = goals_of((Mode.RATE, Mode.RATE, Mode.RATE, lift_mode), x, y, turn, lift)
         return self._hold("move_by_rates", goals, duration, wait)
 
     def move_by_rotors(
@@ -234,10 +230,9 @@ class Pilot(SceneDrone):
         height = up if z is None else checks.height(z)
         up_mode = Mode.VELOCITY if z is None else Mode.POSITION
         modes: Modes = (sideways, sideways, control.mode, up_mode)
-        travel = torch.tensor([[x, y, 0.0]], dtype=torch.float64)
 
         def goals(body: FlightState) -> FlightGoals:
-            return goals_of(body, modes, x, y, control.goal(travel), height)
+            return goals_of(modes, x, y, control.goal(x, y), height)
 
         command = TimedCommand(goals, checks.DURATION.read(duration, "duration"))
         return self._run("move_by_velocity", command, wait)
@@ -262,13 +257,11 @@ class Pilot(SceneDrone):
         path. A lookahead that is too short is an `InputError`.
         """
         points, pace = checks.path(path), checks.SPEED.read(speed, "speed")
-        whole = torch.cat([self.body.position[:, None], points], 1)
-        length = float(whole.diff(dim=1).norm(dim=-1).sum())
         command = PathCommand(
             self.body,
             points,
             pace,
-            checks.time_limit(timeout, length, pace),
+            timeout,
             yaw_control=YawControl(self.body, drivetrain, yaw_mode),
             lookahead=checks.COORDINATE.read(lookahead, "lookahead"),
             adaptive=Real(0.0, 100.0).read(adaptive_lookahead, "adaptive_lookahead"),
@@ -334,16 +327,16 @@ class Pilot(SceneDrone):
         climb = Real(0.0).read(z_max, "z_max")
         control = YawControl(self.body, drivetrain, yaw_mode)
         modes: Modes = (Mode.VELOCITY, Mode.VELOCITY, control.mode, Mode.POSITION)
-        cos, sin = self.body.heading.cos(), self.body.heading.sin()
+        ahead = float(self.body.heading[0])
+        cos, sin = math.cos(ahead), math.sin(ahead)
 
         def goals(body: FlightState) -> FlightGoals:
             sticks = Instance(Sticks).read(self.sticks, "sticks")
             forward, left = sticks.pitch * fastest[0], -sticks.roll * fastest[1]
             x, y = cos * forward - sin * left, sin * forward + cos * left
-            heading = control.goal(torch.stack([x, y, torch.zeros_like(x)], -1))
-            heading = heading - math.radians(YAW_AT_FULL_STICK) * sticks.yaw
-            z = (body.position[:, 2] + sticks.throttle * climb).clamp(min=0.0)
-            return goals_of(body, modes, x, y, heading, z)
+            heading = control.goal(x, y) - math.radians(YAW_AT_FULL_STICK) * sticks.yaw
+            z = max(0.0, float(body.position[0, 2]) + sticks.throttle * climb)
+            return goals_of(modes, x, y, heading, z)
 
         command = TimedCommand(goals, checks.DURATION.read(duration, "duration"))
         return self._run("move_by_manual", command, wait)

@@ -1,4 +1,4 @@
-"""A drone's state, sensors and trajectory as users read them."""
+"""A drone's state and trajectory as users read them."""
 
 import dataclasses
 import enum
@@ -9,8 +9,7 @@ from typing import Self
 import numpy as np
 from torch import Tensor
 
-from drone_rl.config.sensors import SensorSettings
-from drone_rl.sim.coordinates import HOME, Attitude, GeoPoint
+from drone_rl.sim.coordinates import Attitude
 from drone_rl.sim.dynamics import FlightState
 from drone_rl.sim.dynamics.state import (
     ATTITUDE,
@@ -20,13 +19,6 @@ from drone_rl.sim.dynamics.state import (
     REFERENCE,
     ROTORS,
     VELOCITY,
-)
-from drone_rl.sim.sensors import (
-    BarometerReading,
-    GpsReading,
-    ImuReading,
-    MagnetometerReading,
-    SensorSuite,
 )
 from drone_rl.utils.display import table
 
@@ -129,51 +121,6 @@ def _triple(rows: Tensor) -> Triple:
     """Return the first row of a tensor of shape (1, 3)."""
     x, y, z = rows[0].tolist()
     return x, y, z
-
-
-class Sensors:
-    """IMU, barometer, magnetometer and GPS receiver of one drone.
-
-    Readings have batch shape (1, *). They are sampled in each control period, seven ticks by
-    default, even if a sensor's rate is higher.
-    """
-
-    def __init__(
-        self, body: FlightState, settings: SensorSettings, seed: int = 0, home: GeoPoint = HOME
-    ) -> None:
-        """Turn the sensors of one drone on.
-
-        `seed` is that of the noise, and `home` the place on Earth of the world's origin.
-        """
-        self.settings = settings
-        """Rates, latencies and noise."""
-        self._suite = SensorSuite(settings, seed=seed, home=home)
-        self._state = self._suite.start(body)
-
-    @property
-    def time(self) -> float:
-        """Simulated seconds since the sensors were turned on; the clock of the readings."""
-        return float(self._state.time[0])
-
-    def update(self, body: FlightState, seconds: float) -> None:
-        """Advance the sensors to the state `body`, some seconds later."""
-        self._state = self._suite.update(self._state, body, seconds)
-
-    def imu(self) -> ImuReading:
-        """Return specific force, angular rates and attitude."""
-        return self._suite.imu.read(self._state.imu, self._state.time)
-
-    def barometer(self) -> BarometerReading:
-        """Return pressure and the corresponding altitude above the sea."""
-        return self._suite.barometer.read(self._state.barometer, self._state.time)
-
-    def magnetometer(self) -> MagnetometerReading:
-        """Return Earth's magnetic field."""
-        return self._suite.magnetometer.read(self._state.magnetometer, self._state.time)
-
-    def gps(self) -> GpsReading:
-        """Return place on Earth and velocity; `is_valid` from the first reading on, see `fix`."""
-        return self._suite.gps.read(self._state.gps, self._state.time)
 
 
 class Trajectory:

@@ -25,7 +25,6 @@ from drone_rl.sim.dynamics import BodyState
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.trust.plots.images import heated, shown_picture
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.palette import css
 from drone_rl.utils.schema import Flag, OneOf, Real, Record, Several, as_mapping
 
 LIMITS = {"speed": (0.5, 10.0), "wind": (0.0, 12.0), "wind_from": (0.0, 360.0), "light": (0.2, 2.0)}
@@ -51,6 +50,16 @@ _LOOK_PERIOD = 0.1
 _SIZE = 1.0
 """Edge of objects on the map if the task does not state it, metres."""
 JPEG_QUALITY = 85
+_ACTIONS = "the policy's actions"
+_SALIENCY = {
+    "off": "tested when it is switched on",
+    "testing": "testing methods on this policy; this takes a minute or so",
+    "shown": "bright pixels affect the most probable action; method {method}, which passed the "
+    "tests on this policy",
+    "none": "no method passes the tests on this policy, so none is shown",
+    "failed": "the methods can't be tested: {problem}",
+}
+"""What the page says of heat maps, by `LiveSaliency.state`."""
 _log = logging.getLogger(__name__)
 _LONGEST = 0.1
 """Most seconds that pass at once; a slow machine falls behind instead."""
@@ -233,25 +242,23 @@ class Flight:
     # What browsers get
 
     def hello(self) -> dict[str, Any]:
-        """Return what does not change: policy, task, actions, choices."""
+        """Return what does not change: actions, choices, and texts by the ids of their elements."""
         world, actions = self.world, self.world.actions
-        terms, region = world.task.vocabulary, world.policy.task.object_region
+        region = world.policy.task.object_region
+        task = world.task.name.replace("_", " ")
         return {
-            "policy": world.policy.name,
-            "task": world.task.name,
-            "object": terms.target,
+            "texts": {
+                "name": world.policy.name,
+                "task": f"Task: {task}. The policy's actions: {', '.join(actions.names)}.",
+            },
+            "object": world.task.vocabulary.target,
             "size": region.size if region else _SIZE,
-            "goal": terms.goal,
-            "reached": terms.reached,
             "actions": list(actions.names),
             "order": [int(part) for part in actions.order],
-            "colors": [css(color) for color in actions.colors],
-            "total": len(world.objects) if isinstance(world.task, CollectCubes) else None,
             "discrete": not actions.entry.shape,
             "dynamics": world.has_dynamics,
             "cameras": list(CAMERAS),
             "limits": LIMITS,
-            "demonstrations": str(self.recorder.folder),
         }
 
     def frame(self) -> bytes:
@@ -265,7 +272,7 @@ class Flight:
 
     def _state(self) -> dict[str, Any]:
         world = self.world
-        seen, goals = self._look(), world.goals
+        seen = self._look()
         speed, direction = world.wind
         return {
             "time": round(self.time, 3),
@@ -275,8 +282,7 @@ class Flight:
             "camera": self.camera,
             **pose_of(world.body),
             "objects": [None if place is None else _rounded(place) for place in world.objects],
-            "goals": goals,
-            "reward": round(world.reward, 3),
+            "goals": world.goals,
             "steps": int(world.worlds.state.steps[0]),
             "end": world.end,
             "probabilities": _rounded(seen.probabilities),
@@ -292,14 +298,48 @@ class Flight:
                 "saved": self.recorder.saved,
                 "problem": self._problem,
             },
-            "saliency": {
-                "on": self._shows_saliency,
-                "state": self.saliency.state,
-                "method": self.saliency.method,
-                "problem": self.saliency.problem,
-            },
-            "note": self.note,
+            "saliency": self._shows_saliency,
+            "texts": self._texts(),
         }
+
+    def _texts(self) -> dict[str, str]:
+        """Return what the page says, by the ids of its elements."""
+        world, recorder, is_person = self.world, self.recorder, self.pilot == "person"
+        end = ""
+        if world.end and not (is_person and self.mode != "actions"):
+            later = "New episode, or N, starts the next." if is_person else "The next one begins."
+            end = f"Episode over, {world.end}. {later}"
+        recording = (
+            "Record writes what you fly by the policy's actions, or what the policy flies, as "
+            "demonstrations."
+        )
+        if recorder.is_on or recorder.saved:
+            start = "Recording" if recorder.is_on else "Recorded flights"
+            recording = f"{start}: {recorder.saved} saved in {recorder.folder}."
+        return {
+            "flyer": f"You fly: {self.mode.replace('_', ' ').replace('actions', _ACTIONS)}"
+            if is_person
+            else f"The policy {world.policy.name} flies",
+            "score": self._score(),
+            "end": end,
+            "note": self.note,
+            "recording": recording,
+            "method": _SALIENCY[self.saliency.state].format(
+                problem=self.saliency.problem, method=(self.saliency.method or "").replace("_", " ")
+            ),
+        }
+
+    def _score(self) -> str:
+        """Return the goals reached, or the return if the task does not count goals."""
+        world, terms = self.world, self.world.task.vocabulary
+        if world.goals is None:
+            return f"return {round(world.reward, 3):g}"
+        reached, missed = world.goals
+        total = len(world.objects) if isinstance(world.task, CollectCubes) else None
+        of = "" if total is None else f" of {total}"
+        plural = "" if (total or reached) == 1 else "s"
+        lost = f", {missed} missed" if missed else ""
+        return f"{reached}{of} {terms.goal}{plural} {terms.reached}{lost}"
 
     def _look(self) -> Seen:
         """Return what the policy sees; while a person moves freely, some times a second."""

@@ -54,7 +54,8 @@ class Watched:
     def hello(self) -> dict[str, Any]:
         """Return what does not change; see `Flight.hello`."""
         scene = f"scene {self._simulation.stage.scene_name}, clock {self._simulation.clock}"
-        return {"watch": scene, "object": "object", "size": 1.0, "cameras": list(CAMERAS)}
+        texts = {"title": "Watch a program fly", "task": f"AirSim's server: {scene}."}
+        return {"watch": True, "texts": texts, "object": "object", "size": 1.0, "cameras": CAMERAS}
 
     def frame(self) -> bytes:
         """Return the present state and image, see `flight.packed`; nothing if the loop is busy."""
@@ -89,8 +90,10 @@ class Watched:
                 "wind": round(math.hypot(x, y), 2),
                 "wind_from": math.degrees(math.atan2(y, 0.0 - x)) % 360.0,
             },
-            "note": "Time is paused." if simulation.is_paused else "",
-            "vehicle": vehicle.choice.name,
+            "texts": {
+                "flyer": f"A program flies {vehicle.name}",
+                "note": "Time is paused." if simulation.is_paused else "",
+            },
         }
 
     def _render(self) -> Tensor:

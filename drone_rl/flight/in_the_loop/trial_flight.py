@@ -4,17 +4,9 @@ import dataclasses
 import time
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.flight.commands.path_following import (
-    Paths,
-    direction_at,
-    distance_from,
-    make_paths,
-    place_at,
-)
+from drone_rl.flight.commands.path_following import Path
 from drone_rl.flight.in_the_loop.control import Setpoint, velocity_to
 from drone_rl.flight.in_the_loop.drone import DroneInTheLoop, FlightControllerError, Guidance
 from drone_rl.flight.in_the_loop.instruments import Readings, Vector
@@ -71,21 +63,19 @@ def hold_position(place: Vector, settings: DynamicsSettings) -> Guidance:
     return lambda body, readings: Setpoint(velocity_to(place, readings, settings))
 
 
-def follow_path(path: Paths, speed: float, settings: DynamicsSettings) -> Guidance:
+def follow_path(path: Path, speed: float, settings: DynamicsSettings) -> Guidance:
     """Return guidance to a point that moves along a path from the first call.
 
-    It is a single path, and the speed in metres per second is constant.
+    The speed in metres per second is constant.
     """
     begin: float | None = None
 
     def guide(body: FlightState, readings: Readings) -> Setpoint:
         nonlocal begin
         begin = readings.time if begin is None else begin
-        along = torch.tensor([(readings.time - begin) * speed], dtype=torch.float64)
-        is_moving = (along < path.lengths).double()[:, None]
-        ahead = (speed * is_moving * direction_at(path, along))[0].numpy()
-        back = velocity_to(place_at(path, along)[0].numpy(), readings, settings)
-        x, y, z = (back + ahead).tolist()
+        along = (readings.time - begin) * speed
+        ahead = speed * path.direction_at(along) if along < path.length else np.zeros(3)
+        x, y, z = (velocity_to(path.place_at(along), readings, settings) + ahead).tolist()
         return Setpoint((x, y, z))
 
     return guide
@@ -104,18 +94,17 @@ def fly_course(drone: DroneInTheLoop, course: Course | None = None) -> CourseRep
     take_off(drone, above)
     hold = hold_position(above, settings)
     hover = _fly(drone, hold, course.hover)
-    corners = square(above, course.side)
-    follow = follow_path(make_paths(corners[None]), course.speed, settings)
+    path = Path(square(above, course.side))
+    follow = follow_path(path, course.speed, settings)
     measured = _fly(drone, follow, 4.0 * course.side / course.speed)
     _fly(drone, hold, _SETTLING)
     land(drone, ground)
     counted = [m for m in hover if m.time >= hover[0].time + _SETTLING] or hover
-    positions = torch.from_numpy(np.stack([m.position for m in measured]))
-    errors = distance_from(make_paths(corners.repeat(len(measured), 1, 1)), positions).numpy()
+    errors = [path.distance_from(m.position) for m in measured]
     return CourseReport(
         hover_error_m=float(np.mean([np.linalg.norm(m.position - above) for m in counted])),
-        path_error_m=float(errors.mean()),
-        path_error_max_m=float(errors.max()),
+        path_error_m=float(np.mean(errors)),
+        path_error_max_m=max(errors),
         landing_error_m=float(np.linalg.norm((drone.readings.position - ground)[:2])),
         simulated_s=drone.time,
         wall_s=time.monotonic() - begin,
@@ -156,10 +145,10 @@ def land(drone: DroneInTheLoop, ground: Vector, within: float = 20.0) -> None:
     drone.disarm()
 
 
-def square(corner: Vector, side: float) -> Tensor:
+def square(corner: Vector, side: float) -> Vector:
     """Return a square's corners and the first again: forward, left, back, right. Shape: (5, 3)."""
     steps = [[0, 0, 0], [side, 0, 0], [side, side, 0], [0, side, 0], [0, 0, 0]]
-    return torch.from_numpy(corner + np.array(steps))
+    return corner + np.array(steps)
 
 
 def _fly(drone: DroneInTheLoop, guidance: Guidance, seconds: float) -> list[Readings]:

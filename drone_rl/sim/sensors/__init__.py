@@ -5,4 +5,4 @@ from drone_rl.sim.sensors.instruments import Fix as Fix
 from drone_rl.sim.sensors.instruments import GpsReading as GpsReading
 from drone_rl.sim.sensors.instruments import ImuReading as ImuReading
 from drone_rl.sim.sensors.instruments import MagnetometerReading as MagnetometerReading
-from drone_rl.sim.sensors.suite import SensorSuite as SensorSuite
+from drone_rl.sim.sensors.suite import Sensors as Sensors

@@ -1,4 +1,7 @@
-"""The sensors: accelerometer and gyroscope, magnetometer, GPS receiver and barometer."""
+"""The sensors: accelerometer and gyroscope, magnetometer, GPS receiver and barometer.
+
+Times of readings are seconds, minus infinity before the first. Vectors are float64, shape (3,).
+"""
 
 import dataclasses
 import enum
@@ -16,16 +19,7 @@ from drone_rl.config.sensors import (
 )
 from drone_rl.sim.coordinates import HOME, GeoPoint, body_from_world, geo_from_world
 from drone_rl.sim.dynamics.state import BodyState
-from drone_rl.sim.sensors.sensor import (
-    Sampling,
-    Sensor,
-    SensorState,
-    gauss_markov_step,
-    normal,
-    random_walk_step,
-    select,
-)
-from drone_rl.utils.batch import Batch
+from drone_rl.sim.sensors.sensor import Sensor, gauss_markov_step, normal, random_walk_step
 
 STANDARD_GRAVITY = 9.80665
 """Metres per second squared, the unit of accelerometer errors."""
@@ -46,140 +40,98 @@ _EXPONENT, _ATMOSPHERE_RADIUS = 5.255877, 6356766.0
 """Of pressure as a power of temperature; Earth's radius for heights under constant gravity."""
 
 
-@dataclasses.dataclass
-class ImuReading(Batch):
-    """Readings of `num_envs` drones. Body frame: x forward, y left, z up."""
+_ZERO, _NO_ATTITUDE = (torch.zeros(size, dtype=torch.float64) for size in (3, 4))
 
-    time: Tensor  # (num_envs,) float64
-    """When it was taken, seconds; minus infinity before the first."""
-    specific_force: Tensor  # (num_envs, 3) float64
+
+@dataclasses.dataclass(frozen=True)
+class ImuReading:
+    """Body frame: x forward, y left, z up."""
+
+    time: float = -math.inf
+    specific_force: Tensor = _ZERO
     """Acceleration minus gravity, metres per second squared: 9.81 up at rest."""
-    angular_velocity: Tensor  # (num_envs, 3) float64
+    angular_velocity: Tensor = _ZERO
     """Radians per second about the body's axes."""
-    attitude: Tensor  # (num_envs, 4) float64
+    attitude: Tensor = _NO_ATTITUDE
     """The true attitude, as in AirSim: quaternion (w, x, y, z) from body to world."""
 
 
-@dataclasses.dataclass
-class ImuState(SensorState):
-    """State of `num_envs` drones' accelerometers and gyroscopes."""
-
-    time: Tensor  # (num_envs,) float64
-    """Of the last reading, seconds."""
-    velocity: Tensor  # (num_envs, 3) float64
-    """Of the drone at that time, metres per second, world frame."""
-    gyro_bias: Tensor  # (num_envs, 3) float64
-    """Radians per second, body frame."""
-    accel_bias: Tensor  # (num_envs, 3) float64
-    """Metres per second squared, body frame."""
-
-
-class Imu(Sensor[ImuState, ImuReading]):
+class Imu(Sensor[ImuReading]):
     """Accelerometer and gyroscope; see `ImuSettings`."""
 
-    def __init__(self, settings: ImuSettings | None = None) -> None:
-        self.settings = settings or ImuSettings()
-        self.sampling = Sampling(rate=self.settings.rate)
+    def __init__(self, settings: ImuSettings, body: BodyState, generator: Generator) -> None:
+        """Switch it on; the velocity was constant before."""
+        super().__init__(ImuReading(), settings.rate)
+        self.settings, self._generator = settings, generator
+        gyro = settings.noise * settings.gyro_turn_on_bias * _DEGREES_PER_HOUR
+        accel = settings.noise * settings.accel_turn_on_bias * _MILLI_G
+        self.gyro_bias = gyro * normal(_ZERO, generator)
+        """Radians per second, body frame."""
+        self.accel_bias = accel * normal(_ZERO, generator)
+        """Metres per second squared, body frame."""
+        self._last = -1.0 / settings.rate, body.velocity[0].clone()
+        """Time of the last reading, and the drone's velocity then."""
 
-    def _initial(self, body: BodyState, time: Tensor, generator: Generator) -> ImuState:
-        """The velocity was constant before: the first reading has no acceleration but gravity's."""
-        settings = self.settings
-        still = torch.zeros_like(body.velocity)
-        turn_on = settings.noise * settings.gyro_turn_on_bias * _DEGREES_PER_HOUR
-        gyro = turn_on * normal(still, generator)
-        accel = settings.noise * settings.accel_turn_on_bias * _MILLI_G * normal(still, generator)
-        before = time - 1.0 / settings.rate
-        return ImuState(self.sampling.start(time, 10), before, body.velocity.clone(), gyro, accel)
-
-    def _sample(
-        self, state: ImuState, body: BodyState, time: Tensor, generator: Generator
-    ) -> ImuState:
-        settings, is_due = self.settings, self.sampling.due(state.samples, time)
-        seconds = torch.where(is_due, time - state.time, 1.0)
-        force = specific_force(body.attitude, state.velocity, body.velocity, seconds)
-        root = seconds.sqrt()[:, None]
-        gyro_noise = settings.noise * settings.gyro_random_walk * _DEGREES_PER_ROOT_HOUR / root
-        accel_noise = settings.noise * settings.accel_random_walk * _MILLI_G / root
-        rates = body.angular_velocity + state.gyro_bias
-        rates = rates + gyro_noise * normal(rates, generator)
-        force = force + state.accel_bias + accel_noise * normal(force, generator)
-        gyro_step = settings.noise * settings.gyro_bias_stability * _DEGREES_PER_HOUR
-        accel_step = settings.noise * settings.accel_bias_stability * _MICRO_G
-        gyro = random_walk_step(
-            state.gyro_bias, gyro_step, settings.gyro_bias_time, seconds, generator
+    def _sample(self, body: BodyState, time: float) -> ImuReading:
+        settings, generator, (last, before) = self.settings, self._generator, self._last
+        attitude, velocity = body.attitude[0].clone(), body.velocity[0].clone()
+        self._last, seconds = (time, velocity), time - last
+        white = settings.noise / math.sqrt(seconds)
+        rates = body.angular_velocity[0] + self.gyro_bias
+        rates = rates + white * settings.gyro_random_walk * _DEGREES_PER_ROOT_HOUR * normal(
+            rates, generator
         )
-        accel = random_walk_step(
-            state.accel_bias, accel_step, settings.accel_bias_time, seconds, generator
+        force = specific_force(attitude, before, velocity, seconds) + self.accel_bias
+        force = force + white * settings.accel_random_walk * _MILLI_G * normal(force, generator)
+        gyro = settings.noise * settings.gyro_bias_stability * _DEGREES_PER_HOUR
+        accel = settings.noise * settings.accel_bias_stability * _MICRO_G
+        self.gyro_bias = random_walk_step(
+            self.gyro_bias, gyro, settings.gyro_bias_time, seconds, generator
         )
-        return ImuState(
-            self.sampling.take(state.samples, time, torch.cat([force, rates, body.attitude], 1)),
-            torch.where(is_due, time, state.time),
-            select(is_due, body.velocity, state.velocity),
-            select(is_due, gyro, state.gyro_bias),
-            select(is_due, accel, state.accel_bias),
+        self.accel_bias = random_walk_step(
+            self.accel_bias, accel, settings.accel_bias_time, seconds, generator
         )
-
-    def _reading(self, time: Tensor, rows: Tensor) -> ImuReading:
-        return ImuReading(time, rows[:, :3], rows[:, 3:6], rows[:, 6:])
+        return ImuReading(time, force, rates, attitude)
 
 
-def specific_force(attitude: Tensor, before: Tensor, after: Tensor, seconds: Tensor) -> Tensor:
-    """Return the mean specific force, m/s^2, body frame, while velocities changed.
+def specific_force(attitude: Tensor, before: Tensor, after: Tensor, seconds: float) -> Tensor:
+    """Return the mean specific force, m/s^2, body frame, while the velocity changed. Shape: (3,).
 
-    Attitudes are quaternions (w, x, y, z), shape (num_envs, 4). Velocities `before` and `after`
-    some seconds, more than 0, are in m/s, world frame, shape (num_envs, 3).
+    The attitude is a quaternion (w, x, y, z). Velocities `before` and `after` some seconds are in
+    m/s, world frame.
     """
-    acceleration = (after - before) / seconds[:, None]
-    return body_from_world(attitude, acceleration + acceleration.new_tensor((0.0, 0.0, GRAVITY)))
+    gravity = before.new_tensor((0.0, 0.0, GRAVITY))
+    return body_from_world(attitude, (after - before) / seconds + gravity)
 
 
-@dataclasses.dataclass
-class MagnetometerReading(Batch):
-    """Readings of `num_envs` drones."""
+@dataclasses.dataclass(frozen=True)
+class MagnetometerReading:
+    """Earth's field along the axes of the body."""
 
-    time: Tensor  # (num_envs,) float64
-    """When it was taken, seconds; minus infinity before the first."""
-    field: Tensor  # (num_envs, 3) float64
+    time: float = -math.inf
+    field: Tensor = _ZERO
     """Gauss, body frame: x forward, y left, z up."""
 
 
-@dataclasses.dataclass
-class MagnetometerState(SensorState):
-    """State of `num_envs` drones' magnetometers."""
-
-    bias: Tensor  # (num_envs, 3) float64
-    """Gauss, body frame."""
-
-
-class Magnetometer(Sensor[MagnetometerState, MagnetometerReading]):
+class Magnetometer(Sensor[MagnetometerReading]):
     """A magnetometer; see `MagnetometerSettings`."""
 
-    def __init__(self, settings: MagnetometerSettings | None = None, home: GeoPoint = HOME) -> None:
-        self.settings, self.home = settings or MagnetometerSettings(), home
-        self.sampling = Sampling(rate=self.settings.rate, latency=self.settings.latency)
+    def __init__(
+        self, settings: MagnetometerSettings, generator: Generator, home: GeoPoint = HOME
+    ) -> None:
+        """Switch it on; `home` is the place on Earth of the world's origin."""
+        super().__init__(MagnetometerReading(), settings.rate, latency=settings.latency)
+        self.settings, self.home, self._generator = settings, home, generator
+        sampled = torch.rand(3, dtype=torch.float64, generator=generator)
+        self._bias = settings.noise * settings.bias * (2 * sampled - 1)
 
-    def _initial(self, body: BodyState, time: Tensor, generator: Generator) -> MagnetometerState:
-        shape, device = body.position.shape, generator.device
-        sampled = torch.rand(shape, dtype=torch.float64, generator=generator, device=device)
-        bias = self.settings.noise * self.settings.bias * (2 * sampled - 1).to(time.device)
-        return MagnetometerState(self.sampling.start(time, 3), bias)
-
-    def _sample(
-        self, state: MagnetometerState, body: BodyState, time: Tensor, generator: Generator
-    ) -> MagnetometerState:
-        settings = self.settings
-        field = settings.scale * body_from_world(body.attitude, self.field(body.position))
-        rows = field + state.bias + settings.noise * settings.white_noise * normal(field, generator)
-        return MagnetometerState(self.sampling.take(state.samples, time, rows), state.bias)
-
-    def _reading(self, time: Tensor, rows: Tensor) -> MagnetometerReading:
-        return MagnetometerReading(time, rows)
-
-    def field(self, position: Tensor) -> Tensor:
-        """Return Earth's field at world positions, gauss, world frame. Shape: (num_envs, 3)."""
-        if self.settings.field == "constant":
-            return position.new_tensor(CONSTANT).expand(len(position), 3)
-        return dipole_field(geo_from_world(position, self.home))
+    def _sample(self, body: BodyState, time: float) -> MagnetometerReading:
+        settings, field = self.settings, _ZERO.new_tensor(CONSTANT)
+        if settings.field == "dipole":
+            field = dipole_field(geo_from_world(body.position[0], self.home))
+        field = settings.scale * body_from_world(body.attitude[0], field) + self._bias
+        white = settings.noise * settings.white_noise * normal(field, self._generator)
+        return MagnetometerReading(time, field + white)
 
 
 def dipole_field(place: Tensor) -> Tensor:
@@ -204,117 +156,90 @@ class Fix(enum.IntEnum):
     THREE_D = 3
 
 
-@dataclasses.dataclass
-class GpsReading(Batch):
-    """Readings of `num_envs` drones."""
+@dataclasses.dataclass(frozen=True)
+class GpsReading:
+    """Place on Earth and velocity."""
 
-    time: Tensor  # (num_envs,) float64
-    """When it was taken, seconds; minus infinity before the first."""
-    place: Tensor  # (num_envs, 3) float64
+    time: float = -math.inf
+    place: Tensor = _ZERO
     """Latitude and longitude in degrees, altitude in metres."""
-    velocity: Tensor  # (num_envs, 3) float64
+    velocity: Tensor = _ZERO
     """Metres per second, world frame."""
-    error: Tensor  # (num_envs,) float64
+    error: float = 0.0
     """Stated horizontal and vertical error (eph and epv), metres."""
-    fix: Tensor  # (num_envs,) int64
-    """One of `Fix`, by the stated error; `Fix.NONE` before the first reading."""
-    is_valid: Tensor  # (num_envs,) bool
-    """Whether there is a reading yet."""
+    fix: Fix = Fix.NONE
+    """By the stated error; `Fix.NONE` before the first reading."""
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether there is a reading yet."""
+        return math.isfinite(self.time)
 
 
-class Gps(Sensor[SensorState, GpsReading]):
+class Gps(Sensor[GpsReading]):
     """A GPS receiver with latency, whose stated error shrinks after the start."""
 
-    def __init__(self, settings: GpsSettings | None = None, home: GeoPoint = HOME) -> None:
-        self.settings = settings = settings or GpsSettings()
-        self.home = home
-        self.sampling = Sampling(
-            rate=settings.rate, latency=settings.latency, startup=settings.startup
+    def __init__(self, settings: GpsSettings, generator: Generator, home: GeoPoint = HOME) -> None:
+        """Switch it on; `home` is the place on Earth of the world's origin."""
+        super().__init__(
+            GpsReading(), settings.rate, latency=settings.latency, startup=settings.startup
         )
+        self.settings, self.home, self._generator = settings, home, generator
 
-    def _initial(self, body: BodyState, time: Tensor, generator: Generator) -> SensorState:
-        return SensorState(self.sampling.start(time, 7))
+    def _sample(self, body: BodyState, time: float) -> GpsReading:
+        settings, generator = self.settings, self._generator
+        deviations = (*[settings.horizontal_noise] * 2, settings.vertical_noise)
+        off = settings.noise * _ZERO.new_tensor(deviations) * normal(_ZERO, generator)
+        fast = settings.noise * settings.velocity_noise * normal(_ZERO, generator)
+        error = self.stated_error(time)
+        fix = Fix.TWO_D if error <= settings.error_2d else Fix.NONE
+        fix = Fix.THREE_D if error <= settings.error_3d else fix
+        place = geo_from_world(body.position[0] + off, self.home)
+        return GpsReading(time, place, body.velocity[0] + fast, error, fix)
 
-    def _sample(
-        self, state: SensorState, body: BodyState, time: Tensor, generator: Generator
-    ) -> SensorState:
+    def stated_error(self, seconds: float) -> float:
+        """Return the stated error in metres, some seconds after the start."""
         settings = self.settings
-        side = settings.noise * settings.horizontal_noise
-        up = settings.noise * settings.vertical_noise
-        deviations = body.position.new_tensor((side, side, up))
-        position = body.position + deviations * normal(body.position, generator)
-        fast = settings.noise * settings.velocity_noise * normal(body.velocity, generator)
-        place = geo_from_world(position, self.home)
-        error = self.stated_error(time - state.samples.began)
-        rows = torch.cat([place, body.velocity + fast, error[:, None]], 1)
-        return SensorState(self.sampling.take(state.samples, time, rows))
-
-    def _reading(self, time: Tensor, rows: Tensor) -> GpsReading:
-        error, is_valid = rows[:, 6], time.isfinite()
-        fix = torch.full_like(time, Fix.NONE, dtype=torch.int64)
-        fix[is_valid & (error <= self.settings.error_2d)] = Fix.TWO_D
-        fix[is_valid & (error <= self.settings.error_3d)] = Fix.THREE_D
-        return GpsReading(time, rows[:, :3], rows[:, 3:6], error, fix, is_valid)
-
-    def stated_error(self, seconds: Tensor) -> Tensor:
-        """Return the stated error in metres, some seconds after the start. Shape: (num_envs,)."""
-        settings = self.settings
-        left = torch.exp(-seconds / settings.error_time)
+        left = math.exp(-seconds / settings.error_time)
         return settings.last_error + (settings.first_error - settings.last_error) * left
 
 
-@dataclasses.dataclass
-class BarometerReading(Batch):
-    """Readings of `num_envs` drones."""
+@dataclasses.dataclass(frozen=True)
+class BarometerReading:
+    """Pressure and altitude."""
 
-    time: Tensor  # (num_envs,) float64
-    """When it was taken, seconds; minus infinity before the first."""
-    pressure: Tensor  # (num_envs,) float64
+    time: float = -math.inf
+    pressure: float = 0.0
     """Pascals."""
-    altitude: Tensor  # (num_envs,) float64
+    altitude: float = 0.0
     """Metres above sea level, from the pressure and that at sea level."""
 
 
-@dataclasses.dataclass
-class BarometerState(SensorState):
-    """State of `num_envs` drones' barometers."""
-
-    time: Tensor  # (num_envs,) float64
-    """Of the last reading, seconds."""
-    drift: Tensor  # (num_envs, 1) float64
-    """Relative excess of pressure over the standard atmosphere's."""
-
-
-class Barometer(Sensor[BarometerState, BarometerReading]):
+class Barometer(Sensor[BarometerReading]):
     """A barometer; see `BarometerSettings`."""
 
-    def __init__(self, settings: BarometerSettings | None = None, home: GeoPoint = HOME) -> None:
-        self.settings, self.home = settings or BarometerSettings(), home
-        self.sampling = Sampling(rate=self.settings.rate, latency=self.settings.latency)
+    def __init__(
+        self, settings: BarometerSettings, generator: Generator, home: GeoPoint = HOME
+    ) -> None:
+        """Switch it on; `home` is the place on Earth of the world's origin."""
+        super().__init__(BarometerReading(), settings.rate, latency=settings.latency)
+        self.settings, self.home, self._generator = settings, home, generator
+        self._last, self._drift = 0.0, _ZERO[0]
+        """Time of the last reading; relative excess of pressure over the standard atmosphere's."""
 
-    def _initial(self, body: BodyState, time: Tensor, generator: Generator) -> BarometerState:
-        drift = torch.zeros_like(time)[:, None]
-        return BarometerState(self.sampling.start(time, 2), time.clone(), drift)
-
-    def _sample(
-        self, state: BarometerState, body: BodyState, time: Tensor, generator: Generator
-    ) -> BarometerState:
-        settings, is_due = self.settings, self.sampling.due(state.samples, time)
-        strength, seconds = settings.noise * settings.drift, time - state.time
-        drift = gauss_markov_step(state.drift, strength, settings.drift_time, seconds, generator)
-        at_sea = 100.0 * settings.sea_level_pressure
-        exact = at_sea * pressure_ratio(self.home.altitude + body.position[:, 2])
-        noise = settings.noise * settings.white_noise * normal(exact, generator)
-        pressure = exact * (1 + drift[:, 0]) + noise
-        altitude = altitude_from_pressure_ratio(pressure.clamp(min=1.0) / at_sea)
-        return BarometerState(
-            self.sampling.take(state.samples, time, torch.stack([pressure, altitude], 1)),
-            torch.where(is_due, time, state.time),
-            select(is_due, drift, state.drift),
+    def _sample(self, body: BodyState, time: float) -> BarometerReading:
+        settings, generator = self.settings, self._generator
+        strength, seconds = settings.noise * settings.drift, time - self._last
+        self._last, self._drift = (
+            time,
+            gauss_markov_step(self._drift, strength, settings.drift_time, seconds, generator),
         )
-
-    def _reading(self, time: Tensor, rows: Tensor) -> BarometerReading:
-        return BarometerReading(time, rows[:, 0], rows[:, 1])
+        at_sea = 100.0 * settings.sea_level_pressure
+        exact = at_sea * pressure_ratio(self.home.altitude + body.position[0, 2])
+        white = settings.noise * settings.white_noise * normal(exact, generator)
+        pressure = exact * (1 + self._drift) + white
+        altitude = altitude_from_pressure_ratio(pressure.clamp(min=1.0) / at_sea)
+        return BarometerReading(time, float(pressure), float(altitude))
 
 
 def pressure_ratio(altitude: Tensor) -> Tensor:

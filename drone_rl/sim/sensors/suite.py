@@ -1,72 +1,65 @@
 """All sensors of a drone together."""
 
-import dataclasses
-
-import torch
-from torch import Tensor
-
 from drone_rl.config.sensors import SensorSettings
 from drone_rl.sim.coordinates import HOME, GeoPoint
 from drone_rl.sim.dynamics.state import BodyState
-from drone_rl.sim.sensors import instruments
-from drone_rl.sim.sensors.sensor import SensorState
-from drone_rl.utils.batch import Batch
+from drone_rl.sim.sensors.instruments import (
+    Barometer,
+    BarometerReading,
+    Gps,
+    GpsReading,
+    Imu,
+    ImuReading,
+    Magnetometer,
+    MagnetometerReading,
+)
 from drone_rl.utils.seeding import Stream, torch_generator
 
 
-@dataclasses.dataclass
-class SensorSuiteState(Batch):
-    """State of `num_envs` drones' sensors."""
+class Sensors:
+    """IMU, barometer, magnetometer and GPS receiver of one drone, each with a random stream.
 
-    time: Tensor  # (num_envs,) float64
-    """Of the last update, seconds."""
-    imu: instruments.ImuState
-    barometer: instruments.BarometerState
-    magnetometer: instruments.MagnetometerState
-    gps: SensorState
-
-
-class SensorSuite:
-    """All sensors of drones, each with a random stream: `suite.imu.read(state.imu, state.time)`."""
+    A pilot updates them in each control period, seven ticks by default, even if a sensor's rate is
+    higher.
+    """
 
     def __init__(
-        self,
-        settings: SensorSettings | None = None,
-        *,
-        seed: int = 0,
-        number: int = 0,
-        home: GeoPoint = HOME,
+        self, body: BodyState, settings: SensorSettings, seed: int = 0, home: GeoPoint = HOME
     ) -> None:
-        """Make the sensors, with AirSim's settings by default.
+        """Turn the sensors of one drone on.
 
-        `number` distinguishes the noise of several batches of drones under one seed; `home` is the
-        world's origin. Raises an `InputError` if the seed is not a whole number, 0 or more.
+        `seed` is that of the noise, and `home` the place on Earth of the world's origin. Raises an
+        `InputError` if the seed is not a whole number, 0 or more.
         """
-        self.settings = settings = settings or SensorSettings()
-        self.home = home
-        self.imu, self.gps = instruments.Imu(settings.imu), instruments.Gps(settings.gps, home)
-        self.barometer = instruments.Barometer(settings.barometer, home)
-        self.magnetometer = instruments.Magnetometer(settings.magnetometer, home)
-        names = ("imu", "barometer", "magnetometer", "gps")
-        self._streams = {
-            name: torch_generator(seed, Stream.SENSORS, number=4 * number + i)
-            for i, name in enumerate(names)
-        }
+        self.settings = settings
+        """Rates, latencies and noise."""
+        self.time = 0.0
+        """Simulated seconds since the sensors were turned on; the clock of the readings."""
+        streams = [torch_generator(seed, Stream.SENSORS, number=i) for i in range(4)]
+        self._imu = Imu(settings.imu, body, streams[0])
+        self._barometer = Barometer(settings.barometer, streams[1], home)
+        self._magnetometer = Magnetometer(settings.magnetometer, streams[2], home)
+        self._gps = Gps(settings.gps, streams[3], home)
+        self.update(body, 0.0)
 
-    def start(self, body: BodyState) -> SensorSuiteState:
-        """Switch all sensors on at time 0. To restart some drones, assign to their rows."""
-        time = torch.zeros_like(body.position[:, 0])
-        states = {
-            name: getattr(self, name).start(body, time, stream)
-            for name, stream in self._streams.items()
-        }
-        return SensorSuiteState(time=time, **states)
+    def update(self, body: BodyState, seconds: float) -> None:
+        """Advance the sensors to the state `body`, some seconds later; see `Sensor.update`."""
+        self.time += seconds
+        for sensor in (self._imu, self._barometer, self._magnetometer, self._gps):
+            sensor.update(body, self.time)
 
-    def update(self, state: SensorSuiteState, body: BodyState, seconds: float) -> SensorSuiteState:
-        """Return the sensors some seconds after the last update; each takes at most one reading."""
-        time = state.time + seconds
-        states = {
-            name: getattr(self, name).update(getattr(state, name), body, time, stream)
-            for name, stream in self._streams.items()
-        }
-        return SensorSuiteState(time=time, **states)
+    def imu(self) -> ImuReading:
+        """Return specific force, angular rates and attitude."""
+        return self._imu.read()
+
+    def barometer(self) -> BarometerReading:
+        """Return pressure and the corresponding altitude above the sea."""
+        return self._barometer.read()
+
+    def magnetometer(self) -> MagnetometerReading:
+        """Return Earth's magnetic field."""
+        return self._magnetometer.read()
+
+    def gps(self) -> GpsReading:
+        """Return place on Earth and velocity; `is_valid` from the first reading on, see `fix`."""
+        return self._gps.read()

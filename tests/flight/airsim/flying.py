@@ -5,20 +5,18 @@ import torch
 from drone_rl.config import DynamicsSettings
 from drone_rl.flight.airsim.settings_file import VehicleChoice
 from drone_rl.flight.airsim.vehicle import Vehicle
-from drone_rl.flight.commands.path_following import YawMode
 from drone_rl.sim.coordinates import HOME
 from drone_rl.sim.dynamics import Obstacles
 
-FREE, KEEP = "max_degree_of_freedom", YawMode()
 BOX = Obstacles(torch.tensor([[[5.0, 0.0, 1.0]]], dtype=torch.float64), (1.0, 1.0, 1.0))
 
 
 def make(kind="SimpleFlight", obstacles=None, home=HOME, **choice):
-    given = VehicleChoice("A", kind, **{"has_api_control": True, **choice})
+    given = VehicleChoice(vehicle_type=kind, **{"has_api_control": True, **choice})
     dynamics = DynamicsSettings(mode="simple_flight")
     around = {"obstacles": obstacles, "names": ["box"]}
     height = dynamics.radius if kind == "SimpleFlight" else 2.5
-    return Vehicle(given, dynamics, None, **around, home=home, height=height)
+    return Vehicle("A", given, dynamics, None, **around, home=home, height=height)
 
 
 def fly(vehicle, future, seconds=60.0):

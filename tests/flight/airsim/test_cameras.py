@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from drone_rl.flight.airsim.cameras import make_cameras
-from drone_rl.flight.airsim.settings_file import CameraChoice, Capture, Offset
+from drone_rl.flight.airsim.settings_file import CameraChoice, Capture
 from drone_rl.flight.image_types import ImageType
 from drone_rl.sim.rendering.appearance import rotate
 from tests.flight.airsim.looking import look
@@ -21,7 +21,10 @@ def test_cameras_look_where_their_poses_say(empty):
         "front_center",
         ImageType.DEPTH_PLANAR,
         position=(0.0, 0.0, 3.0),
-        offset=Offset(0.0, 0.0, 0.1, pitch=-90.0),
+        x=0.0,
+        y=0.0,
+        z=0.1,
+        pitch=-90.0,
     )
     torch.testing.assert_close(same, down, rtol=1e-4, atol=1e-4)
 
@@ -36,7 +39,7 @@ def test_cameras_look_where_their_poses_say(empty):
     ],
 )
 def test_angles_that_are_not_given_stay(camera, angles, ahead):
-    made = make_cameras({}, {camera: CameraChoice(Offset(**angles))})[camera]
+    made = make_cameras({}, {camera: CameraChoice(**angles)})[camera]
     forward = torch.tensor([1.0, 0.0, 0.0], dtype=torch.float64)
     assert rotate(made.attitude, forward).tolist() == pytest.approx(ahead, abs=1e-9)
     assert made.capture(ImageType.SCENE) == Capture()
@@ -50,7 +53,8 @@ def test_a_camera_without_settings_is_that_of_the_model():
 
 def test_a_wider_camera_sees_the_same_pixel_closer_to_the_middle(cubes):
     cubes.reset()
-    wide = {"captures": {ImageType.DEPTH_PLANAR: Capture(32, 18, 120.0)}}
+    capture = {"ImageType": 1, "Width": 32, "Height": 18, "FOV_Degrees": 120.0}
+    wide = {"capture_settings": [capture]}
     narrow = look(cubes, kind=ImageType.DEPTH_PLANAR)
     broad = look(cubes, kind=ImageType.DEPTH_PLANAR, **wide)
     # the lowest row looks down steeper with the wider view, so the ground there is nearer

@@ -3,12 +3,11 @@
 import contextlib
 import socket
 import time
-from unittest.mock import MagicMock
 
 import msgpack
 import pytest
 
-from drone_rl.flight.airsim.server import MAX_REQUEST, Connection
+from drone_rl.flight.airsim.server import MAX_REQUEST
 from tests.flight.airsim.conftest import CV, YAW, Client
 
 PING = bytes([0x94, 0x00, 0x00, 0xA4, *b"ping", 0x90])
@@ -138,16 +137,3 @@ def test_a_client_that_dies_in_a_call_is_forgotten(start):
     again.call("simContinueForTime", 5.0)
     assert again.call("getMultirotorState")["landed_state"] == 1
     again.close()
-
-
-def test_closing_answers_requests_that_have_not_had_their_turn():
-    transport = MagicMock()
-    server = MagicMock(**{"must_wait.return_value": True})
-    connection = Connection(server)
-    connection.connection_made(transport)
-    connection.data_received(PING + msgpack.packb([2, "ping", []]))
-    transport.write.assert_not_called()
-    connection.close()
-    (answer,) = (msgpack.unpackb(call.args[0]) for call in transport.write.call_args_list)
-    assert answer == [1, 0, "the server has stopped; connect again", None]
-    transport.close.assert_called_once()

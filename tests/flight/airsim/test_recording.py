@@ -5,8 +5,6 @@ import pytest
 from PIL import Image
 
 from drone_rl.flight.airsim.recording import to_letters
-from drone_rl.flight.airsim.settings_file import parse_settings
-from drone_rl.utils.errors import InputError
 from tests.flight.airsim.conftest import pose
 
 
@@ -59,11 +57,6 @@ def test_rows_and_images_are_those_of_the_settings(start, tmp_path):
     assert np.frombuffer(content[-4 * 256 * 144 :], "<f4").min() > 0.5
     assert ids.startswith("img_ComputerVision_0_5_") and ids.endswith(".ppm")
     assert Image.open(table.parent / "images" / ids).size == (256, 144)
-
-
-def test_an_unknown_camera_is_named():
-    with pytest.raises(InputError, match=r"Recording\.Cameras: camera 'left'"):
-        parse_settings('{"Recording": {"Cameras": [{"CameraName": "left"}]}}')
 
 
 def test_names_of_files_hold_letters_alone():

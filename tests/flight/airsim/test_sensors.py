@@ -2,7 +2,7 @@
 
 import pytest
 
-from drone_rl.flight.airsim.airframe import RECENT
+from drone_rl.flight.airsim.vehicle import RECENT
 from drone_rl.sim.coordinates import HOME, GeoPoint
 from tests.flight.airsim.flying import fly, make
 
@@ -27,7 +27,7 @@ def test_gps_knows_the_place_of_a_drone_that_has_flown_before_its_first_reading(
     assert not vehicle.sensor("gps")["is_valid"]
     vehicle.reset()
     vehicle.enable_api_control(True)
-    fly(vehicle, vehicle.takeoff(20.0))
+    fly(vehicle, vehicle.take_off())
     for _ in range(60):
         vehicle.run(vehicle.period)
     found = vehicle.sensor("gps")

@@ -3,7 +3,6 @@
 import pytest
 
 from drone_rl.flight.airsim.serving import serve
-from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.utils.errors import InputError
 
 
@@ -12,31 +11,12 @@ def test_a_host_that_is_no_name_is_one_error():
         serve(scene="empty", port=0, address="a" * 70)
 
 
-def test_any_error_of_the_start_reaches_the_caller_and_closes_the_simulation(monkeypatch):
-    closed = []
-    monkeypatch.setattr(Simulation, "close", lambda self: closed.append(self))
-    monkeypatch.setattr("drone_rl.flight.airsim.serving.AirsimServer", None)
-    with pytest.raises(TypeError, match="not callable"):
-        serve(scene="empty", port=0)
-    assert len(closed) == 1
-
-
 def test_a_port_in_use_is_one_error():
     with (
         serve(scene="empty", port=0) as server,
         pytest.raises(InputError, match=r"port \d+ of 127.0.0.1 can't be opened .*port or address"),
     ):
         serve(scene="empty", port=server.address[1])
-
-
-def test_a_server_whose_thread_has_ended_closes_its_simulation(monkeypatch):
-    closed = []
-    monkeypatch.setattr(Simulation, "close", lambda self: closed.append(self))
-    server = serve(scene="empty", port=0)
-    server.loop.call_soon_threadsafe(server._task.cancel)
-    server._thread.join(20)
-    server.close()
-    assert closed == [server.simulation]
 
 
 def test_calls_that_wait_when_the_server_stops_are_answered_with_an_error(start):

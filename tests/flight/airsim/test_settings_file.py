@@ -1,6 +1,5 @@
 """settings.json as AirSim reads it, the chapter's listings verbatim, and wrong values."""
 
-import dataclasses
 import json
 import logging
 import math
@@ -9,6 +8,7 @@ import time
 import pytest
 
 from drone_rl.flight.airsim.settings_file import (
+    AirsimSettings,
     Capture,
     VehicleChoice,
     find_settings,
@@ -55,46 +55,43 @@ FULL = """
 
 def test_listing_1_means_one_multirotor():
     found = parse_settings(LISTING_1)
-    assert found.sim_mode == "Multirotor"
-    assert [(v.name, v.kind, v.is_armed) for v in found.vehicles] == [
-        ("SimpleFlight", "SimpleFlight", True)
-    ]
+    ((name, vehicle),) = found.choices.items()
+    assert name == vehicle.vehicle_type == "SimpleFlight"
+    assert vehicle.default_vehicle_state == "Armed"
     assert (found.address, found.port, found.clock_speed) == ("127.0.0.1", 41451, 1.0)
     assert found.home == HOME
     assert json.loads(found.text) == {"SettingsVersion": 1.0}
 
 
 def test_listing_2_means_computer_vision():
-    (vehicle,) = parse_settings(LISTING_2).vehicles
-    assert vehicle.kind == "ComputerVision"
+    (vehicle,) = parse_settings(LISTING_2).choices.values()
+    assert vehicle.vehicle_type == "ComputerVision"
 
 
 def test_all_parts_of_a_file():
     found = parse_settings(FULL)
-    assert (found.port, found.clock_speed, found.wind) == (41460, 2.0, (1.0, -2.0, 0.5))
+    assert (found.port, found.clock_speed) == (41460, 2.0)
+    assert (found.wind.x, found.wind.y, found.wind.z) == (1.0, -2.0, 0.5)
     assert found.home == GeoPoint(10.5, -20.0, 30.0)
-    assert found.segmentation == "None"
-    assert found.captures == {
+    assert found.segmentation_settings.init_method == "None"
+    assert found.camera_defaults.captures == {
         ImageType.SCENE: Capture(320, 240, 120.0),
         ImageType.DEPTH_PLANAR: Capture(64, 144, 90.0),
     }
-    one, two = found.vehicles
-    assert (one.name, one.kind, one.start.x, one.start.z, one.start.yaw) == (
-        *("One", "SimpleFlight", 4.0, -2.0, 90.0),
-    )
+    assert [*found.choices] == ["One", "Two"]
+    one, two = found.choices.values()
+    assert (one.vehicle_type, *one.position, one.yaw) == ("SimpleFlight", 4.0, 0.0, -2.0, 90.0)
     camera = one.cameras["front_center"]
-    assert (camera.offset.x, camera.offset.pitch) == (0.5, -15.0)
-    assert math.isnan(camera.offset.y)
+    assert (camera.x, camera.pitch) == (0.5, -15.0) and math.isnan(camera.y)
     assert camera.captures == {ImageType.SCENE: Capture(32, 16, 90.0)}
-    assert two == VehicleChoice("Two", "ComputerVision", has_api_control=True)
+    assert two == VehicleChoice(vehicle_type="ComputerVision", has_api_control=True)
 
 
 def test_quotes_comments_and_commas():
     text = (
         """{'Vehicles': {'a//b': {}, "c": {}, 'it\\'s': {}, 'say "x"': {} /* last */ }, // end\n}"""
     )
-    found = [vehicle.name for vehicle in parse_settings(text).vehicles]
-    assert found == ["a//b", "c", "it's", 'say "x"']
+    assert [*parse_settings(text).choices] == ["a//b", "c", "it's", 'say "x"']
 
 
 def test_many_slashes_after_a_comma_are_one_comment():
@@ -103,16 +100,11 @@ def test_many_slashes_after_a_comma_are_one_comment():
     assert parse_settings(text).port == 5
 
 
-def test_null_and_nan_mean_the_default():
-    given = dict.fromkeys(("SimMode", "UsageScenario", "ClockSpeed", "ApiServerPort"))
-    given["OriginGeopoint"] = {"Latitude": None}
-    text = json.dumps({**given, "Wind": {"X": math.nan, "Y": 2}})
-    plain = parse_settings('{"Wind": {"Y": 2}}')
-    assert dataclasses.replace(parse_settings(text), text=plain.text) == plain
-    nothing = dataclasses.replace(parse_settings('{"Wind": null, "Vehicles": null}'), text="{}")
-    assert nothing == parse_settings("{}")
-    (vehicle,) = parse_settings('{"Vehicles": {"A": {"AutoCreate": null}}}').vehicles
-    assert vehicle.name == "A"
+def test_null_nan_and_nothing_mean_the_default():
+    given = dict.fromkeys(("SimMode", "UsageScenario", "ClockSpeed", "ApiServerPort", "Vehicles"))
+    given |= {"OriginGeopoint": {"Latitude": None}, "LocalHostIp": ""}
+    found = parse_settings(json.dumps({**given, "Wind": {"X": math.nan, "Y": 2}}))
+    assert found.model_copy(update={"text": "{}"}) == AirsimSettings.read({"Wind": {"Y": 2}})
 
 
 def test_misspelled_keys_are_warned_about_and_others_are_not(caplog):
@@ -126,20 +118,14 @@ def test_misspelled_keys_are_warned_about_and_others_are_not(caplog):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("{'SimMode': 'Car'}", "SimMode=Car is not supported; give Multirotor or ComputerVision"),
-        ("{'ApiServerPort': 70000}", "ApiServerPort=70000 is out of range"),
-        ("{'Vehicles': {'A': {'X': 'far'}}}", "Vehicles.A.X='far'"),
-        (
-            "{'Vehicles': {'A': {'VehicleType': 'PhysXCar'}}}",
-            "VehicleType=PhysXCar is not supported",
-        ),
-        (
-            "{'Vehicles': {'A': {'Cameras': {'side': {}}}}}",
-            "Cameras.side: camera 'side' is unknown",
-        ),
-        ("{'Vehicles': []}", "Vehicles is not an object"),
-        ("{'CameraDefaults': {'CaptureSettings': {}}}", "CaptureSettings is not a list"),
-        ("[]", "the file is not an object"),
+        ("{'SimMode': 'Car'}", "SimMode='Car': it must be 'Multirotor' or 'ComputerVision'"),
+        ("{'ApiServerPort': 70000}", "ApiServerPort=70000: it must be less than"),
+        ("{'Vehicles': {'A': {'X': 'far'}}}", r"Vehicles\.A\.X='far'"),
+        ("{'Vehicles': {'A': {'VehicleType': 'PhysXCar'}}}", "PhysXCar is not supported"),
+        ("{'Vehicles': {'A': {'Cameras': {'side': {}}}}}", r"A\.Cameras.*'side' is unknown"),
+        ("{'Recording': {'Cameras': [{'CameraName': 'left'}]}}", "CameraName.*'left' is unknown"),
+        ("{'CameraDefaults': {'CaptureSettings': {}}}", "CaptureSettings=.*must be a valid list"),
+        ("[]", "must be a valid dictionary"),
         ("{/* a\n\n */\n'a': }", "line 4 is not JSON"),
         ('{"a": ' + "1" * 5000 + "}", "too many digits"),
         ("[" * 100_000, "nested too deeply|not JSON"),
@@ -203,5 +189,5 @@ def test_a_file_that_is_not_named_does_not_open_the_server(tmp_path, monkeypatch
     assert find_settings().address == "127.0.0.1"
     assert "LocalHostIp='0.0.0.0' is ignored" in caplog.text
     (tmp_path / "settings.json").write_text('{"SimMode": "Car"}')
-    with pytest.raises(InputError, match=r"settings\.json: .*give settings=FILE or settings=none"):
+    with pytest.raises(InputError, match=r"settings\.json.*give settings=FILE or settings=none"):
         find_settings()

@@ -1,7 +1,6 @@
 """Simulated time: periods, waits, pauses."""
 
 import math
-import time
 
 import pytest
 
@@ -9,8 +8,6 @@ from drone_rl.config.commands import ServeSettings
 from drone_rl.flight.airsim.messages import Pose, nanoseconds
 from drone_rl.flight.airsim.settings_file import parse_settings
 from drone_rl.flight.airsim.simulation import Simulation, Wait
-from drone_rl.utils.errors import InputError
-from tests.flight.airsim.flying import FREE, KEEP
 
 
 @pytest.fixture
@@ -39,25 +36,6 @@ def test_lockstep_runs_while_a_call_waits_and_no_longer(make):
     assert not simulation.is_due
 
 
-def test_a_wait_that_is_done_is_answered_at_once(make):
-    simulation, answers = make(clock="lockstep"), []
-    simulation.wait_for(Wait(lambda: True, lambda: 7), answers.append)
-    assert answers == [7] and simulation.time == 0.0
-
-
-def test_a_forgotten_call_is_not_answered(make):
-    simulation, answers = make(clock="lockstep"), []
-
-    def reply(result):
-        answers.append(result)
-
-    simulation.wait_for(Wait(lambda: simulation.time > 0.1, lambda: 7), reply)
-    assert simulation.is_due
-    simulation.forget(reply)
-    assert not simulation.is_due
-    assert simulation.advance(1.0, math.inf) and simulation.time == 0.0 and answers == []
-
-
 def test_time_stands_at_the_end_of_each_call(make):
     """The second call, which ends later, is answered by another `advance`."""
     simulation, answers = make(clock="lockstep"), []
@@ -76,29 +54,6 @@ def test_continue_for_a_time_pauses_afterwards(make):
     assert simulation.advance(60.0, math.inf)
     assert answers == [None] and simulation.is_paused
     assert simulation.time == pytest.approx(0.5, abs=simulation.period_s)
-
-
-def test_continue_for_no_time_pauses_at_once(make):
-    simulation, answers = make(clock="lockstep"), []
-    simulation.wait_for(simulation.continue_for(0.0), answers.append)
-    assert answers == [None] and simulation.is_paused and simulation.time == 0.0
-
-
-def test_paused_wall_time_stands_still(make):
-    simulation = make(clock="wall")
-    simulation.pause(True)
-    assert simulation.follow(0.1) == math.inf and simulation.time == 0.0
-    simulation.pause(False)
-    assert 0.0 < simulation.follow(0.0) <= simulation.period_s
-
-
-def test_vehicles_are_found_by_name(make):
-    simulation = make('{"Vehicles": {"One": {}, "Two": {}}}')
-    assert simulation.find("") is simulation.find("One")
-    with pytest.raises(InputError, match="Vehicle API for 'Tow' is not available"):
-        simulation.find("Tow")
-    with pytest.raises(InputError, match="Vehicle Sim-API for 'Tow' is not available"):
-        simulation.find("Tow", is_sim_api=True)
 
 
 def test_time_stamps_of_vehicles_go_on_after_a_reset_and_from_their_creation(make):
@@ -135,10 +90,6 @@ def test_continuing_keeps_the_remainder(make, seconds):
     assert simulation.time == pytest.approx(40 * seconds, abs=0.003)
 
 
-def test_the_wall_clock_has_the_present_time(make):
-    assert make(clock="wall").stamp == pytest.approx(time.time_ns(), abs=60e9)
-
-
 def test_added_vehicles_have_the_heading_of_their_pose(make):
     """They look east, 90 degrees to the right."""
     simulation, half = make(), math.sqrt(0.5)
@@ -154,7 +105,7 @@ def test_reset_keeps_the_time_and_drops_api_control(make):
     simulation = make(clock="lockstep")
     vehicle = simulation.find("")
     vehicle.enable_api_control(True)
-    future, answers = vehicle.takeoff(20.0), []
+    future, answers = vehicle.take_off(), []
     simulation.wait_for(Wait(lambda: future.done, future.result), answers.append)
     simulation.advance(0.0, math.inf)
     before = simulation.time
@@ -168,7 +119,7 @@ def test_multirotors_collide_with_each_other(make):
     text = '{"Vehicles": {"A": {"Z": -3, "AllowAPIAlways": true}, "B": {"X": 3, "Z": -3}}}'
     simulation = make(text, clock="lockstep")
     a, b = simulation.find("A"), simulation.find("B")
-    future = a.move_velocity((2.0, 0.0, 0.0), 4.0, FREE, KEEP)
+    future = a.move_by_velocity(2.0, 0.0, 0.0, 4.0)
     simulation.wait_for(Wait(lambda: future.done, future.result), [].append)
     simulation.advance(60.0, math.inf)
     seen = a.collision(), b.collision()

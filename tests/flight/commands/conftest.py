@@ -42,6 +42,6 @@ def flying(quadrotor, taken_off):
     """A pilot whose drone has taken off."""
     pilot = Pilot(quadrotor)
     pilot.body = FlightState(taken_off.body.numbers.clone())
-    pilot._place, pilot._is_armed = taken_off._place.clone(), True
+    pilot._place, pilot._is_armed = [*taken_off._place], True
     pilot._landed = LandedState.FLYING
     return pilot

@@ -109,12 +109,6 @@ def test_a_moved_pillar_is_felt_where_it_stands_until_a_reset():
     assert pilot.state.collision is None or pilot.state.collision.thing == "ground"
 
 
-def test_sensors_go_on_without_dynamics(pilot):
-    begin = pilot.sensors.time
-    pilot.advance(1.0)
-    assert pilot.sensors.time == pytest.approx(begin + 1.0, abs=0.01)
-
-
 def test_movements_are_refused(pilot):
     for command in (pilot.arm, pilot.take_off, pilot.land, lambda: pilot.move_to(0, 0, 1)):
         with pytest.raises(drone_rl.PilotError, match="no dynamics; use set_pose or press"):
@@ -132,13 +126,6 @@ def test_commands_need_api_control(flying):
         flying.hover()
     flying.enable_api_control()
     assert flying.hover(0.1) and flying.has_api_control
-
-
-def test_a_drone_resets_to_the_ground(flying):
-    state = flying.reset()
-    assert state.position[2] == pytest.approx(flying.settings.radius) and not state.armed
-    with pytest.raises(drone_rl.PilotError, match="isn't armed"):
-        flying.take_off()
 
 
 @pytest.mark.parametrize(

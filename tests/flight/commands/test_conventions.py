@@ -5,46 +5,7 @@ import math
 import pytest
 
 import drone_rl
-from drone_rl.sim.coordinates import Attitude, to_pilot, to_simulator
 from drone_rl.sim.entities import find_camera
-
-
-@pytest.mark.parametrize(
-    ("simulator", "pilot"),
-    [
-        ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
-        ((10.0, 0.0, 0.0), (10.0, 0.0, 0.0)),
-        ((0.0, 10.0, 0.0), (0.0, -10.0, 0.0)),  # nose down
-        ((0.0, 0.0, 10.0), (0.0, 0.0, -10.0)),  # to the left
-        ((-1.0, 2.0, -3.0), (-1.0, -2.0, 3.0)),
-    ],
-)
-def test_conversion_in_both_directions(simulator, pilot):
-    assert to_pilot(*simulator) == pytest.approx(pilot)
-    assert to_simulator(*pilot) == pytest.approx(simulator)
-
-
-ABOUT = {"x": 1, "y": 2, "z": 3}
-
-
-@pytest.mark.parametrize(
-    ("axis", "degrees", "angles"),
-    [
-        ("x", 30.0, (30.0, 0.0, 0.0)),  # the left side rises
-        ("x", -45.0, (-45.0, 0.0, 0.0)),
-        ("y", 20.0, (0.0, -20.0, 0.0)),  # the nose sinks
-        ("y", -60.0, (0.0, 60.0, 0.0)),
-        ("z", 90.0, (0.0, 0.0, -90.0)),  # counterclockwise from above
-        ("z", -30.0, (0.0, 0.0, 30.0)),
-        ("z", 135.0, (0.0, 0.0, -135.0)),
-    ],
-)
-def test_attitude_of_a_rotation_about_an_axis(axis, degrees, angles):
-    half = math.radians(degrees) / 2
-    quaternion = [math.cos(half), 0.0, 0.0, 0.0]
-    quaternion[ABOUT[axis]] = math.sin(half)
-    found = Attitude.of(quaternion)
-    assert (found.roll, found.pitch, found.yaw) == pytest.approx(angles, abs=1e-9)
 
 
 @pytest.mark.parametrize("yaw", [0.0, 30.0, -90.0, 170.0])

@@ -5,11 +5,9 @@ import pytest
 import torch
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.flight.commands.command import Hover, Land, PilotError, RotateToCommand, hold
+from drone_rl.flight.commands.command import PilotError
 from drone_rl.flight.commands.drone import Drone
 from drone_rl.flight.commands.pilot import Pilot
-from drone_rl.flight.commands.state import LandedState
-from drone_rl.sim.dynamics.control import rotor_goals
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 
@@ -17,74 +15,6 @@ from drone_rl.utils.errors import InputError
 @pytest.fixture
 def drone(quadrotor):
     return Drone(quadrotor, start=(1, 2), yaw=90)
-
-
-def test_unarmed_rotors_stand_still(drone):
-    drone._fly(hold(drone.body.reference), 100)
-    assert drone.body.rotors.abs().max() == 0.0
-    assert drone.time == pytest.approx(0.3)
-    assert drone.state.position == pytest.approx((1, 2, 0.3))
-    assert drone.state.attitude.yaw == pytest.approx(90)
-
-
-def test_armed_rotors_idle(drone, quadrotor):
-    drone._is_armed = True
-    drone._fly(None, 100)
-    assert drone.body.rotors.mean().item() == pytest.approx(0.1 * quadrotor.settings.hover_throttle)
-    assert drone._landed == LandedState.LANDED
-    assert float(drone.body.velocity.norm()) < 0.01
-
-
-def test_it_flies_when_it_climbs_and_has_landed_when_it_lies_still(drone):
-    drone._is_armed = True
-    drone._fly(rotor_goals(torch.full((1, 4), 0.8, dtype=torch.float64)), 100)
-    assert drone._is_flying
-    drone._is_armed = False
-    drone._fly(None, 1)
-    assert drone._is_flying
-    for _ in range(200):
-        drone._fly(None, 7)
-    assert not drone._is_flying
-    assert drone.state.collision.thing == "ground"
-
-
-def test_idle_rotors_do_not_take_off(drone, hovering):
-    drone.body = hovering((0, 0, 9))
-    drone.body.velocity[0, 2] = 1.0
-    drone.body.rotors[:] = 0.05
-    drone._update_landed()
-    assert not drone._is_flying
-    drone.body.rotors[:] = 0.15
-    drone._update_landed()
-    assert drone._is_flying
-
-
-def test_seeds_have_31_bits(quadrotor):
-    Drone(quadrotor, seed=2**31 - 1)
-    with pytest.raises(InputError, match="seed=2147483648"):
-        Drone(quadrotor, seed=2**31)
-
-
-def test_a_still_drone_in_the_air_has_not_landed(drone, hovering):
-    drone.body, drone._landed = hovering((0, 0, 9)), LandedState.FLYING
-    drone._fly(None, 1)  # not armed: its rotors stop, and it hardly moves yet
-    assert float(drone.body.velocity.norm()) < 0.08
-    assert drone._is_flying
-
-
-def test_time_goes_on_for_a_lost_drone(drone):
-    drone._is_armed = True
-    drone.body.velocity[0, 0] = math.nan
-    drone._fly(hold(drone.body.reference), 10)
-    drone._fly(hold(drone.body.reference), 10)
-    assert drone._is_lost
-    assert drone.time == pytest.approx(0.06)
-    assert drone.state.position == (1, 2, 0.3)
-
-
-def test_ticks(drone):
-    assert drone._ticks_of(0.3) == 100
-    assert drone._ticks_of(0.301) == 101
 
 
 def test_a_notebook_shows_the_state_as_a_table(drone):
@@ -118,35 +48,11 @@ def test_wrong_worlds_cameras_and_requests_are_named():
     worlds.close()
 
 
-def test_time_passes_to_the_tick(hovering_pilot):
-    drone = hovering_pilot
-    drone._advance(10)
-    drone._advance(3)
-    assert drone.body.ticks.item() == 13
-
-
-def test_what_lasts_is_done_when_its_time_is_over(hovering_pilot):
-    drone = hovering_pilot
-    future = drone._start("hover", Hover(drone.body, 0.1), False)
-    drone._advance(28)
-    assert not future.done
-    drone._advance(7)
-    assert future.result() is True
-    assert future.elapsed == pytest.approx(0.105)
-
-
-def test_what_should_have_come_to_an_end_has_failed(hovering_pilot):
-    drone = hovering_pilot
-    future = drone._start("rotate", RotateToCommand(drone.body, 3.0, 0.01, 0.1), False)
-    assert future.result() is False
-    assert not future.cancelled
-
-
 def test_the_next_command_ends_the_one_before(hovering_pilot):
     drone = hovering_pilot
     first = drone.move_by_velocity(1, 0, duration=9, z=5, wait=False)
     drone._advance(10)
-    second = drone._start("hover", Hover(drone.body, 1.0), False)
+    second = drone.hover(1.0, wait=False)
     assert (first.cancelled, first.result()) == (True, False)
     assert drone.running is second
     assert second.result() is True
@@ -163,22 +69,6 @@ def test_after_a_velocity_it_stays_where_it_is_60_ms_later(hovering_pilot):
     drone._advance(3000)
     x = drone.body.position[0, 0].item()
     assert x == pytest.approx(later, abs=0.05)
-
-
-def test_after_landing_its_rotors_idle(hovering_pilot):
-    drone = hovering_pilot
-    drone.body.position[0, 2] = 0.5
-    assert drone._start("land", Land(drone.body, 20.0), False).result() is True
-    assert not drone._is_flying
-    drone._advance(50)
-    assert drone.body.rotors.max() < 0.1
-
-
-def test_a_lost_drone_does_nothing_more(hovering_pilot):
-    drone = hovering_pilot
-    future = drone.move_by_velocity(1, 0, duration=9, z=5, wait=False)
-    drone.body.velocity[0, 0] = torch.nan
-    assert future.result() is False
 
 
 def test_it_begins_on_the_ground_disarmed(quadrotor):
@@ -256,10 +146,13 @@ def test_commands_of_a_drone_that_is_not_armed_or_does_not_fly():
         pilot.hover()
 
 
-def test_a_lost_drone_is_told_nothing(flying):
+def test_a_lost_drone_is_told_nothing_and_its_time_goes_on(flying):
+    future, before = flying.move_by_velocity(1, 0, duration=9, wait=False), flying.state
     flying.body.velocity[0, 0] = math.nan
-    flying.advance(0.1)
-    assert flying.state.lost
+    flying.advance(0.3)
+    assert flying.state.lost and future.result() is False
+    assert flying.state.position == before.position
+    assert flying.time == pytest.approx(before.time + 0.3)
     with pytest.raises(PilotError, match="simulation has diverged; make a new Pilot"):
         flying.hover()
 

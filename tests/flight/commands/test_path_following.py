@@ -1,84 +1,54 @@
 import math
 
 import pytest
-import torch
 
 from benchmarks.flight_paths import fly_command
 from drone_rl.config import DynamicsSettings
-from drone_rl.flight.commands import path_following as of
 from drone_rl.flight.commands.path_following import (
     Drivetrain,
     GoHomeCommand,
+    Path,
     PathCommand,
     TakeoffCommand,
     YawControl,
     YawMode,
+    braking_time,
+    lookahead_of,
 )
 from drone_rl.sim.dynamics import Mode, Quadrotor
 from drone_rl.utils.errors import InputError
 
-
-def rows(*values):
-    return torch.tensor(values, dtype=torch.float64)
-
-
-CORNER = rows([[0, 0, 1], [4, 0, 1], [4, 3, 1]], [[0, 0, 0], [0, 0, 2], [0, 0, 2]])
-"""Four metres ahead and three to the left; two metres up, the end of which is repeated."""
+CORNER = Path([[0, 0, 1], [4, 0, 1], [4, 3, 1], [4, 3, 1]])
+"""Four metres ahead and three to the left; the end is repeated."""
 
 
-@pytest.fixture
-def paths():
-    return of.make_paths(CORNER)
+def test_places_and_directions_along_a_path():
+    assert CORNER.length == 7.0
+    for along, place, direction in (
+        (0.0, [0, 0, 1], [1, 0, 0]),
+        (3.9, [3.9, 0, 1], [1, 0, 0]),
+        (4.0, [4, 0, 1], [0, 1, 0]),  # at a corner the later direction counts
+        (5.0, [4, 1, 1], [0, 1, 0]),
+        (99.0, [4, 3, 1], [0, 0, 0]),
+    ):
+        assert CORNER.place_at(along).tolist() == place
+        assert CORNER.direction_at(along).tolist() == direction
 
 
-def test_lengths_and_directions(paths):
-    assert paths.along.tolist() == [[0, 4, 7], [0, 2, 2]]
-    assert paths.lengths.tolist() == [7, 2]
-    assert paths.directions.tolist() == [[[1, 0, 0], [0, 1, 0]], [[0, 0, 1], [0, 0, 0]]]
-    assert paths.ends.tolist() == [[4, 3, 1], [0, 0, 2]]
+def test_the_nearest_place_of_a_part():
+    """The corner, 4 m along, is nearer to the last position than all of the part from 5 to 6 m."""
+    assert CORNER.nearest([3.5, 2, 1]) == 6.0
+    assert CORNER.nearest([3.5, 2, 1], 0.0, 3.0) == 3.0
+    assert CORNER.nearest([3.5, 2, 1], 5.0, 5.0) == 5.0
+    assert CORNER.nearest([4, 0.1, 1], 5.0, 6.0) == 5.0
+    there_and_back = Path([[0, 0, 0], [5, 0, 0], [0, 0, 0]])
+    assert there_and_back.nearest([2, 0.1, 0], 1.0, 4.0) == 2.0
+    assert there_and_back.nearest([2, 0.1, 0], 6.0, 9.0) == 8.0
 
 
-def test_places_along(paths):
-    assert of.place_at(paths, rows(5, 1.5)).tolist() == [[4, 1, 1], [0, 0, 1.5]]
-    assert of.place_at(paths, rows(0, 9)).tolist() == [[0, 0, 1], [0, 0, 2]]
-    assert of.place_at(paths, rows(99, 2)).tolist() == [[4, 3, 1], [0, 0, 2]]
-
-
-def test_of_a_corner_the_later_direction_counts(paths):
-    assert of.direction_at(paths, rows(4, 0)).tolist() == [[0, 1, 0], [0, 0, 1]]
-    assert of.direction_at(paths, rows(3.9, 1)).tolist() == [[1, 0, 0], [0, 0, 1]]
-
-
-def test_the_nearest_place_of_a_part(paths):
-    position = rows([3.5, 2, 1], [1, 1, 1.25])
-    whole = of.nearest(paths, position, rows(0, 0), paths.lengths)
-    assert whole.tolist() == [6, 1.25]
-    part = of.nearest(paths, position, rows(0, 1.5), rows(3, 2))
-    assert part.tolist() == [3, 1.5]
-    point = of.nearest(paths, position, rows(5, 2), rows(5, 2))
-    assert point.tolist() == [5, 2]
-
-
-def test_the_nearest_place_is_never_outside_the_part(paths):
-    """The corner, 4 m along, is nearer than all of the part from 5 m to 6 m."""
-    position = rows([4, 0.1, 1], [0, 0, 0])
-    assert of.nearest(paths, position, rows(5, 1), rows(6, 2)).tolist() == [5, 1]
-
-
-def test_a_part_keeps_to_one_way_through_a_crossing():
-    """There and back again: the same place is 2 m and 8 m along."""
-    paths = of.make_paths(rows([[0, 0, 0], [5, 0, 0], [0, 0, 0]]))
-    position = rows([2, 0.1, 0])
-    assert of.nearest(paths, position, rows(1), rows(4)).tolist() == [2]
-    assert of.nearest(paths, position, rows(6), rows(9)).tolist() == [8]
-
-
-def test_distances(paths):
-    assert of.distance_from(paths, rows([2, -1, 1], [3, 4, 1])).tolist() == [1, 5]
-    assert of.distance_from(paths, rows([-3, -4, 1], [0, 3, 6])).tolist() == [5, 5]
-
-
-LEFT = torch.tensor([[0.0, 2.0, 5.0]], dtype=torch.float64)
+def test_distances():
+    positions = ([2, -1, 1], [-3, -4, 1], [4, 7, 4])
+    assert [CORNER.distance_from(position) for position in positions] == [1, 5, 5]
 
 
 @pytest.fixture
@@ -89,25 +59,20 @@ def body(hovering):
     return found
 
 
-def test_the_heading_is_held_by_default(body):
-    yaw_control = YawControl(body)
-    assert (yaw_control.mode, yaw_control.goal(LEFT).item()) == (Mode.ANGLE, pytest.approx(0.3))
-
-
-def test_an_angle_and_a_rate(body):
+def test_headings(body):
+    held = YawControl(body)
+    assert (held.mode, held.goal(0.0, 2.0)) == (Mode.ANGLE, pytest.approx(0.3))
     angle = YawControl(body, "max_degree_of_freedom", YawMode(False, -90.0))
-    assert angle.mode == Mode.ANGLE
-    assert angle.goal(LEFT).item() == pytest.approx(math.pi / 2)
+    assert (angle.mode, angle.goal(0.0, 2.0)) == (Mode.ANGLE, pytest.approx(math.pi / 2))
     rate = YawControl(body, "max_degree_of_freedom", YawMode(True, 180.0))
-    assert (rate.mode, rate.goal(LEFT).item()) == (Mode.RATE, pytest.approx(-math.pi))
+    assert (rate.mode, rate.goal(0.0, 2.0)) == (Mode.RATE, pytest.approx(-math.pi))
 
 
 def test_forward_only_looks_where_it_goes_and_else_where_it_looked(body):
     yaw_control = YawControl(body, Drivetrain.FORWARD_ONLY, YawMode(False, -45.0))
-    up = torch.tensor([[0.0, 0.0, 5.0]], dtype=torch.float64)
-    assert yaw_control.goal(up).item() == pytest.approx(0.3)
-    assert yaw_control.goal(LEFT).item() == pytest.approx(math.radians(135))
-    assert yaw_control.goal(up).item() == pytest.approx(math.radians(135))
+    assert yaw_control.goal(0.0, 0.0) == pytest.approx(0.3)
+    assert yaw_control.goal(0.0, 2.0) == pytest.approx(math.radians(135))
+    assert yaw_control.goal(0.0, 0.0) == pytest.approx(math.radians(135))
 
 
 def test_what_does_not_go_together(body):
@@ -119,23 +84,19 @@ def test_what_does_not_go_together(body):
         YawControl(body, "forward_only", (False, 9))
     with pytest.raises(InputError, match="yaw_or_rate=nan"):
         YawMode(False, math.nan)
-
-
-def test_whether_it_is_a_rate_is_true_or_false():
     with pytest.raises(InputError, match="is_rate='no' is neither true nor false"):
         YawMode(is_rate="no", yaw_or_rate=45)
 
 
 def test_over_its_home_first_and_down_then(quadrotor, hovering):
-    home = torch.tensor([[[0.0, 0.0, 1.5]]], dtype=torch.float64)
     body = hovering((5, 0, 1.5))
-    command = GoHomeCommand(PathCommand(body, home, 2.0, 20.0), 20.0)
+    command = GoHomeCommand(PathCommand(body, [(0.0, 0.0, 1.5)], 2.0, 20.0), 20.0)
     assert command.limit == 40.0
     states, done = fly_command(quadrotor, body, command)
-    x, _, z = torch.cat([state.position for state in states]).unbind(-1)
-    assert done.item() == len(states) - 1
-    assert x[z < 1.4].max() < 0.5
-    assert (states[-1].position - home[0] + torch.tensor([0, 0, 1.2])).norm() < 0.05
+    assert done == len(states) - 1
+    places = [state.position[0].tolist() for state in states]
+    assert max(x for x, _, z in places if z < 1.4) < 0.5
+    assert places[-1] == pytest.approx((0.0, 0.0, 0.3), abs=0.05)
 
 
 @pytest.mark.parametrize("wind", [0.0, 5.0])
@@ -143,5 +104,73 @@ def test_two_metres_up_whatever_the_wind(wind, hovering):
     body = hovering((1, 2, 0.3))
     air = Quadrotor(DynamicsSettings(mode="simple_flight", wind=(wind, 0.0, 0.0)))
     states, done = fly_command(air, body, TakeoffCommand(body, 20.0))
-    assert 3.8 < done.item() * 0.021 < 6.0  # 1.9 m at 0.5 m/s, and braking
+    assert 3.8 < done * 0.021 < 6.0  # 1.9 m at 0.5 m/s, and braking
     assert states[-1].position[0, 2].item() == pytest.approx(2.2, abs=0.02)
+
+
+def test_lookahead():
+    assert lookahead_of(2.0) == pytest.approx(1.2)
+    assert lookahead_of(2.0, adaptive=0.0) == pytest.approx(1.6)
+    assert lookahead_of(0.5) == 0.75
+    assert lookahead_of(2.0, 3.0) == 3.0
+    with pytest.raises(InputError, match=r"lookahead=0\.9 is too short at 50 m/s; give at least 1"):
+        lookahead_of(50.0, 0.9)
+
+
+def test_braking_takes_twice_the_time_constant_of_the_speed():
+    """A metre a second that is missing tilts by 0.2 * pi / 5.5, which pulls 9.81 times as much."""
+    settings = DynamicsSettings()
+    assert braking_time(settings) == pytest.approx(2 / (9.81 * 0.2 * math.pi / 5.5))
+    assert braking_time(settings.replace(velocity_gain=0.0)) == 20.0
+
+
+def test_the_carrot_is_a_lookahead_away(hovering):
+    body = hovering((0, 0, 5))
+    command = PathCommand(body, [[10, 0, 5]], 2.0, 60.0)
+    body.position[0, 1] = 0.9
+    goals = command.goals(body)
+    assert goals.modes == (Mode.VELOCITY, Mode.VELOCITY, Mode.ANGLE, Mode.POSITION)
+    ahead = 1.2 + 0.9  # what it is off the path comes on top
+    share = 2.0 / math.hypot(ahead, 0.9)
+    assert goals.values[0].tolist() == pytest.approx([share * ahead, -share * 0.9, 0.0, 5.0])
+    assert command.along == 0.0
+
+
+def test_it_climbs_at_the_speed_of_the_path_and_slower_towards_the_end(hovering):
+    """Half a second's way from the end on: 0.4 m before it at 0.8 m/s."""
+    body = hovering((0, 0, 5))
+    goals = PathCommand(body, [[3, 0, 9]], 2.0, 60.0).goals(body)
+    assert goals.drift[0].tolist() == pytest.approx([0, 0, 0, 1.6])
+    assert goals.values[0].tolist() == pytest.approx([1.2, 0, 0, 5])
+    command, climbs = PathCommand(body, [[0, 0, 9], [0, 0, 9]], 2.0, 60.0), []
+    for height in (6.0, 7.0, 8.0, 8.6, 9.0):
+        body.position[0, 2] = height
+        climbs.append(command.goals(body).drifts[0, 3].item())
+    assert climbs == pytest.approx([2.0, 2.0, 2.0, 0.8, 0.0], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("end", "speed", "pace"),
+    [
+        ([[1, 0, 5], [2, 0, 5]], 4.0, 1.0),
+        ([[1, 0, 5], [9, 0, 5]], 4.0, 4.0),  # for the end alone
+        ([[0.8, 0, 5]], 4.0, 0.6),  # never so much that wind stops it
+        ([[0.8, 0, 5]], 0.3, 0.3),
+    ],
+)
+def test_it_brakes_for_the_end(hovering, end, speed, pace):
+    body = hovering((0, 0, 5))
+    command = PathCommand(body, end, speed, 60.0, braking=2.0)
+    assert command.goals(body).values[0, 0].item() == pytest.approx(pace)
+    assert not command.is_complete(body)
+
+
+def test_a_flight_to_the_left_that_faces_its_direction(quadrotor, hovering):
+    body = hovering((0, 3, 5))
+    yaw_control = YawControl(body, Drivetrain.FORWARD_ONLY, YawMode(False, 0.0))
+    command = PathCommand(body, [[0, 9, 7]], 2.0, 60.0, yaw_control=yaw_control)
+    states, done = fly_command(quadrotor, body, command)
+    assert done * 0.021 < 8.0
+    assert states[-1].position[0].tolist() == pytest.approx([0, 9, 7], abs=0.5)
+    assert command.rest(states[-1]) == pytest.approx([0, 9, math.pi / 2, 7], abs=0.05)
+    assert states[-1].heading.item() == pytest.approx(math.pi / 2, abs=0.1)

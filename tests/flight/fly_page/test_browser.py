@@ -1,7 +1,6 @@
 """The page in a real browser, headless: what a person would do with it."""
 
 import importlib.resources
-import shutil
 
 import pytest
 
@@ -14,7 +13,6 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
 
 import drone_rl
-from benchmarks.fly_page import watch
 from tests.chromium import open_browser
 
 WAIT_S = 30
@@ -128,13 +126,6 @@ def test_the_policy_takes_over_and_collects_a_cube(browser):
     assert "You fly" in text(browser, "flyer")
 
 
-def test_every_camera_can_be_chosen(browser):
-    for camera in browser.execute_script("return hello.cameras"):
-        choose(browser, "camera", camera)
-        until(browser, f"return state.camera === '{camera}'")
-    choose(browser, "camera", "front_center")
-
-
 def test_sliders_change_wind_and_light(browser):
     for name, key in (("wind", Keys.END), ("light", Keys.HOME)):
         browser.find_element(By.ID, f"s-{name}").send_keys(key)
@@ -209,22 +200,6 @@ def test_axe_finds_no_violation(browser, scheme):
         )
         assert [(one["id"], one["nodes"][0]["html"]) for one in found] == []
     browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
-
-
-def test_images_are_displayed_at_a_rate(browser):
-    choose(browser, "mode", "simple_flight")
-    click(browser, "view")
-    ActionChains(browser).key_down("w").perform()
-    rate = watch(browser, 1.0)
-    ActionChains(browser).key_up("w").perform()
-    assert 3 < rate < 70  # other tests run beside this one
-
-
-def test_a_wrong_token_is_refused(page, tmp_path):
-    with open_browser(tmp_path / "profile", (800, 600)) as browser:
-        browser.get("/".join(page.url.split("/")[:3]) + "/guess/")
-        assert "403" in browser.find_element(By.TAG_NAME, "body").text
-    shutil.rmtree(tmp_path / "profile", ignore_errors=True)
 
 
 def test_a_lost_connection_is_shown(tmp_path):

@@ -64,22 +64,6 @@ def test_the_policy_acts_at_the_speed(make_world):
     assert steps[0][0] == (1, 25, 64, 3)
 
 
-def test_a_late_policy_does_not_rush(make_world):
-    world, steps = make_world(), Steps()
-    make_pilot("policy", world, steps.note).advance(60.0, Controls(), 4.0)
-    assert len(steps) == 5
-
-
-def test_the_policy_stops_where_the_episode_ends(make_world):
-    world, steps = make_world(), Steps()
-    pilot = make_pilot("policy", world, steps.note)
-    fly(pilot, Controls(), 30.0)
-    assert world.is_over and world.goals == (3, 0)
-    before = len(steps)
-    fly(pilot, Controls(), 2.0)
-    assert len(steps) == before
-
-
 def test_a_press_is_one_action_and_time_stands_still_between(make_world):
     world, steps, controls = make_world(), Steps(), Controls()
     pilot = make_pilot("actions", world, steps.note)
@@ -134,17 +118,6 @@ def test_computer_vision_keys_step_the_pose(make_world):
     assert place(world) == pytest.approx([0.25, 0.0, 2.75])
     assert float(world.body.heading[0]) == pytest.approx(math.radians(5.0))
     assert world.worlds.state.steps.tolist() == [0]  # no time passes
-
-
-def test_computer_vision_goes_on_from_the_drones_pose_at_the_speed(make_world):
-    world, controls = make_world(), Controls()
-    world.move(world.body.moved(torch.tensor([[7.0, -1.0, 2.5]]).double()))
-    pilot = make_pilot("computer_vision", world, Steps().note)
-    controls.hold(["right"])
-    fly(pilot, controls, 1.3, speed=2.0)  # a step, then about a second at 2 m/s
-    x, y, z = place(world)
-    assert (x, z) == pytest.approx((7.0, 2.5))
-    assert y == pytest.approx(-1.0 - 0.25 - 2.0, abs=0.3)
 
 
 def test_poses_stay_above_the_ground(make_world):

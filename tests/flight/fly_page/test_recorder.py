@@ -57,7 +57,7 @@ def test_recording_switches_to_the_policys_actions(make_flight, written):
     flight = make_flight(mode="simple_flight")
     flight.handle({"type": "record", "on": True})
     state = state_of(flight)
-    assert state["mode"] == "actions" and "now your controls" in state["note"]
+    assert state["mode"] == "actions" and "now your controls" in state["texts"]["note"]
     press(flight, "forward")
     flight.handle({"type": "mode", "mode": "computer_vision"})  # ends this demonstration
     press(flight, "forward")
@@ -80,14 +80,6 @@ def test_a_demonstration_has_one_flyer_one_episode_and_one_wind(make_flight, wri
     flight.handle(message)
     assert [(one.pilot, len(one.actions)) for _, one in written] == [("person", 2)]
     assert flight.recorder.is_on
-
-
-def test_closing_writes_what_was_recorded(make_flight, written):
-    flight = make_flight()
-    flight.handle({"type": "record", "on": True})
-    press(flight, "forward")
-    flight.close()
-    assert len(written) == 1
 
 
 def test_a_folder_that_cannot_be_written_is_reported_and_ends_recording(

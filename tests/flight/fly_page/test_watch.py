@@ -43,7 +43,7 @@ def parts(frame):
 def test_frames_show_the_vehicle_and_change_nothing(simulation, loop):
     watched = Watched(simulation, loop)
     before = simulation.time, simulation.find("").multirotor_state()
-    assert "blocks" in watched.hello()["watch"]
+    assert "blocks" in watched.hello()["texts"]["task"]
     images = {}
     for camera in CAMERAS:
         watched.handle({"type": "camera", "camera": camera})
@@ -51,7 +51,7 @@ def test_frames_show_the_vehicle_and_change_nothing(simulation, loop):
         assert state["camera"] == camera
         images[camera] = image.tobytes()
     assert len({*images.values()}) == len(CAMERAS)
-    assert state["position"][:2] == [0.0, 0.0] and state["vehicle"] == "SimpleFlight"
+    assert state["position"][:2] == [0.0, 0.0] and "SimpleFlight" in state["texts"]["flyer"]
     assert [6.0, -4.0, 1.0] in state["objects"]  # the orange ball
     assert (simulation.time, simulation.find("").multirotor_state()) == before
 

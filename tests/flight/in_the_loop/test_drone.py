@@ -44,26 +44,6 @@ def test_a_firmware_that_never_arms():
         flown.arm(tries=2, settle=0.01, within=0.01)
 
 
-def test_senses_go_with_time():
-    controller = Direct()
-    flown = drone(controller)
-    flown.hold(module.AT_REST, 0.003)
-    assert [s.time for s, _ in controller.seen] == pytest.approx([0.0, 0.001, 0.002])
-    assert controller.seen[2][0].force.tolist() == [0.0, 0.0, 9.81]
-
-
-def test_sticks_integrate_over_their_own_period(monkeypatch):
-    seen = []
-
-    def sticks_for(setpoint, readings, integral, seconds, settings):
-        seen.append(seconds)
-        return module.AT_REST, integral
-
-    monkeypatch.setattr(module, "sticks_for", sticks_for)
-    drone().fly(lambda body, readings: Setpoint((0.0, 0.0, 0.0)), 0.1)
-    assert set(seen) == {module.STICKS_TICKS * SETTINGS.tick}
-
-
 def test_pilots_are_asked_on_time():
     asked = []
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.config import ActionSettings, DynamicsSettings
+from drone_rl.config import DynamicsSettings
 from drone_rl.flight.betaflight.sitl import betaflight_drone
 from drone_rl.flight.in_the_loop import drone as drone_module
 from drone_rl.flight.in_the_loop import dynamics as module
@@ -60,15 +60,6 @@ def begun(hovering, monkeypatch):
     return dynamics, start
 
 
-def test_it_is_a_worlds_dynamics():
-    moves = InTheLoopDynamics(drone(), SETTINGS)
-    assert moves.actions.names == ("forward", "left", "right")
-    assert (moves.mount, moves.is_random, moves.needs_obstacles) == ("body", False, True)
-    gusty = InTheLoopDynamics(drone(), SETTINGS.replace(gusts=1.0), ActionSettings(kind="velocity"))
-    assert gusty.is_random
-    assert gusty.actions.entry.shape == (3,)
-
-
 def test_an_episode_begins_where_it_is_to(begun):
     """`begin` brings the drone there, with the gusts of the episode."""
     dynamics, _ = begun
@@ -105,22 +96,6 @@ def test_a_firmware_that_never_arms(monkeypatch):
     arm_at_once(monkeypatch, within=0.2)
     dynamics = InTheLoopDynamics(drone(Even(arms=False)), SETTINGS)
     with pytest.raises(NotReadyError, match="refuses to arm"):
-        dynamics.begin(dynamics.start(PLACE))
-
-
-def test_a_firmware_that_fails_while_the_drone_rises(monkeypatch):
-    """`begin` flies twice: to the height, and until the drone hovers."""
-    dynamics, flights = InTheLoopDynamics(drone(), SETTINGS), []
-
-    def fly(*args, **kwargs):
-        flights.append(args)
-        if len(flights) == 2:
-            raise FlightControllerError("the firmware ended with status 3")
-        return True
-
-    monkeypatch.setattr(dynamics.drone, "fly", fly)
-    arm_at_once(monkeypatch)
-    with pytest.raises(NotReadyError, match="ended with status 3"):
         dynamics.begin(dynamics.start(PLACE))
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from drone_rl.flight.betaflight.sitl import Betaflight
-from drone_rl.flight.commands.path_following import make_paths
+from drone_rl.flight.commands.path_following import Path
 from drone_rl.flight.in_the_loop import trial_flight
 from drone_rl.flight.in_the_loop.drone import DroneInTheLoop, FlightControllerError
 from drone_rl.flight.in_the_loop.instruments import Readings
@@ -32,7 +32,7 @@ def test_a_square_goes_forward_left_back_right():
 
 
 def test_a_path_moves_on_with_time():
-    pilot = follow_path(make_paths(square(ORIGIN, 10.0)[None]), 2.0, SETTINGS)
+    pilot = follow_path(Path(square(ORIGIN, 10.0)), 2.0, SETTINGS)
     assert pilot(None, readings(5.0)).velocity == (2.0, 0.0, 0.0)
     # A second later the point is 2 m ahead: 1.5 m/s for each metre beside its own speed.
     assert pilot(None, readings(6.0)).velocity == pytest.approx((5.0, 0.0, 0.0))

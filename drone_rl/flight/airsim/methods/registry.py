@@ -1,6 +1,5 @@
 """The registry of RPC methods: their names, arguments and functions."""
 
-import dataclasses
 import functools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -14,8 +13,7 @@ from drone_rl.utils.errors import InputError, did_you_mean
 _REQUIRED = object()
 
 
-@dataclasses.dataclass(frozen=True)
-class Argument:
+class Argument(NamedTuple):
     """How an argument of a method is read."""
 
     read: Callable[[Simulation, Any], Any]
