@@ -137,22 +137,6 @@ def test_a_section_that_fails_is_left_out_with_the_reason(make_pipeline, tmp_pat
     assert numbers.dataset.frames == SMALL.frames and [*numbers.seconds] == ["dataset"]
 
 
-def test_sections_in_a_thread_get_a_copy_of_the_network(make_pipeline, tmp_path):
-    env, actor = make_pipeline(num_envs=6)
-    network, met = actor.module[0].module, {}
-
-    def meet(name):
-        def section(context):
-            met[name] = context.network
-
-        return section
-
-    sections = {"flaws": meet("flaws"), "truth": meet("truth")}
-    written = explain(env, network, tmp_path, sections=sections)
-    assert met["truth"] is network and met["flaws"] is not network
-    assert [*written.seconds] == [*sections]
-
-
 def test_an_unknown_layer_is_refused_before_any_work(make_pipeline, tmp_path):
     env, actor = make_pipeline()
     settings = ExplainSettings(frames=60, perplexity=5, layer="conv7")

@@ -8,7 +8,6 @@ import torch
 from torch import nn
 
 from drone_rl.config import TaskSettings
-from drone_rl.envs import DroneEnv, GrayPixels, with_transforms
 from drone_rl.explanations import response
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.response import (
@@ -26,7 +25,6 @@ from drone_rl.policies import MLP
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.continuous_actions import ContinuousActions
 from tests.continuous import SETTINGS
-from tests.second_task import Posts
 
 IDLE, LEFT = [1.0, 0.0, 0.0], [0.1, 0.9, 0.0]
 
@@ -133,14 +131,6 @@ def test_a_turn_to_the_needed_side_is_not_blind():
         assert find_blind(actions, probs, probs[0, 0, 0], torch.tensor([1])).item() is is_blind
 
 
-def test_outcomes_of_another_task():
-    env = with_transforms(DroneEnv(1, Posts()), [GrayPixels()])
-    found = outcome_map(Scenes(env), Forward(), num_lateral=7, num_forward=2)
-    env.close()
-    past = [True, True, False, False, False, True, True]  # 3 to -3 m; touched within 1 m
-    assert found.collected.tolist() == [[past, past]]
-
-
 def sides(bias):
     """A policy that compares the halves of a one-row picture, and prefers right by `bias`."""
     network = MLP((1, 1, 4), 3, hidden=())
@@ -150,13 +140,6 @@ def sides(bias):
         network.layers.logits.weight[Move.RIGHT, 2:] = 1.0
         network.layers.logits.bias.copy_(torch.tensor([0.0, 0.0, bias]))
     return network
-
-
-def test_only_a_biased_policy_differs_from_its_mirror_image():
-    x, episode = torch.randn(40, 1, 1, 4), np.arange(40)
-    fair, biased = (asymmetry(sides(b), x, episode, MOVES) for b in (0.0, 2.0))
-    assert fair.absolute.mean < 1e-6 and biased.absolute.mean > 0.1
-    assert biased.signed.upper95 < 0  # right is preferred
 
 
 def test_asymmetry_of_frames_by_hand():

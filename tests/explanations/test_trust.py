@@ -97,12 +97,6 @@ def test_placebos_are_not_trusted(trial):
         assert {"placebos", "likeness"} <= set(method.failed), name
 
 
-def test_the_inverted_true_map_is_not_trusted(trial):
-    found = check_method(trial, lambda n, x, a: 2 - weights(n, x, a), LEVEL)
-    assert {"placebos", "pointing"} <= set(found.failed)
-    assert found.score.upper95 < 0
-
-
 def test_a_correct_map_that_ignores_the_policy_is_not_trusted(trial):
     true = weights(trial.network, trial.observations, None)
     found = check_method(trial, lambda n, x, a: true[: len(x)], LEVEL)
@@ -140,14 +134,6 @@ def test_nothing_is_trusted_for_a_constant_policy(trial):
     found = check_maps(dataclasses.replace(blind, frames_without_effect=120), {"true": weights})
     assert found.trusted is None and found.frames_unmoved == 120
     assert found.methods["true"].failed == ("nothing moves the policy",)
-
-
-def test_a_thinned_trial(trial):
-    few = trial.thinned()
-    assert few.episode.tolist() == list(range(40))
-    assert torch.equal(few.observations, trial.observations[1::3])  # the middle of each episode
-    assert np.array_equal(few.effects, trial.effects[1::3])
-    assert torch.equal(few.placebos["noise"], trial.placebos["noise"][1::3])
 
 
 def test_methods_use_the_network_of_the_call(trial):

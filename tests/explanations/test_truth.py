@@ -11,7 +11,6 @@ from drone_rl.explanations.truth import (
     PATIENCE,
     Intervention,
     TargetRollouts,
-    _patches,
     clear_frame,
     followed,
     intervene,
@@ -63,23 +62,6 @@ def test_a_cube_is_moved_to_the_middle_and_never_away_from_it(scenes, lateral, m
     assert after.cubes[0, 0, 1].item() == pytest.approx(7.0 + moved)
     assert torch.equal(after.cubes[0, 1:], state.cubes[0, 1:])
     assert state.cubes[0, 0, 1] == 7.0 + lateral
-
-
-def test_a_patch_of_ground_is_a_square_of_about_as_many_pixels():
-    ground = torch.ones(60, 20, 30, dtype=torch.bool)
-    patches = _patches(ground, torch.full((60,), 25), seed=0)
-    for patch in patches:
-        rows, columns = patch.any(1).nonzero()[:, 0], patch.any(0).nonzero()[:, 0]
-        assert patch.sum() == len(rows) * len(columns)  # all of it
-        for found, end in ((rows, 20), (columns, 30)):
-            cut = found[0] == 0 or found[-1] == end - 1  # by the border of the picture
-            assert (3 <= len(found) <= 5) if cut else len(found) == 5
-    assert len({tuple(patch.nonzero()[0].tolist()) for patch in patches}) > 50  # anywhere
-    assert [int(p.sum()) for p in _patches(ground[:2], torch.tensor([1, 0]), 0)] == [1, 0]
-    ground[:, :, 15:] = False
-    patches = _patches(ground, torch.full((60,), 49), seed=0)
-    assert not (patches & ~ground).any() and patches.flatten(1).any(1).all()
-    assert torch.equal(patches, _patches(ground, torch.full((60,), 49), seed=0))
 
 
 class Follower(nn.Module):

@@ -9,6 +9,7 @@ from tests.evidence import PROOF
 from tests.explanations.example import PICTURED, changed_explanation, mean
 
 GOOD = {"verdict.kind": "good", "verdict.certain": True, "verdict.exit_code": 0}
+UNCERTAIN = {"verdict.certain": False}
 MEASURED = {**GOOD, "shifts": PICTURED}
 NONE_TRUSTED = {
     "truth.trusted": None,
@@ -42,7 +43,7 @@ def text(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("section", "sentence", "against", "before"),
     [
-        ("summary", "Good. This verdict is wrong with at most 5%", {"verdict.certain": False}, GOOD),
+        ("summary", "Good. This verdict is wrong with at most 5%", UNCERTAIN, GOOD),
         ("summary", "in 60.0% (95% CI 58.0% to 62.0%) of 400", {"verdict": None}, {}),
         ("summary", "2 of 3 perturbations", {"shifts.shifts.domain": None}, MEASURED),
         ("summary", "Not measured", MEASURED, {}),
@@ -54,11 +55,9 @@ def text(tmp_path, monkeypatch):
         ("summary", "2.5 to 20 m ahead", {"places": {"refused": "a stack"}}, {}),
         ("summary", "other colors, light or sizes", MEASURED, {}),
         ("summary", "what was left out (embedding)", {"left_out": {}}, {}),
-        ("verdict", "rely on it in environments like those tested", {"verdict.certain": False}, GOOD),
-        ("verdict", "do not rely on it; drone-rl verdict with require=good ends with exit status 12", GOOD,
-         {}),
-        ("verdict", "more episodes (episodes=400)", {"verdict.enough": None},
-         {"verdict.certain": False}),
+        ("verdict", "rely on it in environments like those tested", UNCERTAIN, GOOD),
+        ("verdict", "do not rely on it; drone-rl verdict", GOOD, {}),
+        ("verdict", "more episodes (episodes=400)", {"verdict.enough": None}, UNCERTAIN),
         ("verdict", "fitted to the environments, frames", {"seed_is_fixed": False}, {}),
         ("dataset", "80.0% forward, 10.0% left, 10.0% right.",
          {"dataset.action_shares": [0.0, 0.9999, 0.0001]}, {}),
@@ -76,7 +75,7 @@ def text(tmp_path, monkeypatch):
         ("truth", "No heat map of this policy can be trusted", {"truth.frames": 0}, NONE_TRUSTED),
         ("truth", "could be verified: trust none", {"truth.frames": 5}, {"truth.frames": 0}),
         ("truth", "follow it by 0.80 (95% CI 0.60 to 0.95)", {"truth.outcomes": None}, {}),
-        ("truth", "the outcome of 2.0%", {"truth.outcomes.ground_changed": mean(0.4, 0.3, 0.5)}, {}),
+        ("truth", "the outcome of 2.0%", {"truth.outcomes.ground_changed.mean": 0.4}, {}),
         ("response", "from 64 of 72 places on its left, 72 of 72 places ahead",
          {"response.rows.1.places": 0}, {}),
         ("response", "with the cube at +1.2 m, the policy collects the cube from 50 of 72",
@@ -85,7 +84,7 @@ def text(tmp_path, monkeypatch):
          {"response.rows.0.blind": None}, {}),
         ("asymmetry", "-0.20 (95% CI -0.30 to -0.10) in probability",
          {"asymmetry.signed": mean(0.2, 0.1, 0.3)}, {}),
-        ("places", "left for 25.00% of those on its left", {"places": {"refused": "it is poor"}}, {}),
+        ("places", "left for 25.00% of those on its left", {"places": {"refused": "no"}}, {}),
         ("places", "75.00% of those on its left and 50.00% of those on its right",
          {"places.blind": 0}, {}),
         ("left_out", "It has no layers.", {"left_out.embedding": "It is flat."}, {}),
