@@ -331,6 +331,72 @@ class Response(Model):
     outcome: OutcomeMap
 
 
+class Window(Model):
+    """Positions of one cube relative to the camera, metres."""
+
+    nearest: float
+    farthest: float
+    sideways: float
+
+
+class ActionShares(Model):
+    """Fractions of an area of positions."""
+
+    share: float
+    """The area, as a fraction of all positions."""
+    actions: tuple[float, ...]
+    """With each action."""
+    unseen: float
+    """Where no pixel shows the cube."""
+    blind: float
+    """Where a turn is needed, and the action is that without a cube."""
+
+
+class Outlines(Model):
+    """Closed polygons around regions of equal action."""
+
+    points: Array
+    """Corners of all polygons: metres ahead and to the left. Shape: (P, 2)."""
+    ends: Array
+    """End of each polygon among them. Shape: (N,)."""
+    labels: Array
+    """Action of each, or one more than the last action if the cube is not seen. Shape: (N,)."""
+
+
+class ExactMap(ActionShares):
+    """The policy's action over all positions of one cube: areas, not samples."""
+
+    share: float = 1.0
+    window: Window
+    area: float
+    """Of the window, m^2."""
+    cells: int
+    """Cells of positions with one image each."""
+    sides: dict[str, ActionShares]
+    alone: int
+    """The action without a visible cube."""
+    touch_distance: float
+    """Metres; a cube further to the side requires a turn."""
+    least_gap: float
+    """Smallest difference of the two highest logits."""
+    least_gap_ahead: float
+    """Its position, metres."""
+    least_gap_left: float
+    logit_gap: float
+    """A difference of logits up to which rounding may decide."""
+    close: float
+    """Fraction of the positions with a smaller difference."""
+    in_doubt: float
+    """Bound on the fraction of the positions where float32 may show a neighbour's image."""
+    outlines: Outlines
+
+
+class NoMap(Model):
+    """Why there is no exact map."""
+
+    refused: str
+
+
 class Mirrored(Model):
     """A frame, and how far the policy differs from its mirror image there."""
 
@@ -384,7 +450,7 @@ class Explanation(Model):
     attribution: Attribution | None = None
     truth: Truth | None = None
     response: Response | None = None
-    places: dict[str, Any] | None = None
+    places: ExactMap | NoMap | None = None
     asymmetry: Asymmetry | None = None
     data: dict[str, Array] = Field({}, exclude=True)
     """Arrays of `dataset.npz`, with the analysed frames."""

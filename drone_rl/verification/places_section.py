@@ -1,13 +1,13 @@
 """Section "places" of explanations: the exact map of the action over one cube's place."""
 
 import dataclasses
-from typing import Any
 
 import numpy as np
 
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import PlacesSettings
 from drone_rl.explanations.context import Context
+from drone_rl.explanations.results import ExactMap, NoMap
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.utils.errors import InputError
@@ -21,14 +21,13 @@ _COMPARED = 1000
 """Rendered frames that are compared with the closed form; fewer than in `drone-rl places`."""
 
 
-def places_section(context: Context) -> dict[str, Any]:
-    """Return the map and its "outlines", or why it is "refused" if none is known."""
+def places_section(context: Context) -> ExactMap | NoMap:
+    """Return the map, or why none is known."""
     settings = PlacesSettings()
     try:
-        action_map = _exact_map(context, settings)
+        return _exact_map(context, settings).summary(settings.logit_gap)
     except InputError as error:
-        return {"refused": str(error)}
-    return {**action_map.summary(settings.logit_gap), "outlines": action_map.outlines()}
+        return NoMap(refused=str(error))
 
 
 def _exact_map(context: Context, settings: PlacesSettings) -> ActionMap:

@@ -6,7 +6,6 @@ from drone_rl.explanations.results import Explanation
 from drone_rl.sim.vocabulary import CUBES, SHOWN_MOVES
 from drone_rl.trust.shifts_results import packed
 from tests.evidence import SAVED_SHIFTS, SHIFTS, VERDICT, changed
-from tests.trust.plots.test_regions import NUMBERS, WAYS
 
 FRAMES, STEPS, ACTIONS = 12, 5, 3  # of the data set, in two episodes; of the film
 
@@ -192,8 +191,13 @@ CONTENT = {
     },
     "response": response(),
     "places": {
-        **NUMBERS,
-        "window": {"nearest": 2.5, "farthest": 20.0, "sideways": 8.0},
+        "window": {"nearest": 2.0, "farthest": 4.0, "sideways": 3.0},
+        "area": 12.0,
+        "cells": 7,
+        "touch_distance": 1.5,
+        "least_gap": 0.1,
+        "least_gap_ahead": 3.0,
+        "least_gap_left": 2.0,
         "sides": {
             "left": side(0.4, [0.75, 0.25, 0.0], 0.2, 0.75),
             "ahead": side(0.2, [1.0, 0.0, 0.0], 0.0, 0.0),
@@ -206,7 +210,18 @@ CONTENT = {
         "logit_gap": 0.0001,
         "close": 0.0003,
         "in_doubt": 0.0002,
-        "outlines": WAYS,
+        "outlines": {
+            "points": np.array(
+                [
+                    *((2, -3), (4, -3), (4, 1), (2, 1)),  # forward, mostly to the right
+                    *((2, 1), (4, 1), (4, 3), (2, 3)),  # left
+                    *((2, 2.5), (2.00014, 2.5), (2, 3)),  # not seen
+                ],
+                float,
+            ),
+            "ends": np.array([4, 8, 11]),
+            "labels": np.array([0, 1, 3]),
+        },
     },
     "left_out": {"embedding": "It has no layers."},
     "asymmetry": {

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from drone_rl.explanations import class_models, explain, response
 from drone_rl.explanations.explain import SECTIONS
 from drone_rl.explanations.report import attribution
+from drone_rl.explanations.results import NoMap
 from drone_rl.trust.plots import saving
 from drone_rl.verification import places_section as places
 from drone_rl.verification.places_section import places_section
@@ -35,7 +36,7 @@ def few_sections(*names: str) -> Iterator[None]:
     """Compute these sections alone; all of them take a minute."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(explain, "SECTIONS", {name: SECTIONS[name] for name in names})
-        refused = {"refused": "the test needs none"}
+        refused = NoMap(refused="the test needs none")
         patch.setattr(places, "places_section", lambda context: refused)
         yield
 

@@ -22,8 +22,7 @@ def test_the_exact_map_is_that_of_rendered_observations(context, monkeypatch):
     small = PlacesSettings(farthest=3.5, sideways=3.0)
     monkeypatch.setattr(places_section, "PlacesSettings", lambda: small)
     told = places_section.places_section(context)
-    assert told["window"] == {"nearest": 2.5, "farthest": 3.5, "sideways": 3.0}
-    assert told["outlines"].keys() == {"points", "ends", "labels"}
+    assert dict(told.window) == {"nearest": 2.5, "farthest": 3.5, "sideways": 3.0}
     found = places_section._exact_map(context, small)
     where = np.random.RandomState(0).uniform((2.5, -3.0), (3.5, 3.0), (100, 2))
     ahead, left = torch.from_numpy(where).T
@@ -41,7 +40,7 @@ def test_reasons_for_no_exact_map(context):
         network = changes.pop("network", None)
         changed = {name: getattr(scenes, name) for name in names} | changes
         given = SimpleNamespace(scenes=SimpleNamespace(**changed), network=network)
-        return places_section.places_section(given)["refused"]
+        return places_section.places_section(given).refused
 
     assert "stack of frames" in refused(memory=1)
     assert "does not choose among forward, left, right" in refused(actions=FIVE)
@@ -67,4 +66,4 @@ def test_there_is_no_exact_map_where_a_place_has_several_images(look, faults, mo
     settings = ExplainSettings(frames=40, episodes=6, perplexity=5, seed=3)
     found = places_section.places_section(Context(env, network, settings))
     env.close()
-    assert "several images" in found["refused"]
+    assert "several images" in found.refused

@@ -52,7 +52,7 @@ def text(tmp_path, monkeypatch):
         ("summary", "re-checked by 1,000 rollouts", {"verdict.proof.wrong_at_most": None},
          {"verdict.proof": PROOF}),
         ("summary", "1 of 2 methods passed the tests: trust saliency.", NONE_TRUSTED, {}),
-        ("summary", "2.5 to 20 m ahead", {"places": {"refused": "a stack"}}, {}),
+        ("summary", "2 to 4 m ahead", {"places": {"refused": "a stack"}}, {}),
         ("summary", "other colors, light or sizes", MEASURED, {}),
         ("summary", "what was left out (embedding)", {"left_out": {}}, {}),
         ("verdict", "rely on it in environments like those tested", UNCERTAIN, GOOD),

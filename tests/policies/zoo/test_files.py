@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import torch
 from safetensors.torch import save
+from tests.trust.cards import VERDICT
 
 from drone_rl.policies.zoo import (
     certificate_path,
@@ -22,7 +23,6 @@ from drone_rl.trust.export import export_policy
 from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.errors import InputError
 from tests.policies.zoo.test_description import DEFAULT
-from tests.trust.cards import VERDICT
 
 DESCRIPTION = {
     **DEFAULT,
