@@ -53,16 +53,6 @@ def setting(value: Any) -> str:
     return value if isinstance(value, str) else json.dumps(value)
 
 
-def bounds(interval: Mapping[str, Any], show: Callable[[float], str] = "{:.2f}".format) -> str:
-    """Return a 95% interval in words."""
-    return f"95%: {show(interval['lower95'])} to {show(interval['upper95'])}"
-
-
-def among(share: Mapping[str, Any]) -> str:
-    """Return a rate as "k of n"."""
-    return f"{share['successes']} of {share['trials']}"
-
-
 def listed(parts: Sequence[str], last: str = "and") -> str:
     """Return a list in a sentence."""
     if len(parts) < 2:
