@@ -16,7 +16,7 @@ import torch
 from benchmarks.benchmark import Setup
 from benchmarks.commands import call
 from benchmarks.scripted_policies import SCRIPTS, Script, ScriptedPolicy
-from drone_rl.collectors.complete_episodes import CompleteEpisodes, run_episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes, rollout
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.trust.baselines import BASELINES, run_baselines
@@ -80,9 +80,7 @@ def _verdict(script: Script, episodes: int, seed: int) -> dict[str, Any]:
     task = script.settings
     env = _make_env(task, seed)
     policy = ScriptedPolicy(script, torch.Generator().manual_seed(seed))
-    return apply_rule(
-        run_episodes(env, policy, episodes), _baselines(task, episodes, seed)
-    ).as_dict()
+    return apply_rule(rollout(policy, env, episodes), _baselines(task, episodes, seed)).as_dict()
 
 
 @functools.cache

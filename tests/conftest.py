@@ -58,14 +58,14 @@ def make_pipeline():
     """Return a factory of environments with default transforms and actors with a small network."""
     import torch
 
-    from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
+    from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
     from drone_rl.policies import SmallCNN, make_actor
 
     envs = []
 
     def build(num_envs=4, seed=0, **kwargs):
-        env = with_transforms(
-            DroneEnv(num_envs, seed=seed, **kwargs), [GrayPixels(), StandardizePixels()]
+        env = DroneEnv(
+            num_envs, seed=seed, **kwargs, transforms=[GrayPixels(), StandardizePixels()]
         )
         envs.append(env)
         generator = torch.Generator().manual_seed(seed)

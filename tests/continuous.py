@@ -3,7 +3,7 @@
 import torch
 
 from drone_rl.config import ActionSettings, CameraSettings, TaskSettings
-from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
+from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
 from drone_rl.policies import SmallCNN, make_actor
 from drone_rl.sim.dynamics import Kinematic
 
@@ -22,8 +22,10 @@ CAMERA = CameraSettings(width=32, height=8)
 def make_env(num_envs=8, seed=0, **actions):
     """Return an environment with small images and a control step of 0.25 s."""
     dynamics = Kinematic(SETTINGS.replace(**actions), 0.25)
-    env = DroneEnv(num_envs, TASK, CAMERA, dynamics=dynamics, seed=seed, num_shards=1)
-    return with_transforms(env, [GrayPixels(), StandardizePixels()])
+    transforms = [GrayPixels(), StandardizePixels()]
+    return DroneEnv(
+        num_envs, TASK, CAMERA, transforms=transforms, dynamics=dynamics, seed=seed, num_shards=1
+    )
 
 
 def make_policy(env, seed=0):

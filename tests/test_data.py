@@ -14,7 +14,6 @@ from tools.readme.settings import list_commands, list_groups, list_parts
 
 MUTABLE = {
     "collectors.complete_episodes:CompleteEpisodes",
-    "collectors.complete_episodes:StepLog",
     "explanations.heat_maps:Explainer",
     "explanations.truth:Intervention",
     "explanations.rollouts:RolloutDataset",

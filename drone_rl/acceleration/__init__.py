@@ -5,7 +5,6 @@ implementation, or the reasons why there is none.
 """
 
 from drone_rl.acceleration.activations import ActivationRecorder as ActivationRecorder
-from drone_rl.acceleration.direct_collector import DirectCollector as DirectCollector
-from drone_rl.acceleration.direct_collector import DirectStepper as DirectStepper
-from drone_rl.acceleration.fused_collector import FusedCollector as FusedCollector
+from drone_rl.acceleration.fused_episodes import FusedEpisodes as FusedEpisodes
 from drone_rl.acceleration.fused_network import FusedNetwork as FusedNetwork
+from drone_rl.acceleration.packed_layers import Reasons as Reasons

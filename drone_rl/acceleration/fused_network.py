@@ -17,13 +17,13 @@ from drone_rl.acceleration.packed_layers import (
     Order,
     OutputOffsets,
     PackedLayer,
+    Reasons,
     as_geometries,
     as_indices,
     odd_lines,
     packed_layers,
     unsupported,
 )
-from drone_rl.envs.direct_renderer import Reasons
 from drone_rl.policies.networks import ImageNetwork, PolicyNetwork
 from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
 

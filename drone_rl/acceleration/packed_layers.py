@@ -195,6 +195,13 @@ def as_indices(numbers: Sequence[int]) -> Any:
     return wp.from_torch(torch.tensor(numbers, dtype=torch.int32))
 
 
+class Reasons(tuple[str, ...]):
+    """Reasons why an implementation does not support a configuration."""
+
+    def __str__(self) -> str:
+        return "; ".join(self)
+
+
 def unsupported(network: nn.Module) -> list[str]:
     """Return why kernels do not support a network; empty if they do.
 

@@ -6,12 +6,13 @@ from typing import Any, TypedDict, cast
 
 from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
-from tensordict.utils import NestedKey
-from torch import Tensor, nn
+from torch import nn
 from torchrl.collectors import BaseCollector
 from torchrl.envs import EnvBase
 
 from drone_rl.envs import base_env
+from drone_rl.envs.drone_env import Entries
+from drone_rl.envs.rollout import ActorAgent, Agent, Step
 from drone_rl.utils.errors import InputError
 
 
@@ -19,7 +20,7 @@ class BatchOptions(TypedDict, total=False):
     """Keyword arguments of `BatchedCollector`."""
 
     total_frames: int
-    next_keys: Iterable[NestedKey]
+    info: Iterable[str]
     postproc: Callable[[TensorDictBase], TensorDictBase] | None
 
 
@@ -29,45 +30,44 @@ class BatchedCollector(BaseCollector):
     def __init__(
         self,
         env: EnvBase,
-        actor: TensorDictModuleBase,
+        actor: TensorDictModuleBase | Agent,
         *,
         total_frames: int = -1,
-        next_keys: Iterable[NestedKey] = (("next", "info", "end_reason"),),
+        info: Iterable[str] = (),
         postproc: Callable[[TensorDictBase], TensorDictBase] | None = None,
     ) -> None:
         """Connect an environment and a policy.
 
         Args:
-            env: A batch of environments; an `InputError` for any other.
-            actor: Writes the action.
+            env: A `DroneEnv`, which TorchRL's transforms that change no image may wrap.
+            actor: Writes the action; or an agent.
             total_frames: Stop before a batch once this many frames were collected; -1 for never.
-            next_keys: ("next", ...) entries to keep in addition to reward and end flags, as far as
-                the environment has them.
+            info: Entries of ("next", "info") to keep besides "end_reason"; see `Worlds.entries`.
             postproc: Applied to each batch, such as a return estimator.
+
+        Raises:
+            InputError: `env` is another environment, or has no such entry.
         """
-        if len(env.batch_size) != 1:
-            raise InputError(
-                f"env has batch size {list(env.batch_size)}; give one with one batch dimension"
-            )
         super().__init__()
-        self.env = env
-        self.actor = actor
+        self.env, self.base_env = env, base_env(env)
+        self.actor: Any = actor
         self.postproc = postproc
         self.total_frames = total_frames
         self.frames = 0
         self.episodes = 0
-        self._observed = tuple(actor.in_keys)
-        flags = (env.reward_key, *env.done_keys)
-        observable = {
-            ("next", *((key,) if isinstance(key, str) else key))
-            for key in env.observation_spec.keys(True, True)
-        }
-        self._kept = (*(("next", key) for key in flags), *(k for k in next_keys if k in observable))
+        self._agent: Agent = ActorAgent(actor) if isinstance(actor, TensorDictModuleBase) else actor
+        self._info = tuple(name for name in info if name != "end_reason")
+        if unknown := [name for name in self._info if name not in self.base_env.worlds.entries]:
+            raise InputError(
+                f"info={unknown[0]} is not known of these drones; choose from "
+                f"{', '.join(self.base_env.worlds.entries)}"
+            )
 
-    @property
-    def base_env(self) -> Any:
-        """The environment without its transforms."""
-        return base_env(self.env)
+    def _outcome(self, step: Step) -> Entries:
+        """Return the ("next", ...) entries of a step. Shapes: (k, *)."""
+        entries = self.base_env.outcome(step.after.end_reason, step.reward)
+        every = self.base_env.worlds.info(step.after) if self._info else {}
+        return entries | {("next", "info", name): every[name] for name in self._info}
 
     @abc.abstractmethod
     def collect(self) -> TensorDictBase:
@@ -113,9 +113,3 @@ class BatchedCollector(BaseCollector):
         self.actor.load_state_dict(
             policy_or_weights.state_dict() if is_module else policy_or_weights
         )
-
-
-def take_rows(tensordict: TensorDictBase, rows: Tensor) -> TensorDictBase:
-    """Index the first dimension by rows (k,), faster than tensordict's own indexing."""
-    taken = {key: tensordict.get(key).index_select(0, rows) for key in tensordict.keys(True, True)}
-    return TensorDict(taken, [len(rows)], device=tensordict.device)

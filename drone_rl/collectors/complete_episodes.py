@@ -1,7 +1,7 @@
 """Run complete episodes with a policy."""
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, cast
 
 import torch
@@ -11,7 +11,9 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.collectors.episodes import EpisodeCollector
+from drone_rl.collectors.speedups import Reasons
 from drone_rl.envs import worlds_of
+from drone_rl.envs.rollout import Agent
 from drone_rl.policies.actor import exploring
 from drone_rl.sim.tasks import Goals, Task
 from drone_rl.utils.available_memory import EPISODE_BYTES, require_memory
@@ -28,6 +30,10 @@ class CompleteEpisodes:
     end_reason: Tensor  # (n,) int64
     """One of the task's ends."""
     length: Tensor  # (n,) int64
+    steps: TensorDictBase | None = None
+    """Kept entries of all steps, one episode after the other. Shape: (sum of the lengths,)."""
+    implementation: str = ""
+    """What computed the actions: "fused kernel" or "PyTorch"."""
 
     @classmethod
     def ended(
@@ -45,18 +51,40 @@ class CompleteEpisodes:
         """Return the number of episodes."""
         return len(self.length)
 
-    def __getitem__(self, rows: slice | Tensor) -> "CompleteEpisodes":
-        """Return some of the episodes."""
-        return CompleteEpisodes(
-            self.task, self.goals[rows], self.end_reason[rows], self.length[rows]
+    @classmethod
+    def of(cls, task: Task[Any], batch: TensorDictBase) -> "CompleteEpisodes":
+        """Build episodes from a batch of `EpisodeCollector` with the task's `scored` info."""
+        done = cast(Tensor, batch["next", "done"])[:, 0].nonzero()[:, 0]
+        info: Any = batch["next", "info"]
+        episode = cast(Tensor, batch["collector", "traj_ids"])
+        lengths = episode.unique_consecutive(return_counts=True)[1]
+        names = (*task.scored, "end_reason")
+        return cls.ended(task, {name: info[name][done] for name in names}, lengths)
+
+    def first(self, count: int) -> "CompleteEpisodes":
+        """Return the first episodes."""
+        kept, steps = slice(count), self.steps
+        return dataclasses.replace(
+            self,
+            goals=self.goals[kept],
+            end_reason=self.end_reason[kept],
+            length=self.length[kept],
+            steps=None if steps is None else steps[: int(self.length[kept].sum())],
         )
+
+    def each(self, name: str) -> list[Tensor]:
+        """Return a kept entry of the steps of each episode. Shapes: (T, *)."""
+        assert self.steps is not None
+        return [*cast(Tensor, self.steps[name]).split(self.length.tolist())]
 
     @classmethod
     def joined(cls, parts: Sequence["CompleteEpisodes"]) -> "CompleteEpisodes":
         """Concatenate episodes of one task."""
         goals = type(parts[0].goals).joined([part.goals for part in parts])
         ends, lengths = ([getattr(p, name) for p in parts] for name in ("end_reason", "length"))
-        return cls(parts[0].task, goals, torch.cat(ends), torch.cat(lengths))
+        steps: list[Any] = [part.steps for part in parts if part.steps is not None]
+        joined = cast(Any, torch.cat)(steps) if steps else None
+        return cls(parts[0].task, goals, torch.cat(ends), torch.cat(lengths), joined)
 
     @property
     def success(self) -> Tensor:
@@ -82,106 +110,54 @@ class CompleteEpisodes:
         return (there & self.goals.reached[offered]).sum(-1).double() / there.sum(-1)
 
 
-@dataclasses.dataclass
-class StepLog:
-    """The actions of some episodes, to compare implementations by."""
-
-    implementation: str = ""
-    """What computed the actions: "fused kernel" or "PyTorch"."""
-    actions: list[Tensor] = dataclasses.field(default_factory=list)
-    """Of each episode. Shapes: (T, *)."""
-
-    def add(self, batch: TensorDictBase) -> None:
-        """Add a batch of complete episodes, one after the other."""
-        self.actions += cast(Tensor, batch["action"]).cpu().split(_lengths(batch).tolist())
-
-
-def run_episodes(
+def rollout(
+    agent: TensorDictModuleBase | Agent,
     env: EnvBase,
-    actor: TensorDictModuleBase,
     num_episodes: int,
     *,
+    frames: int = 0,
     greedy: bool = True,
-    is_compiled: bool = False,
-    is_exact: bool = False,
-    log: StepLog | None = None,
+    compiled: bool = False,
+    exact: bool = False,
+    keep: Sequence[str] | None = ("action",),
+    info: Iterable[str] = (),
 ) -> CompleteEpisodes:
     """Run complete episodes, `env.batch_size[0]` at a time; return them, on the CPU.
 
     Environment i samples its episodes from its own random stream, so that the k-th episode has the
-    same initial state for every policy. Arguments are those of `episode_batches`; by default the
-    last batch is whole, and its surplus episodes, whose actions `log` receives, too, are dropped.
+    same initial state for every policy.
+
+    Args:
+        agent: The policy: an actor of TorchRL, or an agent.
+        env: A batch of environments.
+        num_episodes: How many.
+        frames: Go on until there are so many steps, too.
+        greedy: Whether an actor takes the most probable action instead of sampling one.
+        compiled: Whether to use the fused kernel if it supports the policy.
+        exact: Whether the last batch runs no surplus episodes, which are dropped otherwise.
+        keep: Entries of steps to keep, of those that the agent reads and writes; None for all,
+            with those after each step.
+        info: Entries of ("next", "info") besides those that the task's score needs.
     """
     setting = f"episodes={num_episodes}"
     require_memory(num_episodes * EPISODE_BYTES, setting, "give fewer episodes")
-    batches = episode_batches(
-        env,
-        actor,
-        num_episodes,
-        greedy=greedy,
-        is_compiled=is_compiled,
-        is_exact=is_exact,
-        log=log,
-    )
-    return CompleteEpisodes.joined([final_episodes(env, batch) for batch in batches])[:num_episodes]
-
-
-def episode_batches(
-    env: EnvBase,
-    actor: TensorDictModuleBase,
-    num_episodes: int,
-    actor_keys: tuple[str, ...] = (),
-    *,
-    keep: tuple[str, ...] | None = None,
-    greedy: bool = True,
-    is_compiled: bool = False,
-    is_exact: bool = True,
-    log: StepLog | None = None,
-) -> Iterator[TensorDictBase]:
-    """Yield batches of complete episodes until there are `num_episodes`.
-
-    Args:
-        env: A batch of environments.
-        actor: The policy.
-        num_episodes: How many.
-        actor_keys: Entries that the actor reads or writes, to keep in addition to the action.
-        keep: Entries of ("next", "info") to keep; by default what `final_episodes` needs.
-        greedy: Whether to take the most probable action instead of sampling one.
-        is_compiled: Whether to use the fused kernel if it supports the policy.
-        is_exact: Whether the last batch has no surplus episodes.
-        log: Receives the implementation and all actions.
-    """
-    if keep is None:
-        keep = (*worlds_of(env).task.scored, "end_reason")
+    task = worlds_of(env).task
     collector = EpisodeCollector(
         env,
-        actor,
-        next_keys=tuple(("next", "info", name) for name in keep),
-        keep_actor_entries=False,
-        actor_keys=actor_keys,
-        acceleration="fused" if is_compiled else "direct",
+        agent,
+        info=(*task.scored, *info),
+        keep_actor_entries=keep is None,
+        actor_keys=keep or (),
+        compiled=compiled,
         num_threads=num_cores(),
     )
-    if log is not None:
-        log.implementation = collector.source.implementation
-    while (missing := num_episodes - collector.episodes) > 0:
-        with exploring(greedy=greedy):
-            batch = collector.collect(min(missing, env.batch_size[0]) if is_exact else None)
-        if log is not None:
-            log.add(batch)
-        yield batch
-
-
-def final_episodes(env: EnvBase, batch: TensorDictBase) -> CompleteEpisodes:
-    """Return the outcomes of a batch of complete episodes, on the CPU."""
-    task = worlds_of(env).task
-    done = cast(Tensor, batch["next", "done"])[:, 0].nonzero()[:, 0]
-    names = (*task.scored, "end_reason")
-    info = {name: cast(Tensor, batch["next", "info", name])[done] for name in names}
-    return CompleteEpisodes.ended(task, info, _lengths(batch))
-
-
-def _lengths(batch: TensorDictBase) -> Tensor:
-    """Steps of each episode of a batch. Shape: (episodes,)."""
-    episode = cast(Tensor, batch["collector", "traj_ids"])
-    return episode.unique_consecutive(return_counts=True)[1]
+    parts = []
+    with exploring(greedy=greedy):
+        while (missing := num_episodes - collector.episodes) > 0 or collector.frames < frames:
+            batch = collector.collect(missing if exact and missing > 0 else None)
+            part = CompleteEpisodes.of(task, batch)
+            part.steps = (batch if keep is None else batch.select(*keep)).cpu()
+            parts.append(part)
+    episodes = CompleteEpisodes.joined(parts)
+    episodes.implementation = "PyTorch" if isinstance(collector.fused, Reasons) else "fused kernel"
+    return episodes if frames else episodes.first(num_episodes)

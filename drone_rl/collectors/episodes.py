@@ -4,18 +4,20 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Unpack
 
 import torch
-from tensordict import TensorDictBase
+from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from tensordict.utils import NestedKey
 from torch import Tensor
 from torchrl.envs import EnvBase
 
-from drone_rl.collectors.batched_collector import BatchedCollector, BatchOptions, take_rows
-from drone_rl.collectors.speedups import Acceleration, accelerated_collector
-from drone_rl.envs.direct_renderer import Reasons
+from drone_rl.collectors.batched_collector import BatchedCollector, BatchOptions
+from drone_rl.collectors.speedups import Reasons, fused_episodes
+from drone_rl.envs.drone_env import Entries
+from drone_rl.envs.rollout import Act, Agent, StepContext, steps
+from drone_rl.sim.tasks import State
 
 if TYPE_CHECKING:
-    from drone_rl.acceleration import DirectCollector, FusedCollector
+    from drone_rl.acceleration import FusedEpisodes
 
 
 class EpisodeCollector(BatchedCollector):
@@ -26,58 +28,83 @@ class EpisodeCollector(BatchedCollector):
     "traj_ids"), each ending in ("next", "done"). Next observations are left out: only
     estimators with a critic need them.
 
-    All environments reset at the start of a batch. An environment whose episode has ended is masked
-    until the batch ends and is not rendered. So a batch is on-policy and not biased towards short
-    episodes, and between batches the environments' random streams are the whole state.
+    All environments reset at the start of a batch. An environment whose episode has ended is
+    neither stepped nor rendered until the batch ends. So a batch is on-policy and not biased
+    towards short episodes, and between batches the environments' random streams are the whole
+    state.
     """
 
     def __init__(
         self,
         env: EnvBase,
-        actor: TensorDictModuleBase,
+        actor: TensorDictModuleBase | Agent,
         *,
         keep_actor_entries: bool = True,
         actor_keys: Iterable[NestedKey] = (),
-        acceleration: Acceleration = "direct",
+        compiled: bool = False,
         num_threads: int = 1,
         **options: Unpack[BatchOptions],
     ) -> None:
         """Connect an environment and a policy.
 
         Args:
-            env: A batch of environments that honours TorchRL's "_step" masks.
-            actor: Writes the action.
+            env: A batch of environments.
+            actor: Writes the action; or an agent.
             keep_actor_entries: Whether to keep all entries that the actor reads and writes.
             actor_keys: Entries that the actor reads or writes, to keep in addition to the action.
-            acceleration: The fastest implementation that may be used, if it is supported.
-            num_threads: Of the fused kernel; no result depends on it.
+            compiled: Whether one kernel runs the episodes, if it supports them; sampling and sums
+                are in another order.
+            num_threads: Of this kernel; no result depends on it.
             options: See `BatchedCollector`, also for errors.
         """
         super().__init__(env, actor, **options)
-        entries: dict[str, Any] = {"next_keys": self._kept, "actor_keys": actor_keys}
-        entries["keep_actor_entries"] = keep_actor_entries
-        source = accelerated_collector(env, actor, acceleration, num_threads=num_threads, **entries)
-        self.source: FusedCollector | DirectCollector | SteppingCollector = (
-            SteppingCollector(env, actor, source, **entries)
-            if isinstance(source, Reasons)
-            else source
-        )
-        """Implementation that runs the episodes."""
+        self._actor_keys = None if keep_actor_entries else ("action", *actor_keys)
+        self.fused: FusedEpisodes | Reasons = Reasons(["collector.compiled is false"])
+        """The kernel that runs the episodes, or the reasons why they are stepped."""
+        if compiled:
+            self.fused = fused_episodes(
+                self.base_env, actor, keeps_inputs=keep_actor_entries, num_threads=num_threads
+            )
+
+    @property
+    def name(self) -> str:
+        """How episodes are run, for the log."""
+        is_stepped = isinstance(self.fused, Reasons)
+        return f"stepping collector: {self.fused}" if is_stepped else "fused collector"
 
     @torch.no_grad()
     def collect(self, num_envs: int | None = None) -> TensorDictBase:
         """Run an episode in every environment, or in the first `num_envs`. Shape: (T_total,)."""
         size = self.env.batch_size[0]
         count = size if num_envs is None else min(num_envs, size)
-        batch = self.source.collect(count)
+        env = self.base_env
+        started = env.start()[torch.arange(count, device=env.device)]
+        batch = None if isinstance(self.fused, Reasons) else self.fused.run(count)
+        if batch is None:
+            batch = self._step(self._agent, started)
+        elif self._info:  # the task's batched step computes it; nothing is rendered
+            again = _Again(batch["action"], batch["collector", "traj_ids"])
+            batch.update(self._step(again, started))
         batch["collector", "traj_ids"] += self.episodes
         return self._finish(batch, count)
+
+    def _step(self, agent: Agent, started: State) -> TensorDictBase:
+        """Run episodes from these states step by step."""
+        rows: list[Tensor] = []
+        entries: list[Entries] = []
+        for step in steps(agent, self.base_env.observer, started):
+            acted = {**step.act.entries, "action": step.act.action}
+            keys = acted if self._actor_keys is None else self._actor_keys
+            rows.append(step.rows)
+            entries.append({**{key: acted[key] for key in keys}, **self._outcome(step)})
+        return _join(rows, entries, len(started))
 
     def shutdown(
         self, timeout: float | None = None, close_env: bool = True, raise_on_error: bool = True
     ) -> None:
         """See `BatchedCollector`."""
-        self.source.close()
+        if not isinstance(self.fused, Reasons):
+            self.fused.close()
         super().shutdown(timeout, close_env, raise_on_error)
 
     def state_dict(self) -> dict[str, Any]:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -91,56 +118,29 @@ class EpisodeCollector(BatchedCollector):
         self.base_env.load_state_dict(state_dict["worlds"])
 
 
-class SteppingCollector:
-    """Collect one complete episode of each environment by `env.step`.
+class _Again:
+    """Takes the actions of a batch of complete episodes, (T_total,), again."""
 
-    TorchRL's `Collector(trajs_per_batch=...)` takes the episodes that end first, which biases a
-    batch towards short ones.
-    """
+    def __init__(self, actions: Tensor, env_of_step: Tensor) -> None:
+        lengths = env_of_step.bincount()
+        self._actions, self._next = actions, lengths.cumsum(0) - lengths
 
-    implementation = "PyTorch"
+    def act(self, context: StepContext) -> Act:
+        """See `Agent`."""
+        now = self._next[context.rows]
+        self._next[context.rows] += 1
+        return Act(self._actions[now])
 
-    def __init__(
-        self,
-        env: EnvBase,
-        actor: TensorDictModuleBase,
-        reasons: Reasons,
-        *,
-        next_keys: Iterable[NestedKey],
-        actor_keys: Iterable[NestedKey] = (),
-        keep_actor_entries: bool = True,
-    ) -> None:
-        """See `accelerated_collector`; the reasons are why there is no faster collector."""
-        self.name = f"stepping collector: {reasons}"
-        """Name in the log."""
-        self._env, self._actor = env, actor
-        self._kept = (env.action_key, *next_keys, *actor_keys)
-        self._keep_actor_entries = keep_actor_entries
 
-    def collect(self, num_envs: int) -> TensorDictBase:
-        """Run an episode in each of the first environments; traj_ids are 0 to num_envs - 1."""
-        state = self._env.reset()
-        active = torch.arange(len(state), device=state.device) < num_envs
-        steps: list[TensorDictBase] = []
-        masks: list[Tensor] = []
-        while bool(active.any()):
-            rows = active.nonzero()[:, 0]
-            acted = self._actor(take_rows(state.select(*self._actor.in_keys), rows))
-            for key, value in acted.exclude(*self._actor.in_keys).items(True, True):
-                blank = value.new_zeros(len(active), *value.shape[1:])
-                state.set(key, blank.index_copy(0, rows, value))
-            if len(rows) < len(active):
-                state.set("_step", active)
-            state = self._env.step(state)
-            keys = acted.keys(True, True) if self._keep_actor_entries else ()
-            steps.append(state.select(*self._kept, *keys))
-            masks.append(active)
-            active = active & ~state.get(("next", "done")).flatten()
-            state = self._env.step_mdp(state)
-        mask = torch.stack(masks, 1)
-        batch: Any = torch.stack(steps, 1)  # pyright: ignore[reportArgumentType]
-        batch = batch[mask]  # row-major: environment after environment, step after step
-        return batch.set(("collector", "traj_ids"), mask.nonzero()[:, 0])
-
-    def close(self) -> None:
-        """Do nothing: the caller closes the environment."""
+def _join(rows: list[Tensor], steps: list[Entries], num_envs: int) -> TensorDictBase:
+    """Return the steps of all episodes, one episode after the other. Shape: (T_total,)."""
+    env_of_step = torch.cat(rows)
+    lengths = env_of_step.bincount(minlength=num_envs)
+    first = lengths.cumsum(0) - lengths
+    targets = torch.cat([first[indices] + t for t, indices in enumerate(rows)])
+    batch = TensorDict({}, [len(targets)], device=targets.device)
+    for key, value in steps[0].items():
+        joined = value.new_empty(len(batch), *value.shape[1:])
+        batch.set(key, joined.index_copy_(0, targets, torch.cat([step[key] for step in steps])))
+    traj_ids = torch.empty_like(env_of_step).index_copy_(0, targets, env_of_step)
+    return batch.set(("collector", "traj_ids"), traj_ids)

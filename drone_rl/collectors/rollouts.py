@@ -1,23 +1,18 @@
 """Collects rollouts of fixed length; episodes continue from batch to batch."""
 
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Unpack
+import itertools
+from collections.abc import Iterator
+from typing import Any, Unpack
 
 import torch
 from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
-from tensordict.utils import NestedKey
-from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.collectors.batched_collector import BatchedCollector, BatchOptions
-from drone_rl.collectors.speedups import accelerated_stepper
-from drone_rl.envs import base_env
-from drone_rl.envs.direct_renderer import Entries, Reasons
+from drone_rl.envs.drone_env import Entries
+from drone_rl.envs.rollout import Step, steps
 from drone_rl.utils.errors import InputError
-
-if TYPE_CHECKING:
-    from drone_rl.acceleration import DirectStepper
 
 
 class RolloutCollector(BatchedCollector):
@@ -28,6 +23,9 @@ class RolloutCollector(BatchedCollector):
     ("next", "episode_reward") and ("next", "step_count") count from the start of an episode, even
     in an earlier batch, as TorchRL's `RewardSum` and `StepCounter` do.
     """
+
+    name = "stepping collector"
+    """Name in the log."""
 
     def __init__(
         self,
@@ -41,145 +39,77 @@ class RolloutCollector(BatchedCollector):
             raise InputError(f"num_steps={num_steps} is out of range; give 1 or more")
         super().__init__(env, actor, **options)
         self.num_steps = num_steps
-        stepper = accelerated_stepper(env, self._observed, self._kept)
-        self._stepper: DirectStepper | TorchrlStepper = (
-            TorchrlStepper(env, self._observed, self._kept, stepper)
-            if isinstance(stepper, Reasons)
-            else stepper
-        )
+        self._steps: Iterator[Step] | None = None
         self._reward = torch.zeros(*env.batch_size, 1, device=env.device)
-        self._steps = torch.zeros(*env.batch_size, 1, dtype=torch.int64, device=env.device)
-
-    @property
-    def name(self) -> str:
-        """Name of the stepper in the log."""
-        return self._stepper.name
+        self._count = torch.zeros(*env.batch_size, 1, dtype=torch.int64, device=env.device)
 
     @torch.no_grad()
     def collect(self) -> TensorDictBase:
         """Step every environment `num_steps` times. Shape: (num_envs, T)."""
-        steps, episodes = Entries(), 0
-        for t in range(self.num_steps):
-            step = self._step()
-            for key, value in step.items():
+        env, batch, episodes = self.base_env, Entries(), 0
+        for t, step in enumerate(itertools.islice(self._running(), self.num_steps)):
+            entries = self._entries(step)
+            for key, value in entries.items():
                 if t == 0:
-                    steps[key] = value.new_empty(len(value), self.num_steps, *value.shape[1:])
-                steps[key][:, t] = value
-            ended = step["next", "done"]
-            if bool(ended.any()):
-                self._reward, self._steps = self._reward * ~ended, self._steps * ~ended
-                self._stepper.restart(ended)
-                episodes += int(ended.sum())
-        batch = TensorDict({}, [*self.env.batch_size, self.num_steps], device=self.env.device)
-        for key, value in steps.items():
-            batch.set(key, value)
-        return self._finish(batch, episodes)
+                    batch[key] = value.new_empty(len(value), self.num_steps, *value.shape[1:])
+                batch[key][:, t] = value
+            ended = entries["next", "done"]
+            self._reward, self._count = self._reward * ~ended, self._count * ~ended
+            episodes += int(ended.sum())
+            env.worlds.state = step.next_state
+        result = TensorDict({}, [*self.env.batch_size, self.num_steps], device=self.env.device)
+        for key, value in batch.items():
+            result.set(key, value)
+        return self._finish(result, episodes)
 
-    def _step(self) -> Entries:
-        """Take one step; return the kept entries."""
-        acted = self.actor(self._stepper.observe())
-        step: Entries = {key: acted.get(key) for key in acted.keys(True, True)}
-        step |= self._stepper.step(acted.get(self.env.action_key))
-        self._reward = self._reward + step["next", self.env.reward_key]
-        self._steps = self._steps + 1
-        sums = {"episode_reward": self._reward, "step_count": self._steps}
-        return step | {("next", name): value for name, value in sums.items()}
+    def _running(self, state: Any = None) -> Iterator[Step]:
+        """Return all further steps, from new episodes at first, or episodes under way."""
+        if self._steps is None:
+            env = self.base_env
+            self._steps = steps(
+                self._agent,
+                env.observer,
+                env.start() if state is None else state,
+                starts=True if state is None else None,
+                restart=env.start,
+                looks_ahead=True,
+            )
+        return self._steps
+
+    def _entries(self, step: Step) -> Entries:
+        """Return the kept entries of a step."""
+        self._reward = self._reward + step.reward.float()[:, None]
+        self._count = self._count + 1
+        return {
+            **step.act.entries,
+            **self._outcome(step),
+            **{("next", name): value for name, value in step.following.inputs.items()},
+            ("next", "episode_reward"): self._reward,
+            ("next", "step_count"): self._count,
+        }
 
     def set_seed(self, seed: int, static_seed: bool = False) -> int:
         """See `BatchedCollector.set_seed`; all episodes restart."""
-        self._stepper.forget()
-        self._reward, self._steps = torch.zeros_like(self._reward), torch.zeros_like(self._steps)
+        self._steps = None
+        self._reward, self._count = torch.zeros_like(self._reward), torch.zeros_like(self._count)
         return super().set_seed(seed, static_seed=static_seed)
 
     def state_dict(self) -> dict[str, Any]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the state of the episodes under way, without observations."""
+        self._running()
         return {
             "frames": self.frames,
             "episodes": self.episodes,
-            **self._stepper.state_dict(),
+            "worlds": self.base_env.running_state(),
             "episode_reward": self._reward,
-            "step_count": self._steps,
+            "step_count": self._count,
         }
 
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
         """Resume within the episodes of a `state_dict`; observations are rendered again."""
         self.frames, self.episodes = state_dict["frames"], state_dict["episodes"]
-        self._stepper.load_state_dict(state_dict)
+        self.base_env.load_running_state(state_dict["worlds"])
+        self._steps = None
+        self._running(self.base_env.worlds.state)
         self._reward = state_dict["episode_reward"].to(self._reward, copy=True)
-        self._steps = state_dict["step_count"].to(self._steps, copy=True)
-
-
-class TorchrlStepper:
-    """Step all environments by `env.step`; the caller calls `restart` when episodes end."""
-
-    def __init__(
-        self,
-        env: EnvBase,
-        observed: Iterable[NestedKey],
-        next_keys: Iterable[NestedKey],
-        reasons: Reasons,
-    ) -> None:
-        """See `accelerated_stepper`; the reasons are why there is no faster stepper."""
-        self.name = f"stepping collector: {reasons}"
-        """Name in the log."""
-        self._env, self._observed, self._kept = env, tuple(observed), tuple(next_keys)
-        read = {key if isinstance(key, str) else key[0] for key in self._observed}
-        # copying entries that no step reads makes each step of TorchRL slower
-        self._dropped = {*env.done_keys, *({env.reward_key, "info"} - read)}
-        self._state: TensorDictBase | None = None
-
-    def observe(self) -> TensorDictBase:
-        """Return the observations; the first call starts all environments. Shape: (num_envs,)."""
-        return self._begin().select(*self._observed)
-
-    def _begin(self) -> TensorDictBase:
-        if self._state is None:
-            self._state = self._env.reset().exclude(*self._dropped)
-        return self._state
-
-    def step(self, action: Tensor) -> Entries:
-        """Step every environment, actions (num_envs, *); return kept entries and observations."""
-        after = self._env.step(self._begin().set(self._env.action_key, action))
-        following = after.get("next")
-        entries: Entries = {key: after.get(key) for key in self._kept}
-        entries |= {("next", key): following.get(key) for key in self._observed}
-        self._state = following.exclude(*self._dropped)
-        return entries
-
-    def restart(self, ended: Tensor) -> None:
-        """Start new episodes where old ones ended. Shape: (num_envs, 1), bool.
-
-        TorchRL's `reset` would copy the observations of all environments, several times.
-        """
-        state = self._begin()
-        fresh = self._env._reset(TensorDict({"_reset": ended}, state.batch_size))
-        indices = ended.flatten().nonzero()[:, 0]
-        restarted = TensorDict({}, state.batch_size, device=state.device)
-        for key in state.keys(True, True):
-            rows = fresh.get(key).index_select(0, indices)
-            restarted.set(key, state.get(key).index_copy(0, indices, rows))
-        self._state = restarted
-
-    def forget(self) -> None:
-        """Start all episodes again at the next call of `observe`."""
-        self._state = None
-
-    def state_dict(self) -> dict[str, Any]:
-        """Return the state of the episodes under way, without observations."""
-        carried = self._begin().exclude(*self._observed)
-        is_transformed = self._env is not base_env(self._env)
-        return {
-            "worlds": base_env(self._env).running_state(),
-            "transforms": dict(self._env.state_dict()) if is_transformed else {},
-            "carried": carried.to_dict(),
-        }
-
-    def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Resume within the episodes of a `state_dict`; observations are rendered again."""
-        self._begin()  # transforms allocate their memory at a reset
-        base_env(self._env).load_running_state(state["worlds"])
-        if self._env is not base_env(self._env):
-            self._env.load_state_dict(state["transforms"])
-        nowhere = torch.zeros(*self._env.batch_size, 1, dtype=torch.bool, device=self._env.device)
-        rendered = self._env._reset(TensorDict({"_reset": nowhere}, self._env.batch_size))
-        self._state = rendered.exclude(*self._dropped).update(state["carried"])
+        self._count = state_dict["step_count"].to(self._count, copy=True)

@@ -1,14 +1,15 @@
 """The batched TorchRL environment."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Self
 
 import numpy as np
 import torch
 from tensordict import TensorDict, TensorDictBase
+from tensordict.utils import NestedKey
 from torch import Tensor
 from torchrl.data import Binary, Bounded, Categorical, Composite, TensorSpec, Unbounded
-from torchrl.envs import EnvBase
+from torchrl.envs import Compose, EnvBase, Transform, TransformedEnv
 
 from drone_rl.config import (
     MINIMAL,
@@ -18,10 +19,12 @@ from drone_rl.config import (
     CameraSettings,
     DynamicsSettings,
 )
+from drone_rl.envs.observer import Observer
+from drone_rl.envs.transforms import is_of_pixels
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import Dynamics
 from drone_rl.sim.rendering import RendererFactory, check_device
-from drone_rl.sim.tasks import Task, as_task
+from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.available_memory import environment_bytes, require_memory
@@ -29,12 +32,16 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Text, Whole
 from drone_rl.utils.seeding import Stream, get_state, set_state, side_stream, world_random_state
 
+Entries = dict[NestedKey, Tensor]
+"""Entries of a TensorDict."""
+
 
 class DroneEnv(EnvBase):
     """`num_envs` independent drones, stepped and rendered as one batch.
 
-    Observation "pixels": uint8, shape (num_envs, height, width, 3). The action space is that of the
-    dynamics. The nested "info" is the ground truth, see `Worlds.entries`.
+    Observation "pixels": what its `observer` makes of the camera's images; without transforms
+    uint8, shape (num_envs, height, width, 3). The action space is that of the dynamics. The nested
+    "info" is the ground truth, see `Worlds.entries`.
 
     Partial resets and steps (TorchRL's masks "_reset" and "_step") leave the other environments
     alone and repeat their last images. Environment i samples its episodes from its own random
@@ -47,6 +54,7 @@ class DroneEnv(EnvBase):
         task: BaseTaskSettings | Task[Any] | str | None = None,
         camera: CameraSettings | None = None,
         *,
+        transforms: Iterable[Transform] = (),
         seed: int = 0,
         stream: Stream = Stream.WORLDS,
         first_world: int = 0,
@@ -64,6 +72,7 @@ class DroneEnv(EnvBase):
             num_envs: Batch size.
             task: A task, its settings or its name; cube collection by default.
             camera: The policy's camera.
+            transforms: From the camera's images to "pixels", in order.
             seed: Root of the environments' random streams.
             stream: Purpose of the environments; training and evaluation use different streams.
             first_world: Number of the first environment, so that workers use different streams.
@@ -107,12 +116,19 @@ class DroneEnv(EnvBase):
             distractors=self.appearances.distractors,
         )
         self.pixels = pixels
+        self.observer = Observer(
+            self.worlds,
+            transforms,
+            appearance=self.appearances.current,
+            streams=lambda rows, key: self.side_streams(rows, *key),
+        )
+        """Makes "pixels"."""
         if pixels:
-            self.worlds.prepare()
+            self.worlds.prepare(self.observer.view)
         self.stream = stream
         self.first_world = first_world
         self._make_specs()
-        self._pixels = self._pixel_spec().zero()
+        self._pixels = self.observation_spec["pixels"].zero() if pixels else torch.empty(0)
         self.set_seed(seed)
         self.is_closed = False  # TorchRL's default is True
 
@@ -136,7 +152,8 @@ class DroneEnv(EnvBase):
     def running_state(self) -> dict[str, Any]:
         """Return the full state, which suffices to resume within episodes."""
         appearances = {"looks": self.appearances.values} if self.appearances.varies else {}
-        return {**self.state_dict(), "worlds": self.worlds.state.tensors(), **appearances}
+        memory = {"observer": self.observer.pipeline.state_dict()}
+        return {**self.state_dict(), "worlds": self.worlds.state.tensors(), **appearances, **memory}
 
     def load_running_state(self, state: Mapping[str, Any]) -> None:
         """Restore a `running_state` and render it; see `load_state_dict` for errors."""
@@ -144,7 +161,8 @@ class DroneEnv(EnvBase):
         self.worlds.state = self.worlds.state.with_tensors(state["worlds"])
         if self.appearances.varies:
             self.appearances.load(state["looks"])
-        self._render(self._indices(None))
+        self.observer.pipeline.load_state_dict(state["observer"])
+        self._render(self._indices(None), None)
 
     def side_streams(self, env_ids: Tensor, *key: int) -> list[np.random.Generator]:
         """Return further random streams of episodes that have just begun, for the purpose `key`.
@@ -154,9 +172,14 @@ class DroneEnv(EnvBase):
         return [side_stream(self._random_states[i], *key) for i in env_ids.tolist()]
 
     @property
+    def base_env(self) -> Self:
+        """Itself, as TorchRL's `TransformedEnv.base_env`."""
+        return self
+
+    @property
     def last_pixels(self) -> Tensor:
-        """The last images. Shape: (num_envs, H, W, 3), uint8."""
-        return self._pixels
+        """The camera's images of the present states. Shape: (num_envs, H, W, 3), uint8."""
+        return self.worlds.render(self.worlds.state, appearance=self.appearances.current())
 
     def close(self, *, raise_if_closed: bool = True) -> None:
         """Stop the rendering threads."""
@@ -185,10 +208,12 @@ class DroneEnv(EnvBase):
         done = {name: Binary(1, torch.Size((n, 1)), dtype=torch.bool) for name in _DONE_KEYS}
         self.full_done_spec = Composite(done, shape=(n,)).to(self.device)
 
-    def _pixel_spec(self) -> Bounded:
-        camera = self.worlds.camera
-        shape = torch.Size((self.batch_size[0], camera.height, camera.width, 3))
-        return Bounded(0, 255, shape, dtype=torch.uint8, device=self.device)
+    def _pixel_spec(self) -> TensorSpec:
+        example = self.observer.example()
+        shape = torch.Size((self.batch_size[0], *example.shape[1:]))
+        if example.dtype == torch.uint8:
+            return Bounded(0, 255, shape, dtype=torch.uint8, device=self.device)
+        return Unbounded(shape, dtype=example.dtype, device=self.device)
 
     def _set_seed(self, seed: int | None) -> None:
         if seed is None:
@@ -202,16 +227,17 @@ class DroneEnv(EnvBase):
         mask = None if tensordict is None else tensordict.get("_reset", None)
         env_ids = self._indices(mask)
         self.start(env_ids)
-        self._render(env_ids)
+        self._render(env_ids, True)
         running = torch.zeros(*self.batch_size, 1, dtype=torch.bool, device=self.device)
         return self._observe({name: running.clone() for name in _DONE_KEYS})
 
-    def start(self, env_ids: Tensor | None = None) -> None:
-        """Start episodes without rendering, by default all. Indices: (k,)."""
+    def start(self, env_ids: Tensor | None = None) -> State:
+        """Start episodes, by default all, without rendering; return their states. Indices: (k,)."""
         env_ids = self._indices(None) if env_ids is None else env_ids
         random_states = [self._random_states[i] for i in env_ids.tolist()]
         self.appearances.reset(env_ids, random_states)
         self.worlds.reset(env_ids, random_states)
+        return self.worlds.state[env_ids]
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         env_ids = self._indices(tensordict.get("_step", None))
@@ -227,11 +253,22 @@ class DroneEnv(EnvBase):
         taken = action[env_ids]
         self._check_range(taken)
         reward[env_ids, 0] = self.worlds.step(env_ids, taken).float()
-        self._render(env_ids)
-        terminated, truncated = (flag[:, None] for flag in self.worlds.ends())
-        done = terminated | truncated
-        flags = {"done": done, "terminated": terminated, "truncated": truncated}
-        return self._observe({"reward": reward, **flags})
+        self._render(env_ids, False)
+        return self._observe({"reward": reward, **self.flags(self.worlds.state.end_reason)})
+
+    def flags(self, end_reason: Tensor) -> dict[str, Tensor]:
+        """Return "done", "terminated" and "truncated" of states. Shapes: (k,) to (k, 1)."""
+        terminated, truncated = (flag[:, None] for flag in self.worlds.ends(end_reason))
+        return {"done": terminated | truncated, "terminated": terminated, "truncated": truncated}
+
+    def outcome(self, end_reason: Tensor, reward: Tensor) -> Entries:
+        """Return the ("next", ...) entries of any step: reward, flags, and "end_reason" of "info".
+
+        Shapes: (k,) to (k, 1).
+        """
+        entries: Entries = {("next", name): flag for name, flag in self.flags(end_reason).items()}
+        reason = {("next", "info", "end_reason"): end_reason[:, None]}
+        return {("next", "reward"): reward.float()[:, None], **entries, **reason}
 
     def _check_range(self, action: Tensor) -> None:
         """Raise an `InputError` for indices of actions that there are not."""
@@ -247,17 +284,14 @@ class DroneEnv(EnvBase):
                 "env.action_spec"
             )
 
-    def _render(self, env_ids: Tensor) -> None:
-        if not self.pixels:
+    def _render(self, env_ids: Tensor, starts: bool | None) -> None:
+        if not self.pixels or not len(env_ids):
             return
         is_whole = len(env_ids) == len(self._pixels)
         state = self.worlds.state if is_whole else self.worlds.state[env_ids]
-        pixels = self.worlds.render(state, appearance=self.appearances.current(env_ids))
-        if is_whole:
-            self._pixels = pixels
-        else:
-            self._pixels = self._pixels.clone()
-            self._pixels[env_ids] = pixels
+        look = self.appearances.current(env_ids)
+        pixels = self.observer.observe(state, env_ids, starts, look)["pixels"]
+        self._pixels = pixels if is_whole else self._pixels.index_copy(0, env_ids, pixels)
 
     def _observe(self, entries: dict[str, Tensor]) -> TensorDict:
         pixels = {"pixels": self._pixels} if self.pixels else {}
@@ -273,9 +307,33 @@ class DroneEnv(EnvBase):
 _DONE_KEYS = ("done", "terminated", "truncated")
 
 
-def base_env(env: EnvBase) -> Any:
-    """Return the environment below all transforms."""
-    return getattr(env, "base_env", env)
+def base_env(env: EnvBase) -> DroneEnv:
+    """Return the `DroneEnv` below TorchRL's transforms.
+
+    Raises:
+        InputError: There is none, or a transform of TorchRL changes its images.
+    """
+    base: Any = env.base_env if isinstance(env, TransformedEnv) else env
+    if not isinstance(base, DroneEnv):
+        raise InputError(f"env is a {type(base).__name__}; give drone_rl.make_env(...)")
+    transforms: Any = env.transform if isinstance(env, TransformedEnv) else ()
+    if changing := [type(t).__name__ for t in _parts(transforms) if is_of_pixels(t)]:
+        raise InputError(
+            f"env has {changing[0]} in a TransformedEnv; give transforms of images to "
+            "make_env(transforms=...) or DroneEnv(transforms=...)"
+        )
+    return base
+
+
+def with_others(env: DroneEnv, transforms: Iterable[Transform]) -> EnvBase:
+    """Wrap an environment with the transforms that do not change images, if there are any."""
+    others = [transform for transform in transforms if not is_of_pixels(transform)]
+    # TorchRL annotates the star of its arguments as a list
+    return TransformedEnv(env, Compose(*others)) if others else env  # pyright: ignore[reportArgumentType]
+
+
+def _parts(transforms: Any) -> Iterable[Transform]:
+    return transforms if isinstance(transforms, Compose | tuple) else (transforms,)
 
 
 def worlds_of(env: EnvBase) -> Worlds:

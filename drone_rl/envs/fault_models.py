@@ -92,6 +92,20 @@ def late_frames(frames: int) -> FaultModel:
     )
 
 
+def stacked_frames(count: int, padding: str = "same", value: float = 0.0) -> FaultModel:
+    """Show the newest frames as channels, oldest first; TorchRL's `CatFrames`."""
+
+    def begin(images: Tensor, _: Sample) -> Tensor:
+        before = images if padding == "same" else torch.full_like(images, value)
+        return torch.stack([*[before] * (count - 1), images], 1)
+
+    return FaultModel(
+        lambda images, memory, _: memory.flatten(1, 2),
+        begin,
+        lambda memory, images, _: torch.cat([memory[:, 1:], images[:, None]], 1),
+    )
+
+
 def random_shift(down: int, across: int) -> FaultModel:
     """Shift the images of an episode by up to so many pixels down or up, and sideways."""
 

@@ -1,6 +1,6 @@
 """Image transforms from camera frames to network inputs; they need no torchvision."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 
 import torch
 from tensordict import TensorDictBase
@@ -8,7 +8,7 @@ from tensordict.utils import NestedKey
 from torch import Tensor
 from torch.nn import functional
 from torchrl.data import TensorSpec, Unbounded
-from torchrl.envs import CatFrames, Compose, EnvBase, Transform, TransformedEnv
+from torchrl.envs import CatFrames, Transform
 from torchrl.envs.transforms import ObservationTransform
 
 from drone_rl.config import transforms as settings
@@ -36,11 +36,6 @@ class PixelTransform(ObservationTransform):
 
     def __repr__(self) -> str:
         return call_text(self, self.values) if self.values else super().__repr__()
-
-    @property
-    def is_in_place(self) -> bool:
-        """Whether it reads and writes "pixels"."""
-        return list(self.in_keys) == list(self.out_keys) == ["pixels"]
 
     def _reset(
         self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase
@@ -173,47 +168,18 @@ def _check_bytes(transform: PixelTransform, obs: Tensor) -> None:
         )
 
 
-def with_transforms(env: EnvBase, transforms: Sequence[Transform] = ()) -> TransformedEnv:
-    """Wrap an environment with transforms, in the order in which they are applied."""
-    # TorchRL annotates the star of its arguments as a list
-    return TransformedEnv(env, Compose(*transforms))  # pyright: ignore[reportArgumentType]
-
-
-def pixel_transforms(transforms: Iterable[Transform]) -> list[Transform]:
-    """Return the transforms that read "pixels"."""
-    return [transform for transform in transforms if "pixels" in (transform.in_keys or [])]
-
-
-def on_pixels(transforms: Iterable[Transform]) -> Callable[[Tensor], Tensor]:
-    """Return a function that applies transforms of "pixels" to images without an environment."""
-    of_images = pixel_transforms(transforms)
-    return lambda images: apply_to_frames(of_images, [images])
+def is_of_pixels(transform: Transform) -> bool:
+    """Return whether a transform changes images; others, such as `RewardSum`, need TorchRL."""
+    return "pixels" in (transform.in_keys or [])
 
 
 def without_identities(transforms: Iterable[Transform], images: Tensor) -> list[Transform]:
     """Leave out each resize to the size that images already have; `images` are an example."""
     kept: list[Transform] = []
     for transform in transforms:
-        before, images = images, transform._apply_transform(images)
+        before = images
+        if not isinstance(transform, CatFrames):
+            images = transform._apply_transform(images)
         if type(transform) is not Resize or images.shape != before.shape:
             kept.append(transform)
     return kept
-
-
-def memory_of(transforms: Iterable[Transform]) -> int:
-    """Return the number of previous frames in an observation (frame stacking), else 0."""
-    return sum(t.N - 1 for t in transforms if isinstance(t, CatFrames))
-
-
-def apply_to_frames(transforms: Iterable[Transform], frames: Sequence[Tensor]) -> Tensor:
-    """Apply transforms to the last of consecutive images; stacks pad as at an episode's start."""
-    for transform in transforms:
-        if isinstance(transform, CatFrames):
-            is_same, value = transform.padding == "same", transform.padding_value
-            missing = frames[0] if is_same else torch.full_like(frames[0], value)
-            padded = [missing] * (transform.N - 1) + [*frames]
-            windows = (padded[i : i + transform.N] for i in range(len(frames)))
-            frames = [torch.cat(window, dim=transform.dim) for window in windows]
-        else:
-            frames = [transform._apply_transform(pixels) for pixels in frames]
-    return frames[-1]

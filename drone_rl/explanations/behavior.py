@@ -49,6 +49,7 @@ def dataset_section(context: Context) -> Dataset:
         action_shares=(counts / counts.sum()).tolist(),
         entropy=mean_interval(entropy.clip(0.0, 1.0), data.episode),
         goals_reached=int((flights.event > 0).sum()),
+        remembers=context.remembers,
     )
 
 

@@ -27,7 +27,6 @@ from drone_rl.explanations.settings import (
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
-from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.sim.vocabulary import ShownActions, shown_actions
 from drone_rl.trust.plots import images
 from drone_rl.utils.display import TableResult
@@ -167,7 +166,6 @@ def class_models(
     settings, seed = with_seed(from_arguments(ClassModelsSettings, settings, changes, class_models))
     subject = as_policy(policy, outputs, task=task)
     network = subject.make_network()
-    require_memoryless(network, "a class model")
     if not network.is_differentiable:
         raise InputError(NO_GRADIENTS)
     with subject.flying(min(settings.episodes, _BATCH), seed=seed.value) as (env, actor):

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 from tensordict.nn import TensorDictModuleBase
-from torchrl.envs import TransformedEnv
+from torchrl.envs import EnvBase
 
+from drone_rl.envs import base_env
 from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.hooks import feature_layer, features
 from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frames, select_frames
@@ -37,7 +38,7 @@ class Context:
 
     def __init__(
         self,
-        env: TransformedEnv,
+        env: EnvBase,
         network: ImageNetwork,
         settings: ExplainSettings,
         claim: CertificateClaim | None = None,
@@ -47,6 +48,9 @@ class Context:
     ) -> None:
         """See `explain`; raise InputError if a setting does not fit the policy."""
         self.env, self.network, self.claim = env, network, claim
+        self.remembers = network.is_recurrent
+        """Whether the policy remembers earlier frames in rollouts; of single frames, each counts as
+        the first of an episode."""
         self.settings, self.seed = with_seed(settings, seed)
         self.measured, self.unlike = measured, unlike
         self.scenes = Scenes(env)
@@ -57,11 +61,11 @@ class Context:
         self.explainer = Explainer(network, self.absent, settings.grad_cam_layer)
         if self.layer is not None:
             features(network, self.absent[None], self.layer)  # refuse an unknown layer now
-        self._start = env.base_env.state_dict()
+        self._start = base_env(env).state_dict()
 
     def restart(self) -> TensorDictModuleBase:
         """Return the environments to their first episodes; return an actor with a fresh stream."""
-        self.env.base_env.load_state_dict(self._start)
+        base_env(self.env).load_state_dict(self._start)
         generator = torch_generator(self.seed.value, Stream.REPORT, device=str(self.env.device))
         return make_actor(self.network, self.env.action_spec, generator)
 

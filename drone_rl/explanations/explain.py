@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Unpack
 
-from torchrl.envs import TransformedEnv
+from torchrl.envs import EnvBase
 
 from drone_rl.config.configuration import from_arguments
 from drone_rl.explanations import attribution, behavior, class_models, embedding, response, truth
@@ -20,7 +20,6 @@ from drone_rl.policies import ImageNetwork
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
-from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.sim.vocabulary import shown_actions
 from drone_rl.trust.coverage import find_domain
 from drone_rl.trust.recorded import record_verdict
@@ -140,8 +139,6 @@ def explain(
                 seed=seed,
             )
 
-    for one in by_name.values():  # refused before any analysis
-        require_memoryless(one.make_network(), "explain")
     with torch_threads(1):  # same results for any number of cores; more would gain nothing
         explained = {name: explain_one(one, folders[name]) for name, one in by_name.items()}
     for name, one in by_name.items():
@@ -167,7 +164,7 @@ def _named(policies: Given | Sequence[Given], outputs: str | Path) -> dict[str, 
 
 
 def explain_policy(
-    env: TransformedEnv,
+    env: EnvBase,
     network: ImageNetwork,
     folder: Path,
     settings: ExplainSettings,

@@ -9,16 +9,16 @@ import logging
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import torch
-from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
-from torchrl.envs import TransformedEnv
+from torchrl.envs import EnvBase
 
 from drone_rl.config import RendererName
-from drone_rl.envs import DroneEnv
+from drone_rl.envs import base_env
+from drone_rl.envs.rollout import Act, StepContext
 from drone_rl.explanations.attribution import first_heat, shown_methods
 from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.scenes import Scenes
@@ -91,7 +91,7 @@ def record(
 
 
 def record_episode(
-    env: TransformedEnv,
+    env: EnvBase,
     actor: TensorDictModuleBase,
     network: ImageNetwork,
     log: "EpisodeLog",
@@ -99,10 +99,10 @@ def record_episode(
     greedy: bool = True,
 ) -> None:
     """Run one episode in a single environment and log it."""
-    for state, acted in run_episode(env, actor, greedy=greedy):
-        log.state(state)
-        if acted is not None:
-            log.action(acted)
+    for context, act, reward in run_episode(env, actor, greedy=greedy):
+        log.state(context, reward)
+        if act is not None:
+            log.action(act)
     log.observations(network)
 
 
@@ -151,11 +151,11 @@ def _layout(rerun: Any, timestep: float) -> Any:
 class EpisodeLog:
     """Logs one episode of a single environment to a stream of Rerun."""
 
-    def __init__(self, rerun: Any, stream: Any, env: TransformedEnv) -> None:
+    def __init__(self, rerun: Any, stream: Any, env: EnvBase) -> None:
         """Log what does not change: classes, axes, the drone's size, names of the actions."""
         self._rr, self._log = rerun, stream.log
         self._set_time = stream.set_time
-        self._base = cast(DroneEnv, env.base_env)
+        self._base = base_env(env)
         self._worlds, self._scenes = self._base.worlds, Scenes(env)
         self._actions = self._worlds.dynamics.actions
         self._timestep = seconds_per_step(self._worlds.dynamics)
@@ -175,26 +175,25 @@ class EpisodeLog:
         self._log("world/drone", drone, static=True)
         self._log("action/probabilities", lines, static=True)
 
-    def state(self, state: TensorDictBase) -> None:
-        """Log the environment as it is now, and the reward of the action before."""
+    def state(self, context: StepContext, reward: float) -> None:
+        """Log the environment as it is now, and the reward of the action before, if any."""
+        self._return += reward
         self._set_step(len(self._path))
         self._log_images()
         self._log_poses()
-        self._observed.append(state["pixels"][0].cpu())
-        reward = state.get("reward", None)
-        if reward is not None:
-            self._return += float(reward[0])
-            self._log("reward/step", self._rr.Scalars(float(reward[0])))
+        self._observed.append(context.observe()[0].cpu())
+        if len(self._path) > 1:
+            self._log("reward/step", self._rr.Scalars(reward))
         self._log("reward/return", self._rr.Scalars(self._return))
-        end = self._worlds.task.ends(int(state["info", "end_reason"][0]))
+        end = self._worlds.task.ends(int(context.state.end_reason[0]))
         if end:
             self._log("end", self._rr.TextLog(f"end: {end.name.lower()}"))
 
-    def action(self, acted: TensorDictBase) -> None:
+    def action(self, act: Act) -> None:
         """Log the action that the policy takes now, and the probabilities of all."""
-        part = int(self._actions.part(acted["action"][0]))
+        part = int(self._actions.part(act.action[0]))
         self._parts.append(part)
-        probs = probabilities(acted, self._actions).cpu().numpy()
+        probs = probabilities(act, self._actions).cpu().numpy()
         self._log("action/probabilities", self._rr.Scalars(probs))
         self._log("action/taken", self._rr.TextLog(self._actions.names[part]))
 

@@ -39,6 +39,9 @@ class Dataset(Model):
     entropy: Mean
     """Of the policy, relative to the uniform one's."""
     goals_reached: int
+    remembers: bool = False
+    """Whether the policy remembers earlier frames in rollouts; of single frames, each counts as the
+    first of an episode."""
 
 
 class Faithfulness(Model):

@@ -16,19 +16,20 @@ from numpy.typing import NDArray
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
-from torchrl.envs import TransformedEnv
+from torchrl.envs import EnvBase
 
-from drone_rl.collectors import EpisodeCollector
+from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.envs import worlds_of
-from drone_rl.explanations.hooks import features, outputs, probabilities
+from drone_rl.envs.rollout import ActorAgent, Recording, Step, steps
+from drone_rl.explanations.hooks import features, probabilities
 from drone_rl.explanations.scenes import Region, Scenes
-from drone_rl.policies import ImageNetwork
-from drone_rl.policies.actor import exploring
+from drone_rl.policies import ImageNetwork, RecurrentNetwork
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.dynamics.state import heading_of
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import State, Task
+from drone_rl.trust.agents import PolicyAgent
 
 RENDERED = {
     "observations": "input of the policy's network, float32 (T, C, h, w)",
@@ -112,7 +113,7 @@ class RolloutDataset:
 
 
 def collect(
-    env: TransformedEnv,
+    env: EnvBase,
     actor: TensorDictModuleBase,
     *,
     num_episodes: int,
@@ -124,19 +125,23 @@ def collect(
     Only observations are rendered. `meta` is the origin of the policy.
     """
     worlds = worlds_of(env)
-    after = [("next", "info", name) for name in worlds.task.entries]
-    reader = _WithTruth(actor, (*worlds.task.entries, *_POSE))
-    collector = EpisodeCollector(env, reader, next_keys=after)
-    batches = []
-    with exploring(greedy=False):
-        while collector.episodes < num_episodes or collector.frames < num_frames:
-            missing = num_episodes - collector.episodes
-            batches.append(collector.collect(missing if missing > 0 else None))
+    agent = Recording(ActorAgent(actor), (*worlds.task.entries, *_POSE))
+    episodes = rollout(
+        agent,
+        env,
+        num_episodes,
+        frames=num_frames,
+        greedy=False,
+        exact=True,
+        keep=None,
+        info=worlds.task.entries,
+    )
+    assert episodes.steps is not None
     fields = step_fields(worlds.task, worlds.dynamics.actions)
     described = {**fields, "observations": RENDERED["observations"]}
     about = {"greedy": False, **(meta or {}), "fields": described}
-    batch = cast(TensorDictBase, torch.cat(batches))
-    return RolloutDataset(_arrays(batch, worlds.task, worlds.dynamics.actions), {}, about)
+    arrays = _arrays(episodes.steps, worlds.task, worlds.dynamics.actions)
+    return RolloutDataset(arrays, {}, about)
 
 
 def select_frames(episode: NDArray, num_frames: int) -> NDArray:
@@ -183,21 +188,6 @@ def render_frames(
     return dataset
 
 
-class _WithTruth(TensorDictModuleBase):
-    """An actor that also reads entries of "info", so that the collector keeps them."""
-
-    def __init__(self, actor: TensorDictModuleBase, names: tuple[str, ...]) -> None:
-        super().__init__()
-        self.actor = actor
-        keys = [*actor.in_keys, *(("info", name) for name in names)]
-        self.in_keys = keys
-        self.out_keys = actor.out_keys  # pyright: ignore[reportAttributeAccessIssue]
-
-    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Write an action."""
-        return self.actor(tensordict)
-
-
 def _arrays(batch: TensorDictBase, task: Task[Any], actions: Actions) -> dict[str, NDArray]:
     info = cast(Mapping[str, Tensor], batch["info"])
     episode = cast(Tensor, batch["collector", "traj_ids"])
@@ -227,43 +217,22 @@ def _events(task: Task[Any], before: Mapping[str, Tensor], after: Mapping[str, T
     return torch.where(is_reached, 1, -(missed > 0).long()).to(torch.int8)
 
 
-@dataclasses.dataclass(frozen=True)
-class Step:
-    """One step of the active environments of a `rollout`; n of them."""
-
-    rows: Tensor  # indices of the active environments. Shape: (n,).
-    before: State
-    after: State
-    reward: Tensor  # shape: (n,)
-
-
-@torch.no_grad()
-def rollout(
+def run_from(
     scenes: Scenes,
     network: ImageNetwork,
     state: State,
-    stays_active: Callable[[Step], Tensor],
+    goes_on: Callable[[Step], Tensor],
     appearance: Appearance | None = None,
 ) -> State:
-    """Step all environments with the policy's most probable actions until none is active.
+    """Step all environments with the policy's most probable actions until none goes on.
 
-    At the initial states, a policy that stacks frames has seen only the first one. `stays_active`
-    returns which environments stay active after a step, (n,) bool, and may change the states after
-    the step. The appearance is the task's by default.
+    At the initial states, a policy that remembers frames has seen only the first one. For `goes_on`
+    see `steps`. The appearance is the task's by default. Return the last states.
     """
-    device = state.body.position.device
-    rows = torch.arange(len(state), device=device)
-    ends, now, earlier = state[rows], state, []
-    while len(rows):
-        frames = scenes.frames(now, appearance)
-        observations = scenes.transform(frames, earlier)
-        action = scenes.actions.greedy(outputs(network, observations)).to(device)
-        before, (now, reward) = now, scenes.worlds.advance(now, action)
-        active = stays_active(Step(rows, before, now, reward))
-        ends[rows] = now
-        earlier = [*earlier, frames][-scenes.memory :] if scenes.memory else []
-        earlier = [one[active] for one in earlier]
-        now, rows = now[active], rows[active]
+    ends = state[torch.arange(len(state), device=state.end_reason.device)]
+    agent, observer = PolicyAgent(network), scenes.observer(appearance)
+    for step in steps(agent, observer, state, goes_on=goes_on):
+        ends[step.rows] = step.after
     return ends
 
 
@@ -277,18 +246,18 @@ def run_to_end(scenes: Scenes, network: ImageNetwork, state: State) -> State:
     previous: Tensor | None = None
     is_new = torch.ones(len(state), dtype=torch.bool, device=state.body.position.device)
 
-    def stays_active(step: Step) -> Tensor:
+    def goes_on(step: Step) -> Tensor:
         nonlocal previous, is_new
         after = step.after
-        if previous is not None and not scenes.memory:
+        if previous is not None and not (scenes.memory or isinstance(network, RecurrentNetwork)):
             is_back = ((_pose(after) - previous).abs() < _SAME).all(-1)
             after.end_reason[is_back & ~is_new] = task.truncation
         active = (after.end_reason == 0) & ~task.next_offset(after)[:, 0].isnan()
         is_new = (step.reward != 0)[active]  # with one target less, the scene is a new one
-        previous = _pose(step.before)[active]
+        previous = _pose(step.context.state)[active]
         return active
 
-    return rollout(scenes, network, state, stays_active)
+    return run_from(scenes, network, state, goes_on)
 
 
 def _pose(state: State) -> Tensor:

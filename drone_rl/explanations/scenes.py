@@ -1,15 +1,22 @@
 """Render any state as the policy observes it, and label the region of each pixel."""
 
 import enum
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import torch
 from torch import Tensor
 from torch.nn import functional
-from torchrl.envs import CatFrames, Transform, TransformedEnv
+from torchrl.envs import CatFrames, EnvBase
 
-from drone_rl.envs import CameraFault, ChromaticityPixels, CropRows, RgbPixels, base_env, worlds_of
-from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transforms
+from drone_rl.envs import (
+    CameraFault,
+    ChromaticityPixels,
+    CropRows,
+    Observer,
+    Pipeline,
+    RgbPixels,
+    base_env,
+)
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import State
@@ -39,19 +46,19 @@ class Scenes:
     Where the transforms stack frames, a single frame is padded as at the start of an episode.
     """
 
-    def __init__(self, env: TransformedEnv) -> None:
-        self.worlds = worlds_of(env)
+    def __init__(self, env: EnvBase) -> None:
+        base = base_env(env)
+        self.worlds, self._transforms = base.worlds, base.observer.transforms
         self.task = self.worlds.task
         self.actions = self.worlds.dynamics.actions
-        pipeline: Iterable[Transform] = env.transform  # type: ignore[assignment]
-        self._transforms = pixel_transforms(pipeline)
         kinds = {type(transform) for transform in self._transforms}
         colors = {ChromaticityPixels: "chromaticity", RgbPixels: "rgb"}
         self.channels: str = next((name for kind, name in colors.items() if kind in kinds), "gray")
         """Channels of an observation: "gray", "rgb", or "chromaticity" (of red and blue)."""
-        self.memory: int = memory_of(self._transforms)  # number of earlier frames in observations
+        self.memory: int = Pipeline(self._transforms).earlier
+        """Number of earlier frames in observations."""
         is_faulty = any(isinstance(one, CameraFault) for one in self._transforms)
-        self.is_ambiguous: bool = is_faulty or base_env(env).appearances.varies
+        self.is_ambiguous: bool = is_faulty or base.appearances.varies
         """Whether a state has several observations: camera faults, appearances with ranges."""
 
     def frames(self, state: State, appearance: Appearance | None = None) -> Tensor:
@@ -71,7 +78,11 @@ class Scenes:
 
         `earlier` has frames of earlier steps, oldest first; missing ones are those of a start.
         """
-        return apply_to_frames(self._transforms, [*earlier, frames])
+        return Pipeline(self._transforms).of_frames([*earlier, frames])
+
+    def observer(self, appearance: Appearance | None = None) -> Observer:
+        """Return what observes rollouts in one appearance, without camera faults."""
+        return Observer(self.worlds, self._transforms, appearance=lambda rows: appearance)
 
     def to_frame(self, maps: Tensor) -> Tensor:
         """Transform heat maps back to the coordinates of the camera's frame.

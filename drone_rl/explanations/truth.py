@@ -12,7 +12,7 @@ from drone_rl.explanations.context import Context
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.patches import sample_frames
 from drone_rl.explanations.results import Outcomes, Truth
-from drone_rl.explanations.rollouts import Step, rollout
+from drone_rl.explanations.rollouts import Step, run_from
 from drone_rl.explanations.scenes import DARK_GROUND, Region, Scenes
 from drone_rl.policies import ImageNetwork
 from drone_rl.sim.rendering import Appearance
@@ -166,12 +166,12 @@ def run_to_target(
     target: Tensor,
     appearance: Appearance | None = None,
 ) -> TargetRollouts:
-    """Step until one target (N,) of each environment is reached or passed; see `rollout`."""
+    """Step until one target (N,) of each environment is reached or passed; see `run_from`."""
     task = scenes.task
     decided = torch.zeros_like(target)
     lateral = [state.body.position[:, 1].clone()]
 
-    def stays_active(step: Step) -> Tensor:
+    def goes_on(step: Step) -> Tensor:
         after, goal = step.after, target[step.rows]
         decided[step.rows] += 1
         lateral.append(lateral[-1].clone())
@@ -179,7 +179,7 @@ def run_to_target(
         is_over = task.is_behind(after, goal) | task.is_reached(after, goal)
         return ~is_over & (after.end_reason == 0) & (len(lateral) <= PATIENCE)
 
-    end = rollout(scenes, network, state, stays_active, appearance)
+    end = run_from(scenes, network, state, goes_on, appearance)
     return TargetRollouts(
         task.is_reached(end, target).cpu().numpy(),
         decided.cpu().numpy(),

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torchrl.envs.utils import step_mdp
 
 from drone_rl.collectors.complete_episodes import CompleteEpisodes
-from drone_rl.envs import worlds_of
+from drone_rl.envs import base_env
+from drone_rl.envs.rollout import ActorAgent, StepContext, steps
 from drone_rl.flight.betaflight.build import find_firmware
 from drone_rl.flight.betaflight.sitl import Betaflight, betaflight_drone
 from drone_rl.flight.in_the_loop.drone import FlightControllerError, NotReadyError
@@ -158,26 +158,24 @@ def _fly(
         env, actor = stack.enter_context(
             policy.flying(1, seed=seed, first_world=world, dynamics=dynamics)
         )
-        seen, worlds = env.reset(), worlds_of(env)
-        actor(seen.clone())  # once before the firmware waits for it
-        dynamics.begin(worlds.state.body)
+        base = base_env(env)
+        state, worlds = base.start(), base.worlds
+        first = StepContext(base.observer, state, torch.tensor([0]), torch.tensor([True]))
+        ActorAgent(actor).act(first)  # once before the firmware waits for it
+        dynamics.begin(state.body)
         start, path = drone.time, [drone.body.position[0].tolist()]
-        while True:
-            after = env.step(actor(seen))
+        for step in steps(ActorAgent(actor), base.observer, state):
+            state = step.after
             path.append(drone.body.position[0].tolist())
-            if bool(after["next", "done"]):
-                break
-            seen = step_mdp(after)
-        names, steps = (*worlds.task.scored, "end_reason"), len(path) - 1
-        info = {name: after["next", "info", name] for name in names}
-        ended = CompleteEpisodes.ended(worlds.task, info, torch.tensor([steps]))
+        count = len(path) - 1
+        ended = CompleteEpisodes.ended(worlds.task, worlds.info(state), torch.tensor([count]))
         reached = ended.goals.reached[0]
         return ended, SitlEpisode(
             world=world,
             goals=int(reached.sum()),
             success=bool(ended.success[0]),
             end=worlds.task.ends(int(ended.end_reason[0])).name.lower(),
-            steps=steps,
+            steps=count,
             simulated_s=drone.time - start,
             wall_s=time.monotonic() - began,
             missed=drone.controller.missed if isinstance(drone.controller, Betaflight) else 0,

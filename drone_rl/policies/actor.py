@@ -18,6 +18,7 @@ from torchrl.data import TensorSpec
 from torchrl.envs.utils import ExplorationType, exploration_type
 from torchrl.modules import ProbabilisticActor
 
+from drone_rl.envs.rollout import Act, Agent, StepContext
 from drone_rl.policies.networks import ImageNetwork
 from drone_rl.policies.recurrent import WHOLE_EPISODES
 from drone_rl.sim.continuous_actions import normal_of
@@ -49,6 +50,18 @@ def exploring(*, greedy: bool) -> AbstractContextManager[None]:
 def current_exploration() -> ExplorationType | None:
     """Return how actors choose actions: by `exploring`, else by `set_exploration_type`."""
     return _EXPLORATION.get() or exploration_type()
+
+
+class Exploring:
+    """An agent that takes the most probable action, or samples, whatever its caller does."""
+
+    def __init__(self, agent: Agent, *, greedy: bool) -> None:
+        self._agent, self._greedy = agent, greedy
+
+    def act(self, context: StepContext) -> Act:
+        """See `Agent`."""
+        with exploring(greedy=self._greedy):
+            return self._agent.act(context)
 
 
 MAX_ACTION = 1 - 1e-6

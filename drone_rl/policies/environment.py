@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any, TypedDict, Unpack
 
-from torchrl.envs import TransformedEnv
+from torchrl.envs import EnvBase
 
 from drone_rl import envs
 from drone_rl.config import (
@@ -51,7 +51,7 @@ def make_env(
     stream: Stream = Stream.WORLDS,
     device: str = "cpu",
     **options: Unpack[EnvOptions],
-) -> TransformedEnv:
+) -> EnvBase:
     """Return environments to train in, as one batched TorchRL environment.
 
     Args:
@@ -76,5 +76,8 @@ def make_env(
         dynamics.check_air()
     appearance = Maybe(Instance(AppearanceSettings)).read(options.get("appearance"), "appearance")
     others: Any = {**options, "appearance": appearance}
-    base = envs.DroneEnv(num_envs, task, camera, seed=seed, stream=stream, device=device, **others)
-    return envs.with_transforms(base, [step.make() for step in as_transforms(transforms)])
+    made = [step.make() for step in as_transforms(transforms)] if others.get("pixels", True) else ()
+    base = envs.DroneEnv(
+        num_envs, task, camera, transforms=made, seed=seed, stream=stream, device=device, **others
+    )
+    return envs.with_others(base, made)

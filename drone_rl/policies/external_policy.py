@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Unpack
 
 import torch
-from torchrl.envs import TransformedEnv
+from torchrl.envs import EnvBase
 
 from drone_rl.config import (
     COMPUTER_VISION,
@@ -105,7 +105,7 @@ class ExternalPolicy(BasePolicy):
         stream: Stream = Stream.REPORT,
         device: str = "cpu",
         **options: Unpack[EnvOptions],
-    ) -> TransformedEnv:
+    ) -> EnvBase:
         """See `BasePolicy`."""
         dynamics = options["dynamics"] = options.get("dynamics") or self.dynamics
         options.setdefault("appearance", self.appearance)

@@ -12,8 +12,7 @@ import numpy as np
 import torch
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
-from torchrl.envs import EnvBase, TransformedEnv
-from torchrl.envs import Transform as TorchrlTransform
+from torchrl.envs import EnvBase
 
 from drone_rl.config import (
     ActionSettings,
@@ -23,7 +22,7 @@ from drone_rl.config import (
 )
 from drone_rl.config.configuration import Changes
 from drone_rl.config.options import DynamicsOptions, TaskOptions
-from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transforms
+from drone_rl.envs import Pipeline
 from drone_rl.policies import ImageNetwork, RecurrentNetwork, make_actor
 from drone_rl.policies.environment import EnvOptions
 from drone_rl.policies.recurrent import Memory
@@ -126,7 +125,7 @@ class BasePolicy(abc.ABC):
         stream: Stream = Stream.REPORT,
         device: str = "cpu",
         **options: Unpack[EnvOptions],
-    ) -> TransformedEnv:
+    ) -> EnvBase:
         """Return environments like those of its training, with its camera and transforms.
 
         The default `stream` has the environments to report on, which training never sees.
@@ -166,7 +165,7 @@ class BasePolicy(abc.ABC):
         stream: Stream = Stream.REPORT,
         device: str = "cpu",
         **options: Unpack[EnvOptions],
-    ) -> Iterator[tuple[TransformedEnv, TensorDictModuleBase]]:
+    ) -> Iterator[tuple[EnvBase, TensorDictModuleBase]]:
         """Yield environments and its actor; close them afterwards. See `make_env`."""
         env = self.make_env(num_envs, seed=seed, stream=stream, device=device, **options)
         try:
@@ -190,10 +189,6 @@ class Policy(BasePolicy):
     """Task, camera, transforms and network."""
     state: dict[str, Any] = dataclasses.field(repr=False)
     """Content of its file, see `drone_rl.policies.zoo.read_policy`."""
-    _earlier_frames: list[Tensor] = dataclasses.field(
-        default_factory=list, init=False, repr=False, compare=False
-    )
-    """Images that `act_batch` remembers, oldest first."""
     _memory: list[Memory] = dataclasses.field(
         default_factory=list, init=False, repr=False, compare=False
     )
@@ -264,7 +259,7 @@ class Policy(BasePolicy):
         stream: Stream = Stream.REPORT,
         device: str = "cpu",
         **options: Unpack[EnvOptions],
-    ) -> TransformedEnv:
+    ) -> EnvBase:
         """See `BasePolicy`."""
         return self.description.build_env(
             num_envs, seed=seed, stream=stream, device=device, **options
@@ -311,33 +306,31 @@ class Policy(BasePolicy):
                 f"images of shape {tuple(images.shape)} and type {images.dtype} do not fit the "
                 f"policy's camera; give uint8 of shape (N, {camera.height}, {camera.width}, 3)"
             )
-        remembered = [*self._earlier_frames[-1:], *(memory.hidden for memory in self._memory)]
+        network, pipeline = self._network_and_pipeline
+        memories = [stage.memory for stage in pipeline.stages if stage.memory is not None]
+        remembered = [*memories, *(memory.hidden for memory in self._memory)]
         if remembered and len(remembered[0]) != len(images):
             raise InputError(
                 f"{len(images)} images follow {len(remembered[0])}; call reset() before images of "
                 "another number of drones"
             )
-        network, transforms = self._network_and_transforms
-        frames = [*self._earlier_frames, images]
-        observation = apply_to_frames(transforms, frames)
+        observation = pipeline(images, starts=not memories)
         if isinstance(network, RecurrentNetwork):
             memory = self._memory[0] if self._memory else network.start(len(images))
             outputs, memory = network.step(observation, memory)
             self._memory[:] = [memory]
         else:
             outputs = network(observation)
-        self._earlier_frames[:] = frames[-memory_of(transforms) :] if memory_of(transforms) else []
         return network.actions.greedy(outputs)
 
     def reset(self) -> None:
         """Forget the images of earlier calls of `act` and `act_batch`, before a new episode."""
-        self._earlier_frames.clear()
         self._memory.clear()
+        self._network_and_pipeline[1].forget()
 
     @functools.cached_property
-    def _network_and_transforms(self) -> tuple[ImageNetwork, list[TorchrlTransform]]:
-        made = self.description.without_faults().make_transforms()
-        return self.make_network(), pixel_transforms(made)
+    def _network_and_pipeline(self) -> tuple[ImageNetwork, Pipeline]:
+        return self.make_network(), Pipeline(self.description.without_faults().make_transforms())
 
     def _repr_html_(self) -> str:
         progress, described = self.state["progress"], self.description.as_dict()

@@ -19,11 +19,9 @@ from drone_rl.policies.networks import (
     orthogonal,
     require_finite,
 )
-from drone_rl.utils.errors import InputError
 
 HIDDEN, CELL = "recurrent_state_h", "recurrent_state_c"
 """Entries of the state, by TorchRL's names; after a step they are under "next"."""
-_REMEDY = "give another policy; verdict, evaluate, shifts, play and export support this one"
 _FEATURES, _REMEMBERED = "features", "remembered"
 
 
@@ -98,6 +96,12 @@ class RecurrentNetwork(ImageNetwork):
         """Number of outputs, see `Actions.num_outputs`."""
         return self.logits.out_features
 
+    @torch.no_grad()
+    def rescale(self, factor: Tensor, shift: Tensor) -> None:
+        """See `ImageNetwork`; the last layer changes."""
+        self.logits.weight.mul_(factor[:, None])
+        self.logits.bias.mul_(factor).add_(shift)
+
     def start(self, num_envs: int) -> Memory:
         """Return the state of environments whose episodes start."""
         size = self.logits.in_features
@@ -123,8 +127,10 @@ class RecurrentNetwork(ImageNetwork):
         is_init: Tensor | None = None,
         hidden: Tensor | None = None,
         cell: Tensor | None = None,
-    ) -> tuple[Tensor, Tensor, Tensor]:
+    ) -> Tensor | tuple[Tensor, Tensor, Tensor]:
         """Return the outputs and the states after each step.
+
+        Given frames alone, return the outputs if each is the first frame of an episode.
 
         Args:
             pixels: Frames. Shape: (N, C, H, W).
@@ -138,11 +144,10 @@ class RecurrentNetwork(ImageNetwork):
             mode the states are zero but for the last step of each episode.
 
         Raises:
-            InputError: It is given frames alone; their shape differs; or, without gradients, an
-                output is not finite.
+            InputError: Their shape differs; or, without gradients, an output is not finite.
         """
         if is_init is None or hidden is None or cell is None:
-            raise InputError(refusal(self.owner, "an analysis of single images"))
+            return self.step(pixels, self.start(len(pixels)))[0]
         check_shape(pixels, self.in_shape)
         entries = {_FEATURES: self.trunk(pixels), "is_init": is_init, HIDDEN: hidden, CELL: cell}
         after = self.lstm(TensorDict(entries, [len(pixels)], device=pixels.device))
@@ -150,17 +155,3 @@ class RecurrentNetwork(ImageNetwork):
         if not torch.is_grad_enabled():
             require_finite(logits, self.owner)
         return logits, after["next", HIDDEN], after["next", CELL]
-
-
-def refusal(owner: str, what: str, remedy: str = _REMEDY) -> str:
-    """Return the message that an analysis does not apply to a recurrent policy."""
-    return (
-        f"{owner} remembers earlier frames (network=lstm), but {what} needs actions that depend on "
-        f"the current frame only; {remedy}"
-    )
-
-
-def require_memoryless(network: ImageNetwork, what: str, remedy: str = _REMEDY) -> None:
-    """Raise an `InputError` for a recurrent network, to which `what` does not apply."""
-    if network.is_recurrent:
-        raise InputError(refusal(network.owner, what, remedy))

@@ -30,9 +30,10 @@ from torch import Tensor
 from drone_rl.config import CameraSettings
 from drone_rl.config.registry import implements
 from drone_rl.config.transforms import Frame, Rgb, Stack, Transform
+from drone_rl.envs import Pipeline
 from drone_rl.envs.gymnasium.environments import DroneWorld, DroneWorlds
 from drone_rl.envs.sb3.worlds import Sb3Worlds
-from drone_rl.envs.transforms import PixelTransform, on_pixels
+from drone_rl.envs.transforms import PixelTransform
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance, Whole
 
@@ -166,7 +167,7 @@ class Observations:
             transforms: Transforms up to the wrappers, if those of the environment are unknown.
         """
         first = transforms if self.transforms is None else self.transforms
-        pixels = on_pixels([transform.make() for transform in first or ()])(frames)
+        pixels = Pipeline([transform.make() for transform in first or ()])(frames)
         seen = [one[None] for one in _into(self._inner)(pixels.numpy())]
         for wrapper in self._wrappers:
             if isinstance(wrapper, VecFrameStack):

@@ -8,6 +8,7 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
 from drone_rl.envs import base_env
+from drone_rl.envs.rollout import ActorAgent, steps
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.policies.rounding import TOLERANCE, require_same_in_any_batch
 from drone_rl.utils.errors import InputError
@@ -60,10 +61,16 @@ def check_on_episodes(
 
 def _fly(env: Any, actor: TensorDictModuleBase) -> list[tuple[Tensor, Tensor]]:
     """Return camera frames and observations of the start of an episode, for each environment."""
-    state, frames, seen = env.reset(), [], []
-    for _ in range(_STEPS):
-        frames.append(base_env(env).last_pixels.clone())
-        seen.append(state["pixels"])
-        state = env.step(actor(state))["next"]
+    base, frames, seen = base_env(env), [], []
+    run = steps(
+        ActorAgent(actor),
+        base.observer,
+        base.start(),
+        num_steps=_STEPS,
+        goes_on=lambda step: torch.ones_like(step.context.starts),
+    )
+    for step in run:
+        frames.append(step.context.render())
+        seen.append(step.context.observe())
     pairs = zip(torch.stack(frames, 1), torch.stack(seen, 1), strict=True)
     return [*pairs]

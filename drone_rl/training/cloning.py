@@ -17,7 +17,7 @@ from torch import Tensor
 from torchrl.envs import Transform
 
 from drone_rl.config.training import TrainSettings
-from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transforms
+from drone_rl.envs import Pipeline
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.actor import distribution_of
 from drone_rl.policies.zoo import describe
@@ -77,9 +77,11 @@ class RecordedFrames(NamedTuple):
         Transforms that stack frames get the earlier frames of the same flight, and repeat its first
         one, as in an episode.
         """
-        earlier = range(memory_of(transforms), -1, -1)
-        frames = [self.images[torch.maximum(rows - by, self.starts[rows])] for by in earlier]
-        return apply_to_frames(transforms, frames)
+        pipeline = Pipeline(transforms)
+        earlier = range(pipeline.earlier, -1, -1)
+        return pipeline.of_frames(
+            [self.images[torch.maximum(rows - by, self.starts[rows])] for by in earlier]
+        )
 
 
 def imitation_loss(outputs: Tensor, actions: Tensor) -> Tensor:
@@ -121,7 +123,7 @@ class Cloner:
         """Take the network, which is trained in place."""
         self.network = network
         self.how, self.limits = settings.cloning, settings.trainer
-        self.transforms = pixel_transforms(describe(settings).without_faults().make_transforms())
+        self.transforms = describe(settings).without_faults().make_transforms()
         self.optimizer = torch.optim.Adam(network.parameters(), lr=self.how.lr)
 
     def learn(self, frames: RecordedFrames, generator: torch.Generator) -> dict[str, float]:

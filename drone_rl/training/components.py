@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import torch
-from torchrl.envs import TransformedEnv
+from torchrl.envs import EnvBase
 
 from drone_rl.config.learning import Episodes, Ray
 from drone_rl.config.training import TrainSettings
@@ -20,7 +20,7 @@ from drone_rl.utils.errors import InputError
 class EnvGroup(NamedTuple):
     """The environments of one thread or worker, with the policy."""
 
-    env: TransformedEnv
+    env: EnvBase
     actor: Any
     network: ImageNetwork
     """Shared by all groups."""
@@ -58,7 +58,7 @@ def episode_options(settings: TrainSettings, num_threads: int) -> dict[str, Any]
     """Return the arguments of `EpisodeCollector`; a fused kernel uses `num_threads`."""
     chosen = settings.collector
     fused = isinstance(chosen, Episodes) and chosen.compiled
-    return {"acceleration": "fused" if fused else "none", "num_threads": num_threads}
+    return {"compiled": fused, "num_threads": num_threads}
 
 
 def make_collector(settings: TrainSettings, replay: FailureReplayTask | None = None) -> Components:

@@ -5,10 +5,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from torch import nn
-from torchrl.envs import TransformedEnv
+from torchrl.envs import EnvBase
 
-from drone_rl.collectors.complete_episodes import run_episodes
+from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config.training import TrainSettings
+from drone_rl.envs import base_env
 from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import describe
 from drone_rl.utils.seeding import Stream
@@ -35,13 +36,12 @@ class Confirmation:
         """Return whether enough episodes succeed; each update has its own environments."""
         settings, episodes = self._settings, self._settings.trainer.confirm_episodes
         env = self._env
-        worlds: Any = env.base_env
-        worlds.first_world = update * _NUM_ENVS
+        base_env(env).first_world = update * _NUM_ENVS
         env.set_seed(settings.seed)
         actor = make_actor(self._network, env.action_spec)
         self._network.eval()  # as the policy acts once it is loaded
         try:
-            greedy = run_episodes(env, actor, episodes, is_compiled=True)
+            greedy = rollout(actor, env, episodes, compiled=True)
         finally:
             self._network.train()
         self.attempts += 1
@@ -49,7 +49,7 @@ class Confirmation:
         return self.succeeded >= settings.trainer.confirm_share * episodes - 1e-9
 
     @functools.cached_property
-    def _env(self) -> TransformedEnv:
+    def _env(self) -> EnvBase:
         settings = self._settings
         return self._description.build_env(
             min(_NUM_ENVS, settings.trainer.confirm_episodes),

@@ -17,9 +17,8 @@ from typing import Any, Self, Unpack
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from tensordict.nn import TensorDictModule
 
-from drone_rl.collectors import EpisodeCollector
+from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import (
     ActionSettings,
     BaseTaskSettings,
@@ -31,6 +30,7 @@ from drone_rl.config.configuration import from_arguments
 from drone_rl.config.options import UnseededTrainOptions
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
+from drone_rl.envs.rollout import ActorAgent, Recording
 from drone_rl.policies.baselines import oracle_policy
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import make_dynamics
@@ -323,14 +323,8 @@ def record_oracle(
         appearance=settings.appearance,
     )
     with closing(env):
-        oracle = oracle_policy(settings.task, env.worlds.dynamics.actions)
-        act: Any = oracle.module
-        watching = TensorDictModule(
-            lambda pixels, *entries: act(*entries),
-            in_keys=["pixels", *oracle.in_keys],
-            out_keys=["action"],
-        )
-        batch: Any = EpisodeCollector(env, watching).collect().cpu()  # entries are tensors
+        oracle = ActorAgent(oracle_policy(settings.task, env.worlds.dynamics.actions))
+        batch: Any = rollout(Recording(oracle), env, flights, keep=None).steps
     conditions, paths = FlightConditions.of(settings), []
     for number in range(flights):
         steps = batch[batch["collector", "traj_ids"] == number]

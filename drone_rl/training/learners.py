@@ -13,7 +13,6 @@ from torch import Tensor, nn
 from torch.nn.utils import clip_grads_with_norm_, get_total_norm
 from torchrl.objectives import A2CLoss, ClipPPOLoss
 
-from drone_rl.collectors import take_rows
 from drone_rl.config.training import TrainerSettings
 from drone_rl.objectives import Advantages, ReinforceLoss
 from drone_rl.policies import ActorCritic
@@ -377,3 +376,9 @@ def descend(
         clip_grads_with_norm_(weights.values(), max_norm, norm)
     optimizer.step()
     return float(norm)
+
+
+def take_rows(tensordict: TensorDictBase, rows: Tensor) -> TensorDictBase:
+    """Index the first dimension by rows (k,), faster than tensordict's own indexing."""
+    taken = {key: tensordict.get(key).index_select(0, rows) for key in tensordict.keys(True, True)}
+    return TensorDict(taken, [len(rows)], device=tensordict.device)

@@ -21,7 +21,6 @@ from drone_rl.config.configuration import (
 )
 from drone_rl.config.training import CloningSettings, TrainSettings
 from drone_rl.policies.policy import Policy, load_policy
-from drone_rl.policies.recurrent import refusal
 from drone_rl.policies.zoo import describe, read_checkpoint
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.tasks import Task, as_settings, as_task
@@ -179,7 +178,10 @@ class RunFolder:
                 )
         elif folder is not None:
             if describe(settings).is_recurrent:
-                raise InputError(refusal("the policy", "cloning", "set another network=..."))
+                raise InputError(
+                    "network=lstm remembers earlier frames, and cloning learns from single ones; "
+                    "set another network=..."
+                )
             demonstrations = read_demonstrations(folder, FlightConditions.of(settings))
         elif settings.cloning != CloningSettings():
             _log.warning("settings of cloning have no effect without demonstrations=FOLDER")

@@ -8,7 +8,6 @@ from torch import Tensor, nn
 from torchrl.data import Categorical
 from torchrl.modules import ProbabilisticActor
 
-from drone_rl.collectors import EpisodeCollector
 from drone_rl.envs.three_state import ThreeStateEnv
 from drone_rl.objectives import ReinforceLoss, TotalReward
 from drone_rl.policies.actor import RandomSource, SeededCategorical
@@ -81,8 +80,8 @@ class _Learner:
             distribution_kwargs={"source": source},
             default_interaction_type="random",
         )
-        env = ThreeStateEnv(episodes, horizon=horizon, seed=seed)
-        self._collector = EpisodeCollector(env, actor, next_keys=(), postproc=TotalReward())
+        self._env, self._actor = ThreeStateEnv(episodes, horizon=horizon, seed=seed), actor
+        self._returns = TotalReward()
         self._loss = ReinforceLoss(actor, reduction="episode_mean", entropy_coeff=0.0)
 
     @property
@@ -92,7 +91,10 @@ class _Learner:
 
     def accumulate_gradient(self) -> float:
         """Run a batch of episodes, set the gradient of the loss and return the sum of rewards."""
-        batch = self._collector.collect()
+        with torch.no_grad():
+            rolled = self._env.rollout(self._env.horizon, self._actor, break_when_all_done=True)
+        ended = rolled["next", "done"].cumsum(1) - rolled["next", "done"].long()
+        batch = self._returns(rolled[(ended == 0)[..., 0]])
         self.table.zero_grad()
         self._loss(batch)["loss_actor"].backward()
         return float(batch["next", "reward"].sum())

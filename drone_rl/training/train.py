@@ -162,11 +162,11 @@ def threaded_collector(
     groups = make_groups(settings, sizes, replay)
     options = components.episode_options(settings, max(1, num_cores() // len(sizes)))
     collectors = [EpisodeCollector(group.env, group.actor, **options) for group in groups]
-    _log.info("%s", collectors[0].source.name)
+    _log.info("%s", collectors[0].name)
     made = components.joined(ThreadedCollector(collectors, postproc=estimator), groups)
     if len(collectors) > 1:  # whose batches are copied
         return made
-    return made._replace(activations=getattr(collectors[0].source, "activations", None))
+    return made._replace(activations=getattr(collectors[0].fused, "activations", None))
 
 
 def make_groups(

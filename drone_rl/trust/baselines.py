@@ -4,7 +4,7 @@ from typing import Any
 
 import torch
 
-from drone_rl.collectors.complete_episodes import CompleteEpisodes, run_episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes, rollout
 from drone_rl.config import BaseTaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.policies.baselines import make_baseline
@@ -45,6 +45,6 @@ def run_baselines(
     results = {}
     for name, actor in actors.items():
         env.load_state_dict(worlds)
-        results[name] = run_episodes(env, actor, episodes)
+        results[name] = rollout(actor, env, episodes)
     env.close()
     return results

@@ -143,8 +143,8 @@ class Prober:
             key = self._evaluator.settings(condition)
         except InputError as error:
             return Probe(good=False, bad=True, refused=str(error))
-        subject, count = self._evaluator.subject, self._evaluator.episodes
-        agent = PolicyAgent(subject.network, subject.transforms, count, examines_rounding=True)
+        subject = self._evaluator.subject
+        agent = PolicyAgent(subject.network, examines_rounding=True)
         greedy = self._evaluator.run(condition, agent=agent).episodes
         if key not in self._baselines:  # of task and camera, nearly
             self._baselines[key] = self._evaluator.run_baselines(condition)

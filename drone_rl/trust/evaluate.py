@@ -8,12 +8,12 @@ from typing import Any, ClassVar, Unpack
 import pydantic
 from tensordict.nn import TensorDictModuleBase
 
-from drone_rl.collectors.complete_episodes import run_episodes
+from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import AppearanceSettings
 from drone_rl.config.commands import EvaluateSettings, HeldOutSettings
 from drone_rl.config.configuration import from_arguments
 from drone_rl.config.options import EvaluateOptions
-from drone_rl.envs import worlds_of
+from drone_rl.envs import base_env, worlds_of
 from drone_rl.policies.baselines import check_baselines
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
@@ -137,14 +137,14 @@ def evaluate(
     require_function(policy, seed=seed.value, device=settings.device, renderer=settings.renderer)
     episodes, steps = settings.episodes, 3 if settings.baselines else 2
     with held_out_environments(policy, settings, seed) as (env, actor):
-        state, flown = env.base_env.state_dict(), worlds_of(env).dynamics
+        state, flown = base_env(env).state_dict(), worlds_of(env).dynamics
         if settings.baselines:
             check_baselines(as_task(policy.task), flown.actions)
         progress("most probable actions", 0, steps)
-        greedy = run_episodes(env, actor, episodes)
-        env.base_env.load_state_dict(state)
+        greedy = rollout(actor, env, episodes)
+        base_env(env).load_state_dict(state)
         progress("sampled actions", 1, steps)
-        rollouts = {"greedy": greedy, "sampled": run_episodes(env, actor, episodes, greedy=False)}
+        rollouts = {"greedy": greedy, "sampled": rollout(actor, env, episodes, greedy=False)}
     if settings.baselines:
         progress("baselines", 2, steps)
         num_envs, device = settings.batch_size, settings.device

@@ -3,15 +3,15 @@
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import torch
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
-from torchrl.envs import TransformedEnv
+from torchrl.envs import EnvBase
 
-from drone_rl.envs import worlds_of
-from drone_rl.policies.actor import exploring
+from drone_rl.envs import base_env
+from drone_rl.envs.rollout import ActorAgent, steps
+from drone_rl.policies.actor import Exploring
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import make_onnx, open_onnx
 from drone_rl.trust.export import recorded_origin
@@ -39,10 +39,10 @@ class Agreement:
 
 @torch.no_grad()
 def agreement(
-    env: TransformedEnv,
+    env: EnvBase,
     actor: TensorDictModuleBase,
     other: Callable[..., Tensor],
-    steps: int,
+    num_steps: int,
 ) -> Agreement:
     """Run a policy with sampled actions and compare another implementation at every step.
 
@@ -50,16 +50,15 @@ def agreement(
     also which episodes start, bool (N, 1), and returns `Actions.probabilities` (N, A) on the CPU.
     Environments whose episode ends are reset.
     """
-    base: Any = env.base_env
-    actions = worlds_of(env).dynamics.actions
-    probs, others, state = [], [], env.reset()
-    with exploring(greedy=False):
-        for _ in range(steps):
-            state = actor(state)
-            probs.append(actions.probabilities(state["logits"]).cpu())
-            started = [state["is_init"].cpu()] if "is_init" in actor.in_keys else []
-            others.append(other(base.last_pixels.cpu(), *started))
-            state = env.step_and_maybe_reset(state)[1]
+    base = base_env(env)
+    actions = base.worlds.dynamics.actions
+    agent, probs, others = Exploring(ActorAgent(actor), greedy=False), [], []
+    run = steps(agent, base.observer, base.start(), num_steps=num_steps, restart=base.start)
+    for context, act, *_ in run:
+        assert act.distribution is not None
+        probs.append(actions.probabilities(act.distribution).cpu())
+        started = [context.starts[:, None].cpu()] if "is_init" in actor.in_keys else []
+        others.append(other(context.render().cpu(), *started))
     mine, its = torch.cat(probs), torch.cat(others)
     return Agreement(
         frames=len(mine),

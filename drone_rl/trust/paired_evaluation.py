@@ -1,7 +1,6 @@
 """Run a policy under conditions, from the same initial states in each of them."""
 
 import dataclasses
-import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -20,19 +19,22 @@ from drone_rl.config import (
     CameraSettings,
     DynamicsSettings,
 )
+from drone_rl.envs import Observer
+from drone_rl.envs.rollout import ActorAgent, Agent, DelayedAgent, steps
 from drone_rl.policies import ImageNetwork
+from drone_rl.policies.baselines import make_baseline
 from drone_rl.sim.dynamics import draw_seeds, make_dynamics
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.tasks import State, as_task
+from drone_rl.sim.tasks import as_task
 from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.sim.worlds import Worlds
-from drone_rl.trust.agents import Agent, BaselineAgent, PolicyAgent, StepContext
+from drone_rl.trust.agents import PolicyAgent
 from drone_rl.trust.perturbations import (
     ONSET_STEP,
     Condition,
-    FaultPipeline,
     PerturbationMode,
     clutter,
+    make_faults,
     sample_distractors,
     scene_appearance,
     task_region,
@@ -128,38 +130,68 @@ class PairedEvaluator:
 
         The perturbations of the condition are active as the mode says.
         """
-        if agent is None:
-            agent = PolicyAgent(self.subject.network, self.subject.transforms, self.episodes)
-        stages = {0: condition}
+        agent = PolicyAgent(self.subject.network) if agent is None else agent
+        delayed, observer = DelayedAgent(agent), None
+        stages: list[tuple[Condition, int | None]] = [(condition, None)]
         if mode is PerturbationMode.ONSET:
-            stages = {0: Condition(), ONSET_STEP: condition}
-        stage = _Stage(self, stages[0], mode, agent)
-        start = stage.worlds.start(self._drawn, self._seeds)
-        active = torch.arange(len(start), device=start.end_reason.device)
-        final, state = start[active], start
-        trace = torch.zeros(len(start), dtype=torch.float64, device=stage.worlds.device)
-        decided: list[Tensor] = []
-        for number in itertools.count():
-            if number and number in stages:
-                stage = _Stage(self, stages[number], mode, agent)
-            delay = stage.delay
-            due = range(number, number + delay) if decided else ()
-            pending = [decided[max(s - delay, 0)][active] for s in due]
-            action, seen = agent.act(stage.context(state, active, pending))
-            if seen is not None:
-                trace[active] += (number + 1) * seen.flatten(1).double().sum(-1)
-            decided.append(action.new_zeros(len(start), *action.shape[1:]))
-            decided[-1][active] = action
-            state, _ = stage.worlds.advance(state, decided[max(number - delay, 0)][active])
-            final[active] = state
-            is_active = state.end_reason == 0
-            if not is_active.all():
-                state, active = state[is_active], active[is_active]
-            if not len(active):
+            stages.insert(0, (Condition(), ONSET_STEP))
+        state = self.worlds(stages[0][0]).start(self._drawn, self._seeds)
+        rows = torch.arange(len(state), device=state.end_reason.device)
+        final = state[rows]
+        trace = torch.zeros(len(state), dtype=torch.float64, device=rows.device)
+        number = 0
+        for stage, num_steps in stages:
+            if not len(rows):
                 break
-        worlds = stage.worlds
+            starts = observer is None
+            observer = self._observer(stage, mode, agent, observer)
+            delayed.delay = stage.delay
+            for step in steps(delayed, observer, state, rows, starts=starts, num_steps=num_steps):
+                number += 1
+                if step.act.distribution is not None:
+                    seen = observer.images.flatten(1).double().sum(-1)
+                    trace[step.rows] += number * seen
+                final[step.rows] = step.after
+            rows = (final.end_reason == 0).nonzero()[:, 0]
+            state = final[rows]
+        assert observer is not None
+        worlds = observer.worlds
         episodes = CompleteEpisodes.ended(worlds.task, worlds.info(final), final.steps)
         return ConditionResult(episodes, trace.cpu())
+
+    def _observer(
+        self, condition: Condition, mode: PerturbationMode, agent: Agent, earlier: Observer | None
+    ) -> Observer:
+        """Return what observes the environments under a condition; memory goes on from `earlier`.
+
+        It must be asked for the appearance once at each step.
+        """
+        worlds, appearances = self.worlds(condition), self.appearances
+        generator = torch_generator(self.seed, Stream.SHIFTS)
+        varied = variations(mode, condition.dimensions, self.episodes, generator)
+        changes = (*condition.appearance_changes, *condition.mounts)
+        full = scene_appearance(worlds.scene) if condition.appearance_changes else None
+        distractors = self.distractor_places() if condition.clutter else None
+
+        def appearance(rows: Tensor) -> Appearance | None:
+            look = appearances.current(rows) if appearances.varies else appearances.middle
+            if full is not None:
+                look = full if look is None else look.over(full)
+            for part, by in zip(changes, next(varied), strict=True):
+                look = part.change(look or Appearance(), by.to(worlds.device)[rows])
+            if distractors is not None:
+                region = task_region(self.subject.task)
+                look = clutter(look, region, distractors[rows, : condition.clutter])
+            return look
+
+        hiding_only = getattr(agent, "needs_only_hiding_faults", False)
+        return Observer(
+            worlds,
+            self.subject.transforms,
+            appearance=appearance,
+            faults=make_faults(condition.faults, self.episodes, self.seed, hiding_only=hiding_only),
+            earlier=earlier,
+        )
 
     def run_baselines(self, condition: Condition) -> dict[str, CompleteEpisodes]:
         """Return the episodes of the task's random and constant baselines, by name."""
@@ -167,7 +199,8 @@ class PairedEvaluator:
         episodes = {}
         for name in worlds.task.blind_baselines:
             generator = torch_generator(self.seed, Stream.ACTIONS)
-            agent = BaselineAgent(name, worlds.dynamics.actions, generator)
+            actions = worlds.dynamics.actions
+            agent = ActorAgent(make_baseline(name, worlds.task, generator, actions))
             episodes[name] = self.run(condition, agent=agent).episodes
         return episodes
 
@@ -181,40 +214,3 @@ class PairedEvaluator:
         """Close the renderers."""
         for worlds in self._built.values():
             worlds.close()
-
-
-class _Stage:
-    """A part of an episode under one condition."""
-
-    def __init__(
-        self, evaluator: PairedEvaluator, condition: Condition, mode: PerturbationMode, agent: Agent
-    ) -> None:
-        self._evaluator, self._condition = evaluator, condition
-        self.worlds, self.delay = evaluator.worlds(condition), condition.delay
-        episodes, seed = evaluator.episodes, evaluator.seed
-        generator = torch_generator(seed, Stream.SHIFTS)
-        self._variations = variations(mode, condition.dimensions, episodes, generator)
-        self._faults = FaultPipeline(
-            condition.faults, episodes, seed, hiding_only=agent.needs_only_hiding_faults
-        )
-        self._own = None if evaluator.appearances.varies else evaluator.appearances.middle
-        self._full = scene_appearance(self.worlds.scene) if condition.appearance_changes else None
-        self._distractors = evaluator.distractor_places() if condition.clutter else None
-
-    def context(self, state: State, active: Tensor, pending: list[Tensor]) -> StepContext:
-        """Everything that the agent may use at the next step."""
-        appearances, condition = self._evaluator.appearances, self._condition
-        variation = [part.to(self.worlds.device)[active] for part in next(self._variations)]
-        appearance = appearances.current(active) if appearances.varies else self._own
-        if self._full is not None:
-            appearance = self._full if appearance is None else appearance.over(self._full)
-        for part, by in zip(
-            (*condition.appearance_changes, *condition.mounts), variation, strict=True
-        ):
-            appearance = part.change(appearance or Appearance(), by)
-        if self._distractors is not None:
-            region = task_region(self._evaluator.subject.task)
-            places = self._distractors[active, : condition.clutter]
-            appearance = clutter(appearance, region, places)
-        poses = self.worlds.poses(state, appearance)
-        return StepContext(self.worlds, state, active, poses, appearance, self._faults, pending)

@@ -13,6 +13,7 @@ from drone_rl.config import BaseTaskSettings
 from drone_rl.config.task import ObjectRegion
 from drone_rl.envs import fault_models
 from drone_rl.envs.fault_models import FaultModel, Sample
+from drone_rl.envs.observer import Pipeline, Stage
 from drone_rl.sim.rendering import Appearance, Distractors, Scene
 from drone_rl.sim.rendering.appearance import Colors, moved, turned
 from drone_rl.sim.rendering.scene import SemanticClass
@@ -255,48 +256,38 @@ def frozen_frames(rate: float) -> FaultModel:
     return dataclasses.replace(fault_models.frozen_frames(rate), begin=begin)
 
 
-class FaultPipeline:
-    """Applies faults in a batch of environments, of which fewer and fewer are active."""
+class SharedStream:
+    """Random numbers of one fault in all environments, whichever of them are running."""
 
-    def __init__(
-        self, faults: Sequence[FaultModel], num_envs: int, seed: int, *, hiding_only: bool = False
-    ) -> None:
-        """Take faults in the order in which they act; each has a random stream of its own.
+    def __init__(self, generator: torch.Generator, num_envs: int) -> None:
+        self._generator, self._num_envs = generator, num_envs
 
-        `hiding_only` leaves out those that hide nothing.
-        """
-        self._num_envs = num_envs
-        self._faults = [
-            (fault, torch_generator(seed, Stream.SHIFTS, number=1 + i))
-            for i, fault in enumerate(faults)
-            if fault.hides or not hiding_only
-        ]
-        self._memories: dict[int, Tensor] = {}
+    def __call__(self, rows: Tensor, *, begins: bool) -> Sample:
+        """See `drone_rl.envs.observer.Source`."""
 
-    def __call__(self, images: Tensor, active: Tensor, nothing: float = 0.0) -> Tensor:
-        """Return the faulty images of one step.
-
-        `images` are those of the `active` environments, from 0 to 1, shape (n, C, H, W); `nothing`
-        is the value of a pixel that shows nothing.
-        """
-        for i, (fault, generator) in enumerate(self._faults):
-            sample = self._sampler(generator, active)
-            if i not in self._memories:
-                rows = fault.begin(images, sample)
-                self._memories[i] = rows.new_zeros(self._num_envs, *rows.shape[1:])
-            else:
-                rows = fault.update(self._memories[i][active], images, sample)
-            self._memories[i][active] = rows
-            images = fault.show(images, rows, nothing)
-        return images
-
-    def _sampler(self, generator: torch.Generator, active: Tensor) -> Sample:
         def sample(*shape: int, normal: bool = False) -> Tensor:
             draw = torch.randn if normal else torch.rand
-            every = draw(self._num_envs, *shape, generator=generator)
-            return every.to(active.device)[active]
+            every = draw(self._num_envs, *shape, generator=self._generator)
+            return every.to(rows.device)[rows]
 
         return sample
+
+
+def make_faults(
+    models: Sequence[FaultModel], num_envs: int, seed: int, *, hiding_only: bool = False
+) -> Pipeline:
+    """Return faults in the order in which they act; each has a random stream of its own.
+
+    `hiding_only` leaves out those that hide nothing.
+    """
+    streams = (torch_generator(seed, Stream.SHIFTS, number=1 + i) for i in range(len(models)))
+    return Pipeline(
+        stages=[
+            Stage(model, SharedStream(stream, num_envs))
+            for model, stream in zip(models, streams, strict=True)
+            if model.hides or not hiding_only
+        ]
+    )
 
 
 def _repaint(

@@ -9,13 +9,7 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import EnvBase
 
-from drone_rl.collectors.complete_episodes import (
-    CompleteEpisodes,
-    StepLog,
-    episode_batches,
-    final_episodes,
-    run_episodes,
-)
+from drone_rl.collectors.complete_episodes import CompleteEpisodes, rollout
 from drone_rl.envs import base_env, worlds_of
 from drone_rl.policies import ImageNetwork, make_actor
 from drone_rl.policies.external_policy import ExternalPolicy
@@ -58,32 +52,29 @@ def require_function(
     if isinstance(policy, ExternalPolicy):
         options: dict[str, Any] = {"seed": seed, "device": device, "renderer": renderer}
         with policy.flying(_CHECKED_EPISODES, **options) as (env, actor):
-            state, log = base_env(env).state_dict(), StepLog()
-            greedy = run_episodes(env, actor, _CHECKED_EPISODES, log=log)
+            state = base_env(env).state_dict()
+            greedy = rollout(actor, env, _CHECKED_EPISODES)
             base_env(env).load_state_dict(state)
-            check_rounding(env, actor, COMPARED, greedy=greedy, log=log)
+            check_rounding(env, actor, COMPARED, greedy)
 
 
 def check_rounding(
     env: EnvBase,
     actor: TensorDictModuleBase,
     episodes: int,
-    *,
     greedy: CompleteEpisodes,
-    log: StepLog,
 ) -> Rounding | None:
     """Run the first episodes again, with a bound on the rounding error at every frame.
 
-    They are compared with greedy episodes and their actions, `greedy` and `log`, which started from
-    the present state of the environments. If the fused kernel ran those, PyTorch runs them again;
-    otherwise PyTorch with the frames in other batches.
+    They are compared with `greedy` episodes, which started from the present state of the
+    environments. If the fused kernel ran those, PyTorch runs them again; otherwise PyTorch with the
+    frames in other batches.
 
     Args:
         env: The environments.
         actor: The policy's actor.
         episodes: How many at most.
         greedy: Greedy episodes of the policy.
-        log: Their actions.
 
     Returns:
         None for an actor without a network that depends on single images only.
@@ -97,56 +88,35 @@ def check_rounding(
     decide, is_bound = decider(network)
     arithmetic, is_exact = arithmetic_on(worlds_of(env).device)
     episodes, state = min(episodes, len(greedy)), base_env(env).state_dict()
-    ends, again, fragile = _run_checked(env, decide, network, episodes)
-    count = episodes
-    if log.implementation == "PyTorch":
-        count = min(COMPARED, episodes)
+    checking = _CheckingActor(decide, network)
+    again = rollout(checking, env, episodes, exact=True, keep=("action", "fragile"))
+    fragile, compared = again.each("fragile"), again.implementation
+    if greedy.implementation == "PyTorch":
         mixed = make_actor(Regrouped(network, "mixed"), env.action_spec)
-        ends, again = _run_again(env, mixed, count, state)
-        again.implementation = "PyTorch, in other batches"
+        base_env(env).load_state_dict(state)
+        again = rollout(mixed, env, min(COMPARED, episodes), exact=True)
+        compared = "PyTorch, in other batches"
+    count = len(again)
     if by_action := _is_compared_by_action(env, network):
-        pairs = zip(log.actions[:count], again.actions[:count], strict=True)
+        pairs = zip(greedy.each("action")[:count], again.each("action"), strict=True)
         steps = [_first_difference(one, other) for one, other in pairs]
     else:
-        steps = [_other_outcome(greedy, ends, i) for i in range(count)]
+        steps = [_other_outcome(greedy, again, i) for i in range(count)]
     if not is_bound:
         base_env(env).load_state_dict(state)
-        _require_function_of_frames(env, network, log, fragile)
+        _require_function_of_frames(env, network, greedy.each("action"), fragile)
     return Rounding(
-        arithmetic=f"{arithmetic}, {log.implementation}",
+        arithmetic=f"{arithmetic}, {greedy.implementation}",
         bound=is_bound and by_action and is_exact,
         frames=sum(map(len, fragile)),
         fragile=int(sum(f.sum() for f in fragile)),
         episodes=len(fragile),
         fragile_episodes=sum(bool(f.any()) for f in fragile),
-        compared=again.implementation,
+        compared=compared,
         compared_episodes=count,
         differing=sum(step is not None for step in steps),
         unexplained=_count_unexplained(steps, fragile),
     )
-
-
-def _run_checked(
-    env: EnvBase, decide: Decide, network: ImageNetwork, episodes: int
-) -> tuple[CompleteEpisodes, StepLog, list[Tensor]]:
-    """Run episodes in PyTorch; return also which frames of each are fragile, (T,), bool."""
-    log, fragile, finals = StepLog(), list[Tensor](), []
-    for batch in episode_batches(
-        env, _CheckingActor(decide, network), episodes, ("fragile",), log=log
-    ):
-        lengths = [len(actions) for actions in log.actions[len(fragile) :]]
-        fragile += cast(Tensor, batch["fragile"]).cpu().split(lengths)
-        finals.append(final_episodes(env, batch))
-    return CompleteEpisodes.joined(finals), log, fragile
-
-
-def _run_again(
-    env: EnvBase, actor: TensorDictModuleBase, episodes: int, state: dict[str, Any]
-) -> tuple[CompleteEpisodes, StepLog]:
-    """Run episodes from this state of the environments."""
-    base_env(env).load_state_dict(state)
-    log = StepLog()
-    return run_episodes(env, actor, episodes, is_exact=True, log=log), log
 
 
 def _is_compared_by_action(env: EnvBase, network: ImageNetwork) -> bool:
@@ -198,17 +168,18 @@ class _CheckingActor(TensorDictModuleBase):
 
 
 def _require_function_of_frames(
-    env: EnvBase, network: ImageNetwork, log: StepLog, fragile: Sequence[Tensor]
+    env: EnvBase, network: ImageNetwork, actions: Sequence[Tensor], fragile: Sequence[Tensor]
 ) -> None:
     """Check that a third-party network depends on the frame alone, in batches of any size."""
     before, frames = base_env(env).state_dict(), torch.empty(0)
     count = min(ALONE, len(fragile))
     for groups, how in (("single", "one frame at a time"), ("mixed", "in other batches")):
         base_env(env).load_state_dict(before)
-        again, actor = StepLog(), make_actor(Regrouped(network, groups), env.action_spec)
-        for batch in episode_batches(env, actor, count, ("pixels",), log=again):
-            frames = cast(Tensor, batch["pixels"])
-        steps = map(_first_difference, log.actions, again.actions)  # until one log ends
+        actor = make_actor(Regrouped(network, groups), env.action_spec)
+        again = rollout(actor, env, count, exact=True, keep=("action", "pixels"))
+        assert again.steps is not None
+        frames = cast(Tensor, again.steps["pixels"]).to(env.device)
+        steps = map(_first_difference, actions, again.each("action"))  # until one ends
         other = _count_unexplained(steps, fragile)
         if isinstance(network.actions, DiscreteActions) and other > MAX_UNEXPLAINED * count:
             raise InputError(

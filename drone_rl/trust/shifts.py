@@ -14,12 +14,11 @@ from drone_rl.config import MINIMAL, BaseTaskSettings
 from drone_rl.config.commands import ShiftSettings
 from drone_rl.config.configuration import from_arguments
 from drone_rl.config.options import ShiftOptions
-from drone_rl.envs import worlds_of
+from drone_rl.envs import base_env, worlds_of
 from drone_rl.policies.baselines import check_baselines
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy, Policy
-from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.policies.zoo import fingerprint
 from drone_rl.sim.tasks import as_task
 from drone_rl.trust.agents import OracleAgent
@@ -97,8 +96,6 @@ def shifts(
         if (judged := as_task(subject.task)).oracle is None:
             raise InputError(f"task={judged.name} has no oracle to compare with; give domain=false")
         check_baselines(judged, subject.network.actions)
-        remedy = "give domain=false for the success rates under perturbations alone"
-        require_memoryless(subject.network, "the operating domain", remedy)
     axes = find_axes(settings.axes, subject)
     total = len(axes) * (len(settings.strengths) + settings.domain) + 1
     done = itertools.count()
@@ -174,7 +171,7 @@ def make_evaluated_policy(policy: BasePolicy, settings: ShiftSettings) -> Evalua
         )
     env: Any = policy.make_env(1, device=settings.device, renderer=settings.renderer)
     try:
-        camera, transforms = worlds_of(env).camera, [*env.transform]
+        camera, transforms = worlds_of(env).camera, base_env(env).observer.transforms
     finally:
         env.close()
     network = policy.make_network(settings.device).eval()

@@ -12,7 +12,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.trust.agents import OracleAgent, StepContext, has_oracle
+from drone_rl.envs.rollout import Act, StepContext
+from drone_rl.trust.agents import OracleAgent, has_oracle
 from drone_rl.trust.axes import TOGETHER, Axis
 from drone_rl.trust.paired_evaluation import ConditionResult, PairedEvaluator
 from drone_rl.trust.perturbations import Condition, PerturbationMode
@@ -123,22 +124,19 @@ class Suite:
 class FrameRecorder:
     """Fly straight on and record the color image of one step."""
 
-    needs_only_hiding_faults = False
-
     def __init__(self) -> None:
         self._step = 0
         self.image: Tensor | None = None
 
-    def act(self, context: StepContext) -> tuple[Tensor, Tensor | None]:
+    def act(self, context: StepContext) -> Act:
         """See `Agent`."""
         images = context.render("rgb").movedim(-1, 1).float() / 255.0
-        images = context.apply_faults(images, context.active)
+        images = context.observer.faults(images, context.rows, context.starts)
         if self._step <= STEP:  # some episodes end earlier
             self.image = (images[0] * 255).round().to(torch.uint8).movedim(0, -1)
         self._step += 1
-        actions, active = context.worlds.dynamics.actions, context.active
-        ahead = actions.always(actions.names[0])
-        return ahead.expand(len(active), *ahead.shape).to(active.device), None
+        ahead = context.actions.always(context.actions.names[0])
+        return Act(ahead.expand(len(context.rows), *ahead.shape).to(context.rows.device))
 
 
 def make_strip(evaluator: PairedEvaluator, axis: Axis) -> list[NDArray | None]:

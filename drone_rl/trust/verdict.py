@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
-from drone_rl.collectors.complete_episodes import CompleteEpisodes, StepLog, run_episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes, rollout
 from drone_rl.envs import base_env, worlds_of
 from drone_rl.policies.baselines import check_baselines
 from drone_rl.policies.policy import BasePolicy, load_policy
@@ -89,13 +89,13 @@ def judge_policy(
     baselines = run_baselines(
         env.batch_size[0], worlds.task, state, episodes, str(worlds.device), worlds.dynamics
     )
-    log, drawn = StepLog(), None
-    greedy = run_episodes(env, actor, episodes, is_compiled=True, log=log)
+    drawn = None
+    greedy = rollout(actor, env, episodes, compiled=True)
     if sampled:
         base.load_state_dict(state)
-        drawn = run_episodes(env, actor, episodes, greedy=False)
+        drawn = rollout(actor, env, episodes, greedy=False)
     base.load_state_dict(state)
-    rounding = check_rounding(env, actor, episodes, greedy=greedy, log=log)
+    rounding = check_rounding(env, actor, episodes, greedy)
     return apply_rule(
         greedy,
         baselines,

@@ -7,22 +7,20 @@ import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import imageio.v3 as iio
 import numpy as np
 import torch
 from PIL import Image, ImageDraw, ImageFont
-from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
-from torchrl.envs import TransformedEnv
+from torchrl.envs import EnvBase
 
-from drone_rl.envs import DroneEnv
-from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transforms
-from drone_rl.policies.actor import exploring
+from drone_rl.envs import DroneEnv, Observer, base_env
+from drone_rl.envs.rollout import Act, ActorAgent, StepContext, steps
+from drone_rl.policies.actor import Exploring
 from drone_rl.policies.policy import Policy
-from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.coordinates import inverse
@@ -38,7 +36,7 @@ from drone_rl.sim.entities import (
 )
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.appearance import Mounting, product, rotate
-from drone_rl.sim.tasks import Task
+from drone_rl.sim.tasks import State, Task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.trust import instruments
 from drone_rl.utils.errors import InputError
@@ -103,17 +101,17 @@ def view(
     The viewer shows the dm_control simulation; observations are rendered as in training.
 
     Raises:
-        InputError: There is no display, or the policy is recurrent.
+        InputError: There is no display.
     """
-    require_memoryless(policy.make_network(), "the viewer", "leave viewer=false to film it")
     if not has_display():
         raise InputError("viewer=true needs a display, and there is none; leave it false to film")
     import dm_env
     from dm_control import viewer
 
     env = policy.make_env(1, seed=seed, device=device, renderer=renderer)
-    base = cast(DroneEnv, env.base_env)
-    actor, worlds = policy.make_actor(env, seed=seed), base.worlds
+    base = base_env(env)
+    agent = Exploring(ActorAgent(policy.make_actor(env, seed=seed)), greedy=greedy)
+    worlds = base.worlds
     shown = make_environment(
         worlds.task,
         worlds.camera,
@@ -122,21 +120,16 @@ def view(
         random_state=legacy_seed(seed),
         appearance=base.appearances.settings,
     )
-    pipeline: Any = env.transform
-    transforms, frames = pixel_transforms(pipeline), list[Tensor]()
+    observer = Observer(
+        worlds, base.observer.transforms, appearance=lambda rows: shown.task.appearance
+    )
 
     @torch.no_grad()
     def act(timestep: dm_env.TimeStep) -> np.ndarray:
-        if timestep.first():
-            frames.clear()
-        state = shown.task.state.to(worlds.device)
-        frames.append(worlds.render(state, appearance=shown.task.appearance))
-        del frames[: -1 - memory_of(transforms)]
-        seen = TensorDict(
-            {"pixels": apply_to_frames(transforms, frames)}, [1], device=worlds.device
-        )
-        with exploring(greedy=greedy):
-            return actor(seen)["action"][0].cpu().numpy()
+        state, starts = shown.task.state.to(worlds.device), torch.tensor([timestep.first()])
+        rows = torch.zeros(1, dtype=torch.int64, device=worlds.device)
+        context = StepContext(observer, state, rows, starts.to(worlds.device))
+        return agent.act(context).action[0].cpu().numpy()
 
     with contextlib.closing(env):
         viewer.launch(shown, act, title="drone-rl play")
@@ -154,9 +147,8 @@ class StepImages(NamedTuple):
     """Instruments, if the drone has flight dynamics."""
 
 
-@torch.no_grad()
 def film_episode(
-    env: TransformedEnv, actor: TensorDictModuleBase, *, greedy: bool = True
+    env: EnvBase, actor: TensorDictModuleBase, *, greedy: bool = True
 ) -> Iterator[np.ndarray]:
     """Run one episode in a single environment and yield its video frames.
 
@@ -165,29 +157,31 @@ def film_episode(
     Yields:
         RGB frames, uint8. Shape: (720, 1280, 3).
     """
-    base, earned = cast(DroneEnv, env.base_env), 0.0
-    task, actions = base.worlds.task, base.worlds.dynamics.actions
-    for state, acted in run_episode(env, actor, greedy=greedy):
-        earned += float(state.get("reward", torch.zeros(1))[0])
-        yield _compose(render_step(base), _caption(task, state, earned), acted, actions)
+    base, earned = base_env(env), 0.0
+    for context, act, reward in run_episode(env, actor, greedy=greedy):
+        earned += reward
+        caption = _caption(base.worlds.task, context.state, earned)
+        yield _compose(render_step(base), caption, act, context.actions)
 
 
 @torch.no_grad()
 def run_episode(
-    env: TransformedEnv, actor: TensorDictModuleBase, *, greedy: bool = True
-) -> Iterator[tuple[TensorDictBase, TensorDictBase | None]]:
-    """Run one episode in a single environment; yield each state with what the actor returns for it.
+    env: EnvBase, actor: TensorDictModuleBase, *, greedy: bool = True
+) -> Iterator[tuple[StepContext, Act | None, float]]:
+    """Run one episode in a single environment; yield each step with the reward of the one before.
 
     The environment is then in that state. The last one, in which no action is taken, comes with
     None.
     """
-    state = env.reset()
-    while not bool(state["done"].all()):
-        with exploring(greedy=greedy):  # not while the caller has the state
-            acted = actor(state.clone(False))
-        yield state, acted
-        state = env.step(acted)["next"]
-    yield state, None
+    base, reward, step = base_env(env), 0.0, None
+    agent = Exploring(ActorAgent(actor), greedy=greedy)
+    for step in steps(agent, base.observer, base.start(), looks_ahead=True):
+        base.worlds.state = step.context.state
+        yield step.context, step.act, reward
+        reward = float(step.reward)
+    assert step is not None
+    base.worlds.state = step.after
+    yield step.following, None, reward
 
 
 def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:
@@ -216,8 +210,8 @@ def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:
     return files
 
 
-def _caption(task: Task[Any], state: TensorDictBase, earned: float) -> str:
-    end = task.ends(int(state["info", "end_reason"][0]))
+def _caption(task: Task[Any], state: State, earned: float) -> str:
+    end = task.ends(int(state.end_reason[0]))
     ended = "" if end == 0 else f"   ended: {end.name.lower()}"
     return f"return {earned:.3g}" + ended.replace("_", " ")
 
@@ -231,11 +225,12 @@ def render_step(base: DroneEnv) -> StepImages:
     body, dynamics, panel = worlds.state.body, worlds.dynamics, None
     if isinstance(body, FlightState) and isinstance(dynamics, Quadrotor):
         panel = instruments.panel(instruments.read(body), dynamics.settings.hover_throttle)
-    return StepImages(base.last_pixels[0], chase, strip, panel)
+    seen = worlds.render(worlds.state, appearance=look)[0]
+    return StepImages(seen, chase, strip, panel)
 
 
 def _compose(
-    seen: StepImages, caption: str, acted: TensorDictBase | None = None, actions: Actions = MOVES
+    seen: StepImages, caption: str, act: Act | None = None, actions: Actions = MOVES
 ) -> np.ndarray:
     """Chase view with the camera image as inset; below all five cameras, a caption and bars."""
     canvas = Image.new("RGB", (WIDTH, HEIGHT), _BACKGROUND)
@@ -257,28 +252,25 @@ def _compose(
         draw.rectangle((x, _STRIP, x + width + 12, _STRIP + 23), _BACKGROUND)
         draw.text((x + 6, _STRIP + 2), label, _TEXT, font)
     draw.text((12, _BOTTOM), caption, _TEXT, font)
-    if acted is not None:
-        _draw_bars(draw, font, acted, actions)
+    if act is not None:
+        _draw_bars(draw, font, act, actions)
     return np.asarray(canvas)
 
 
-def probabilities(acted: TensorDictBase, actions: Actions) -> Tensor:
+def probabilities(act: Act, actions: Actions) -> Tensor:
     """Return the probabilities of the parts in the first environment. Shape: (K,).
 
-    Without "logits", that of the chosen part is 1.
+    Without a distribution, that of the chosen part is 1.
     """
-    logits = acted.get("logits", None)
-    if logits is None:
-        return torch.eye(len(actions))[int(actions.part(acted["action"][0]))]
-    return actions.probabilities(logits[0])
+    if act.distribution is None:
+        return torch.eye(len(actions))[int(actions.part(act.action[0]))]
+    return actions.probabilities(act.distribution[0])
 
 
-def _draw_bars(
-    draw: ImageDraw.ImageDraw, font: Font, acted: TensorDictBase, actions: Actions
-) -> None:
+def _draw_bars(draw: ImageDraw.ImageDraw, font: Font, act: Act, actions: Actions) -> None:
     """Draw a bar for each action; its length is the probability. The chosen action's is white."""
-    chosen, names = int(actions.part(acted["action"][0])), actions.names
-    probs = probabilities(acted, actions)
+    chosen, names = int(actions.part(act.action[0])), actions.names
+    probs = probabilities(act, actions)
     room = 960 // len(names)
     for i, action in enumerate(actions.order):
         x, y = 300 + room * i, _BOTTOM

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from drone_rl.config.commands import PlacesSettings
 from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.config.options import PlacesOptions
-from drone_rl.envs.transforms import on_pixels
+from drone_rl.envs import Pipeline
 from drone_rl.explanations.report.places import chart, describe, rows
 from drone_rl.explanations.results import ExactMap
 from drone_rl.policies.policy import Policy, load_policy
@@ -114,7 +114,7 @@ def places(
     begin = time.perf_counter()
     network, gap = policy.make_network(), settings.logit_gap
     spec = make_policy_spec(policy.description, network, gap, settings.renderer)
-    transform = on_pixels(policy.description.make_transforms())
+    transform = Pipeline(policy.description.make_transforms())
     with torch_threads(1), closing(spec):
         progress("comparing the renderer's images")
         compared = spec.images.check(

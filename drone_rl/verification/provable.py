@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
-from drone_rl.collectors.complete_episodes import episode_batches
+from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ProvableSettings, ProveSettings
 from drone_rl.config.configuration import as_config, check_same_config, from_arguments
@@ -248,17 +248,13 @@ def find_failures(
     Returns:
         Placements, metres to the left of the start, (failures, num_cubes); number of episodes.
     """
-    names = ("collected", "cube_positions")
     failures: list[NDArray[np.float64]] = []
     episodes = 0
-    for batch in episode_batches(env, actor, num_episodes, keep=names, is_exact=False):
-        is_last = batch["next", "done"][:, 0]
-        collected, cubes = (batch["next", "info", name][is_last] for name in names)
-        failed = cubes[~collected.all(-1)]
-        failures.append(np.asarray(failed[..., 1].double().cpu()))
-        episodes += len(collected)
-        if sum(map(len, failures)) >= enough:
-            break
+    while episodes < num_episodes and sum(map(len, failures)) < enough:
+        goals = rollout(actor, env, env.batch_size[0]).goals
+        cubes = goals.world.reshape(len(goals.world), -1, 3)
+        failures.append(np.asarray(cubes[~goals.reached.all(-1)][..., 1].double()))
+        episodes += len(cubes)
     return np.concatenate(failures), episodes
 
 

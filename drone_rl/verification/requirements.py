@@ -5,7 +5,7 @@ import math
 import torch
 
 from drone_rl.config import TaskSettings
-from drone_rl.envs import CameraFault, on_pixels
+from drone_rl.envs import CameraFault, Pipeline
 from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.utils.errors import InputError
 
@@ -46,7 +46,7 @@ def _ambiguity(described: PolicyDescription) -> str:
     made, camera = described.make_transforms(), described.camera  # also the user's own
     shape = (2, camera.height, camera.width, 3)
     images = (torch.arange(math.prod(shape)) % 255).to(torch.uint8).reshape(shape)
-    first, second = (on_pixels(made)(images) for _ in range(2))
+    first, second = (Pipeline(made)(images) for _ in range(2))
     if any(isinstance(one, CameraFault) for one in made) or not torch.equal(first, second):
         return "transforms without chance; those of this policy may change an image at random"
     return ""

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from drone_rl.acceleration.fused_network import FusedNetwork
-from drone_rl.envs.direct_renderer import Reasons
+from drone_rl.acceleration.packed_layers import Reasons
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN
 from tests.policies.halves import draw_weights, forward_backward, halves, make_network
 

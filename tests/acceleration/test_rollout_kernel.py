@@ -6,10 +6,10 @@ import pytest
 import torch
 import warp as wp
 
-from drone_rl.acceleration.fused_collector import FusedCollector
+from drone_rl.acceleration import FusedEpisodes
 from drone_rl.acceleration.rollout_kernel import choose, standardise
 from drone_rl.collectors import EpisodeCollector
-from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
+from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
 from drone_rl.policies import SmallCNN, make_actor
 from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.tasks import CollectCubes
@@ -82,13 +82,13 @@ class Half(CollectCubes):
 
 @pytest.mark.parametrize("task", [CollectCubes, Half])
 def test_kernel_runs_the_rules_of_the_task(task):
-    env = with_transforms(DroneEnv(4, task()), [GrayPixels(), StandardizePixels()])
+    env = DroneEnv(4, task(), transforms=[GrayPixels(), StandardizePixels()])
     shape = tuple(env.observation_spec["pixels"].shape[1:])
     generator = torch.Generator().manual_seed(0)
     network = SmallCNN(shape, 3, channels=(4,), hidden=(8,), generator=generator)
     actor = make_actor(network, env.action_spec, generator)
-    collector = EpisodeCollector(env, actor, acceleration="fused", next_keys=[INFO])
-    assert isinstance(collector.source, FusedCollector)
+    collector = EpisodeCollector(env, actor, compiled=True, info=("collected",))
+    assert isinstance(collector.fused, FusedEpisodes)
     for _ in range(3):
         batch = collector.collect()
         first = torch.cat([torch.tensor([True]), batch["next", "done"][:-1, 0]])

@@ -7,7 +7,7 @@ import torch
 
 from benchmarks import verdicts
 from benchmarks.scripted_policies import SCRIPTS, ScriptedPolicy
-from drone_rl.collectors.complete_episodes import run_episodes
+from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.envs import DroneEnv
 from drone_rl.trust.baselines import run_baselines
 from drone_rl.trust.verdict import apply_rule
@@ -42,7 +42,7 @@ def baselines(task):
 def run(name, greedy=True):
     env = DroneEnv(EPISODES, SCRIPTS[name].settings, pixels=False, stream=Stream.REPORT)
     policy = ScriptedPolicy(SCRIPTS[name], torch.Generator().manual_seed(0))
-    return run_episodes(env, policy, EPISODES, greedy=greedy)
+    return rollout(policy, env, EPISODES, greedy=greedy)
 
 
 def judge(name, sampled=None):

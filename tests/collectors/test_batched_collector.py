@@ -13,7 +13,6 @@ from drone_rl.collectors import EpisodeCollector, RolloutCollector
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.policies.baselines import oracle_policy
-from drone_rl.utils.errors import InputError
 
 TASK = TaskSettings(num_cubes=1, first_distance=3.0, step_limit=12, front_margin=3.0)
 KINDS = {
@@ -81,11 +80,3 @@ def test_shutdown_can_leave_the_environment_open(make):
     assert not collector.env.is_closed
     collector.shutdown()
     assert collector.env.is_closed
-
-
-def test_unbatched_environment_raises(make):
-    env = DroneEnv(1, TASK, pixels=False)
-    env.batch_size = torch.Size([])
-    for kind in KINDS.values():
-        with pytest.raises(InputError, match=r"batch size \[\]; give one with one batch dimension"):
-            kind(env, oracle_policy(TASK))

@@ -1,144 +1,67 @@
-"""Complete episodes in order, and the interface of TorchRL's collectors."""
+"""Complete episodes in order, and what a batch of them holds."""
 
 import pytest
 import torch
-from tensordict import TensorDict
-from tensordict.nn import TensorDictModule, probabilistic
-from torchrl.data import Binary, Categorical, Composite, Unbounded
-from torchrl.envs import EnvBase
+from torchrl.envs import CatFrames, Compose, TransformedEnv
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl.collectors import EpisodeCollector
-from drone_rl.collectors.episodes import SteppingCollector
-from drone_rl.config import TaskSettings
-from drone_rl.envs import DroneEnv, GrayPixels, with_transforms
-from drone_rl.envs.direct_renderer import Reasons
+from drone_rl.config import AppearanceSettings, PillarsSettings, TaskSettings
+from drone_rl.envs import DroneEnv, GrayPixels
+from drone_rl.envs.rollout import Act
 from drone_rl.objectives import RewardToGo
-from drone_rl.policies import SmallCNN, make_actor
-from drone_rl.policies.baselines import oracle_policy
+from drone_rl.policies.baselines import constant_policy, oracle_policy
+from drone_rl.utils.errors import InputError
+from tests.continuous import make_env as make_continuous_env
+from tests.continuous import make_policy
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
+FOG = AppearanceSettings(fog_visibility=(5.0, 50.0))
 
 
-TRUTH = (("next", "info", "cubes"), ("next", "info", "end_reason"))
+@pytest.mark.parametrize(
+    ("task", "look"), [(SHORT, None), (SHORT, FOG), (PillarsSettings(num_rows=1), None)]
+)
+def test_batches_equal_stepping_by_torchrl(make_pipeline, task, look):
+    """The observations, rewards and ends of each episode, in two batches."""
+    env, actor = make_pipeline(3, task=task, appearance=look)
+    other, _ = make_pipeline(3, task=task, appearance=look)
+    collector = EpisodeCollector(env, actor, info=("drone",))
+    for number in range(2):
+        batch, state = collector.collect(), other.reset()
+        ids = batch["collector", "traj_ids"] - 3 * number
+        episodes = [batch[ids == i] for i in range(3)]
+        for t in range(max(map(len, episodes))):
+            on = torch.tensor([t < len(episode) for episode in episodes])
+            rows = torch.stack([episode[t] for episode in episodes if t < len(episode)])
+            assert torch.equal(rows["pixels"], state["pixels"][on])
+            action = torch.zeros(3, dtype=torch.int64)
+            action[on] = rows["action"]
+            state = other.step(state.set("action", action).set("_step", on))
+            for key in ("reward", "done", "truncated", ("info", "end_reason"), ("info", "drone")):
+                assert torch.equal(rows["next"][key], state["next"][key][on])
+            state = state["next"]
+        assert batch["next", "done"].sum() == 3
 
 
-class Scripted(EnvBase):
-    """Episodes of known lengths; the frame of environment w is 100 w + 10 episode + step."""
-
-    LENGTHS = ((3, 1, 2), (1, 1, 4), (2, 5, 1))
-
-    def __init__(self):
-        super().__init__(batch_size=torch.Size([3]))
-        self.observation_spec = Composite(frame=Unbounded((3, 1)), shape=(3,))
-        self.action_spec = Categorical(1000, shape=(3,), dtype=torch.int64)
-        self.reward_spec = Unbounded((3, 1))
-        self.full_done_spec = Composite(done=Binary(1, (3, 1), dtype=torch.bool), shape=(3,))
-        self.episode, self.step_of = torch.full((3,), -1), torch.zeros(3).long()
-
-    def _frame(self):
-        return (100 * torch.arange(3) + 10 * self.episode + self.step_of).float()[:, None]
-
-    def _reset(self, tensordict=None, **kwargs):
-        self.episode, self.step_of = self.episode + 1, torch.zeros(3).long()
-        return TensorDict({"frame": self._frame(), "done": torch.zeros(3, 1).bool()}, [3])
-
-    def _step(self, tensordict):
-        reward = -tensordict["action"].float()[
-            :, None
-        ]  # reward of the frame to which the action belongs
-        self.step_of = self.step_of + 1
-        lengths = torch.tensor([self.LENGTHS[w][int(self.episode[w])] for w in range(3)])
-        done = (self.step_of >= lengths)[:, None]
-        return TensorDict({"frame": self._frame(), "reward": reward, "done": done}, [3])
-
-    def _set_seed(self, seed):
-        pass
+def test_continuous_actions_are_collected():
+    env = make_continuous_env(5)
+    batch = EpisodeCollector(env, make_policy(env)[1]).collect()
+    assert batch["action"].shape == (len(batch), 3) and batch["action"].dtype == torch.float32
 
 
-def scripted(**kwargs):
-    """Return a collector whose actor returns the frame number as action."""
-    actor = TensorDictModule(lambda f: f[:, 0].long(), in_keys=["frame"], out_keys=["action"])
-    return EpisodeCollector(Scripted(), actor, **{"next_keys": (("next", "frame"),), **kwargs})
-
-
-def test_every_frame_appears_once_in_order_with_its_action():
-    collector = scripted()
-    for episode, first in ((0, 0), (1, 3), (2, 6)):
-        batch = collector.collect()
-        lengths = [Scripted.LENGTHS[w][episode] for w in range(3)]
-        frames = [100 * w + 10 * episode + t for w in range(3) for t in range(lengths[w])]
-        assert batch["frame"][:, 0].tolist() == batch["action"].tolist() == frames
-        assert batch["next", "reward"][:, 0].tolist() == [-f for f in frames]
-        assert batch["next", "frame"][:, 0].tolist() == [f + 1 for f in frames]
-        ends = [t == length - 1 for length in lengths for t in range(length)]
-        assert batch["next", "done"][:, 0].tolist() == ends
-        ids = [first + w for w in range(3) for _ in range(lengths[w])]
-        assert batch["collector", "traj_ids"].tolist() == ids
-    assert (collector.frames, collector.episodes) == (20, 9)
-
-
-def test_collecting_from_the_first_environments():
-    collector = scripted()
-    batch = collector.collect(2)
-    assert batch["frame"][:, 0].tolist() == [0, 1, 2, 100]
-    assert (collector.frames, collector.episodes) == (4, 2)
-    following = collector.collect(1)
-    assert following["frame"][:, 0].tolist() == [10]
-    assert following["collector", "traj_ids"].tolist() == [2]
-
-
-def test_total_frames_stops_before_an_unneeded_batch():
-    assert [len(batch) for batch in scripted(total_frames=6)] == [6]
-    assert [len(batch) for batch in scripted(total_frames=7)] == [6, 7]
-    assert [len(batch) for batch in scripted(total_frames=0)] == []
-
-
-def test_nested_entries_are_read_and_kept_as_leaves():
-    """One actor reads the true state; the other writes an entry in addition to its action."""
-    env = DroneEnv(2, SHORT, pixels=False)
-    assert EpisodeCollector(env, oracle_policy(SHORT)).collect()["next", "reward"].sum() > 0
-    actor = TensorDictModule(
-        lambda f: (f[:, 0].long(), f + 1), in_keys=["frame"], out_keys=["action", ("note", "more")]
-    )
-    batch = EpisodeCollector(Scripted(), actor, next_keys=()).collect()
-    assert torch.equal(batch["note", "more"], batch["frame"] + 1)
-    assert batch["frame"][:, 0].tolist() == [0, 1, 2, 100, 200, 201]
-
-
-def test_state_resumes_collection():
-    first = scripted()
-    first.env.state_dict, first.env.load_state_dict = dict, lambda state: None
-    first.collect()
-    assert first.state_dict() == {"frames": 6, "episodes": 3, "worlds": {}}
-    second = scripted()
-    second.env.load_state_dict = lambda state: None
-    second.load_state_dict(first.state_dict())
-    assert (second.frames, second.episodes) == (6, 3)
-    assert second.collect()["collector", "traj_ids"].unique().tolist() == [3, 4, 5]
-
-
-@pytest.fixture
-def collector(make_pipeline):
-    return EpisodeCollector(*make_pipeline(5, task=SHORT), next_keys=TRUTH)
-
-
-def test_batch_contains_complete_episodes(collector):
-    batch = collector.collect()
-    ids, done = batch["collector", "traj_ids"], batch["next", "done"][:, 0]
-    assert ids.unique().tolist() == [0, 1, 2, 3, 4]
-    assert torch.equal(ids, ids.sort().values)
-    last = torch.cat([ids[1:] != ids[:-1], torch.tensor([True])])
-    assert torch.equal(done, last)  # done is exactly the last step of each episode
+def test_collecting_from_the_first_environments(make_pipeline):
+    collector = EpisodeCollector(*make_pipeline(4, task=SHORT))
+    assert collector.collect(2)["collector", "traj_ids"].unique().tolist() == [0, 1]
+    assert collector.collect()["collector", "traj_ids"].unique().tolist() == [2, 3, 4, 5]
+    assert collector.episodes == 6
 
 
 def test_finished_environments_are_not_rendered(make_pipeline):
     env, actor = make_pipeline(4, task=SHORT)
     num_rendered = []
-    render = env.base_env.worlds.render
-    env.base_env.worlds.render = lambda s, *view, **look: (
-        num_rendered.append(len(s)) or render(s, *view)
-    )
+    render = env.worlds.render
+    env.worlds.render = lambda state, *view: num_rendered.append(len(state)) or render(state, *view)
     batch = EpisodeCollector(env, actor).collect()
     assert sum(num_rendered) == len(batch)  # exactly the frames with an action
 
@@ -150,17 +73,11 @@ def test_observations_are_optional(make_pipeline):
     assert "action" in batch
 
 
-@pytest.fixture
-def seeing(make_pipeline):
-    """Return a collector whose policy reads the true state; three environments, no rendering."""
-    return EpisodeCollector(DroneEnv(3, SHORT, pixels=False), oracle_policy(SHORT), next_keys=TRUTH)
-
-
-def test_policy_inputs_are_available_and_kept(seeing):
-    batch = seeing.collect()
-    assert len(batch) > 3  # the second step needs the state after the first
-    read = set(batch.keys(True, True)) - {"action", ("collector", "traj_ids")}
-    assert {key for key in read if key[0] != "next"} == set(oracle_policy(SHORT).in_keys)
+def test_actors_read_the_true_state():
+    env = DroneEnv(3, SHORT, pixels=False)
+    batch = EpisodeCollector(env, oracle_policy(SHORT), info=("cubes",)).collect()
+    read = {key for key in batch.keys(True, True) if key[0] not in ("next", "collector")}
+    assert read == {"action", *oracle_policy(SHORT).in_keys}
     first = batch["collector", "traj_ids"].diff(prepend=torch.tensor([-1])) > 0
     drone, after = batch["info", "drone"], batch["next", "info", "cubes"][:, 0]
     assert drone[first].tolist() == [[0.0, 0.0, SHORT.altitude]] * 3
@@ -169,10 +86,26 @@ def test_policy_inputs_are_available_and_kept(seeing):
     assert after[~first.roll(-1)].max() < 2  # all cubes end an episode
 
 
-def test_episode_ids_continue_across_batches(seeing):
-    ids = [set(seeing.collect()["collector", "traj_ids"].tolist()) for _ in range(3)]
-    assert ids == [{0, 1, 2}, {3, 4, 5}, {6, 7, 8}]
-    assert seeing.episodes == 9
+def test_agents_may_remember_each_environment():
+    """An agent that counts its steps in each environment, from 0 where an episode starts."""
+
+    class Counting:
+        def __init__(self):
+            self.count, self.seen = torch.zeros(3, dtype=torch.int64), []
+
+        def act(self, context):
+            self.count[context.rows[context.starts]] = 0
+            self.seen.append(self.count[context.rows].tolist())
+            self.count[context.rows] += 1
+            return Act(torch.zeros_like(context.rows))
+
+    agent = Counting()
+    collector = EpisodeCollector(DroneEnv(3, SHORT, pixels=False), agent)
+    for _ in range(2):
+        batch = collector.collect()
+    assert agent.seen[0] == [0, 0, 0] and agent.seen[1] == [1, 1, 1]
+    assert [0, 0, 0] in agent.seen[2:]
+    assert batch.keys() == {"action", "next", "collector"}
 
 
 def test_episodes_of_one_step():
@@ -182,66 +115,38 @@ def test_episodes_of_one_step():
     assert batch["next", "done"].all()
 
 
-def test_steps_are_masked_once_an_episode_has_ended(seeing):
-    masked, step = [], seeing.env._step
-    seeing.env._step = lambda state: masked.append("_step" in state) or step(state)
-    batch = EpisodeCollector(seeing.env, seeing.actor, acceleration="none").collect()
-    lengths = batch["collector", "traj_ids"].bincount()
-    assert len(masked) == int(lengths.max())  # no step after the last episode
-    assert masked.index(True) == int(lengths.min())
-    assert all(masked[int(lengths.min()) :])
-
-
-def test_postproc_receives_each_batch():
-    collector = scripted(postproc=RewardToGo(0.5), total_frames=7)
-    for batch in collector:
+def test_postproc_receives_each_batch(make_pipeline):
+    env, actor = make_pipeline(2, task=SHORT)
+    for batch in EpisodeCollector(env, actor, postproc=RewardToGo(0.5), total_frames=7):
         expected = RewardToGo(0.5)(batch.exclude("return_to_go"))["return_to_go"]
         assert torch.equal(batch["return_to_go"], expected)
 
 
-TASK = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
-KEPT = [("next", name) for name in ("reward", "done", "terminated", "truncated")]
-
-
-def make(num_envs=5, **settings):
-    env = with_transforms(DroneEnv(num_envs, TASK), [GrayPixels()])
-    generator = torch.Generator().manual_seed(0)
-    network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,), generator=generator)
-    actor = make_actor(network, env.action_spec, generator)
-    return SteppingCollector(env, actor, Reasons(["a reason"]), next_keys=KEPT, **settings), env
-
-
-def test_construction_starts_no_episode():
-    env = DroneEnv(5, TASK)
-    assert torch.equal(make()[0].collect(5)["pixels"][0], GrayPixels()(env.reset())["pixels"][0])
-
-
-@pytest.mark.parametrize("num_envs", [5, 2])
-def test_every_episode_is_complete_and_starts_once(num_envs):
-    collector, env = make()
-    started, start = [], env.base_env.start
-    env.base_env.start = lambda rows=None: started.append(len(rows)) or start(rows)
-    for _ in range(2):
-        batch = collector.collect(num_envs)
-        ids, done = batch["collector", "traj_ids"], batch["next", "done"][:, 0]
-        assert ids.unique().tolist() == list(range(num_envs))
-        assert torch.equal(done, ids != torch.cat([ids[1:], torch.tensor([-1])]))
-    assert started == [5, 5]
-
-
-def test_outer_exploration_type_is_respected():
-    collector, _ = make()
+def test_outer_exploration_type_is_respected(make_pipeline):
+    collector = EpisodeCollector(*make_pipeline(5, task=SHORT))
     with set_exploration_type(ExplorationType.DETERMINISTIC):
-        batch = collector.collect(5)
+        batch = collector.collect()
     assert torch.equal(batch["action"], batch["logits"].argmax(-1))
-    batch = collector.collect(5)
+    batch = collector.collect()
     assert not torch.equal(batch["action"], batch["logits"].argmax(-1))
 
 
-def test_no_exploration_type_is_set_for_other_threads(monkeypatch):
-    """TorchRL's own collector sets one for the whole process."""
-    collector, _ = make()
-    kinds = []
-    monkeypatch.setattr(probabilistic._interaction_type, "set_mode", kinds.append)
-    collector.collect(5)
-    assert not kinds
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (
+            lambda env: EpisodeCollector(
+                TransformedEnv(env, Compose(GrayPixels(), CatFrames(2, -3, ["pixels"]))),
+                constant_policy(0),
+            ),
+            r"env has GrayPixels in a TransformedEnv; give transforms .* make_env\(transforms=",
+        ),
+        (
+            lambda env: EpisodeCollector(env, constant_policy(0), info=("fuel",)),
+            "info=fuel is not known of these drones; choose from cubes, collected",
+        ),
+    ],
+)
+def test_unusable_arguments_raise(make, message):
+    with pytest.raises(InputError, match=message):
+        make(DroneEnv(2, SHORT))

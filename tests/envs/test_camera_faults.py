@@ -4,8 +4,7 @@ import copy
 
 import pytest
 import torch
-from tensordict import TensorDict
-from torchrl.envs import RewardSum, StepCounter, TransformedEnv
+from torchrl.envs import Compose, TransformedEnv
 from torchrl.envs.utils import check_env_specs
 
 from drone_rl.collectors import EpisodeCollector, RolloutCollector
@@ -21,7 +20,6 @@ from drone_rl.envs import (
     Noise,
     Shift,
     StandardizePixels,
-    with_transforms,
 )
 from drone_rl.envs.fault_models import FaultModel
 from drone_rl.policies import SmallCNN, make_actor
@@ -47,8 +45,8 @@ KINDS = {
 
 
 def make_env(kind="all", num_envs=4, **options):
-    base = DroneEnv(num_envs, SHORT, SMALL, **options)
-    return with_transforms(base, [GrayPixels(), *KINDS[kind](), StandardizePixels()])
+    transforms = [GrayPixels(), *KINDS[kind](), StandardizePixels()]
+    return DroneEnv(num_envs, SHORT, SMALL, transforms=transforms, **options)
 
 
 def fly(env, steps=6, worlds=4):
@@ -98,10 +96,10 @@ class OtherNoise(Noise):
 
 def test_noise_is_independent_across_environments_episodes_and_faults():
     pipeline = [GrayPixels(), Noise(1.0), Noise(1.0), OtherNoise(1.0)]
-    env, memories = with_transforms(DroneEnv(2, SHORT, SMALL), pipeline), []
+    env, memories = DroneEnv(2, SHORT, SMALL, transforms=pipeline), []
     for _ in range(2):
         env.reset()
-        memories += [fault._memory[w] for fault in pipeline[1:] for w in (0, 1)]
+        memories += [s.memory[w] for s in env.observer.pipeline.stages for w in (0, 1)]
     for i in range(len(memories)):
         for j in range(i):
             both = torch.stack([memories[i].flatten(), memories[j].flatten()])
@@ -109,7 +107,7 @@ def test_noise_is_independent_across_environments_episodes_and_faults():
 
 
 def test_faults_do_not_change_episodes():
-    clean = with_transforms(DroneEnv(4, SHORT, SMALL, seed=2), [GrayPixels()])
+    clean = DroneEnv(4, SHORT, SMALL, seed=2, transforms=[GrayPixels()])
     faulty = make_env(seed=2)
     for _ in range(3):
         cubes = [env.reset()["info", "cube_positions"] for env in (clean, faulty)]
@@ -156,7 +154,7 @@ def test_masked_environments_keep_their_faults(kind):
 
 @pytest.mark.parametrize("fault", [Noise(), DeadRows(), FrozenFrames(0.5), LateFrames(2), Shift()])
 def test_returned_images_are_not_modified(fault):
-    env = with_transforms(DroneEnv(3, SHORT, SMALL), [GrayPixels(), fault])
+    env = DroneEnv(3, SHORT, SMALL, transforms=[GrayPixels(), fault])
     state, shown = env.reset(), []
     for t in range(6):
         shown.append((state["pixels"], state["pixels"].clone()))
@@ -173,7 +171,7 @@ def collector(kind, how, seed=0):
     actor = make_actor(network, env.action_spec, generator)
     if how is RolloutCollector:
         return RolloutCollector(env, actor, 5), generator
-    return EpisodeCollector(env, actor, acceleration="fused"), generator
+    return EpisodeCollector(env, actor, compiled=True), generator
 
 
 @pytest.mark.parametrize("how", [EpisodeCollector, RolloutCollector])
@@ -197,46 +195,28 @@ def test_collectors_resume_bit_for_bit(how, kind, tmp_path):
 def test_saved_state_resumes_within_an_episode():
     env, moves = make_env(), torch.zeros(4, dtype=torch.int64)
     state = env.step(env.reset().set("action", moves))["next"]
-    saved = copy.deepcopy({"env": env.state_dict(), "worlds": env.base_env.running_state()})
+    saved = copy.deepcopy(env.running_state())
     expected = env.step(state.clone().set("action", moves))["next"]["pixels"]
     other = make_env(seed=9)
-    other.load_state_dict(saved["env"])
-    other.base_env.load_running_state(saved["worlds"])
+    other.load_running_state(saved)
     assert torch.equal(other.step(state.set("action", moves))["next"]["pixels"], expected)
 
 
-def test_state_of_another_batch_size_raises():
-    one, other = make_env("noise", 2), make_env("noise", 4)
-    one.reset()
-    other.reset()
-    with pytest.raises(InputError, match=r"Noise has 2 environments, this one 4; set num_envs=2"):
-        other.load_state_dict(one.state_dict())
-
-
 def test_images_outside_0_to_1_raise():
-    base = DroneEnv(1, SHORT, SMALL)
     for kind in (Noise, DeadRows, FrozenFrames, LateFrames, Shift):
         with pytest.raises(
             InputError, match=rf"{kind.__name__} got torch.uint8 .* after gray or rgb"
         ):
-            with_transforms(base, [kind()]).reset()
-        for standard in (StandardizePixels(1.0, 1.0), StandardizePixels(0.0, 0.5)):
-            with pytest.raises(InputError, match=r"got images from .* before standardize"):
-                with_transforms(base, [GrayPixels(), standard, kind()]).reset()
+            DroneEnv(1, SHORT, SMALL, transforms=[kind()]).reset()
+        standard = StandardizePixels(0.0, 0.5)
+        with pytest.raises(InputError, match=r"got images from .* before standardize"):
+            DroneEnv(1, SHORT, SMALL, transforms=[GrayPixels(), standard, kind()]).reset()
 
 
-def test_step_before_reset_raises():
-    env = with_transforms(DroneEnv(1, SHORT, SMALL), [GrayPixels(), Noise()])
-    with pytest.raises(InputError, match=r"a step before any reset; call reset\(\)"):
-        env.step(TensorDict({"action": torch.zeros(1, dtype=torch.int64)}, [1]))
-
-
-def test_without_environment_a_fault_changes_nothing():
-    env = TransformedEnv(DroneEnv(2, SHORT, SMALL), GrayPixels())
-    env.append_transform(LateFrames())
-    env.append_transform(RewardSum())
-    env.append_transform(StepCounter())
-    check_env_specs(env, break_when_any_done="both")
+def test_torchrl_transforms_do_not_apply_faults():
+    env = TransformedEnv(DroneEnv(2, SHORT, SMALL), Compose(GrayPixels(), LateFrames()))
+    with pytest.raises(InputError, match=r"LateFrames has a memory .* give it to make_env"):
+        env.reset()
     images = torch.rand(2, 1, 4, 4)
     assert Noise(1.0)._apply_transform(images) is images
 
@@ -249,7 +229,7 @@ class Inverted(CameraFault):
 
 
 def test_user_defined_faults_work():
-    env = with_transforms(DroneEnv(2, SHORT, SMALL), [GrayPixels(), Inverted()])
+    env = DroneEnv(2, SHORT, SMALL, transforms=[GrayPixels(), Inverted()])
     pixels = env.reset()["pixels"]
     gray = GrayPixels()._apply_transform(env.base_env.last_pixels)
     assert torch.equal(pixels, 1 - gray)
@@ -257,17 +237,13 @@ def test_user_defined_faults_work():
 
 @pytest.mark.gpu
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA GPU")
-def test_gpu_samples_equal_cpu_and_states_are_interchangeable():
+def test_gpu_samples_equal_cpu():
     one, other = make_env(num_envs=2), make_env(num_envs=2, device="cuda")
     for env in (one, other):
         env.reset()
-    memories = [env.transform[3]._memory for env in (one, other)]
+    memories = [env.observer.pipeline.stages[0].memory for env in (one, other)]
     assert memories[1].is_cuda and torch.equal(memories[0], memories[1].cpu())
     check_env_specs(other, break_when_any_done="both")
-    state = other.reset()
-    other.load_state_dict(one.state_dict())
-    action = torch.zeros(2, dtype=torch.int64, device="cuda")
-    assert other.step(state.set("action", action))["next", "pixels"].is_cuda
 
 
 LONG_TASK = TaskSettings(num_cubes=30, first_distance=3.0, spacing=3.0, step_limit=90)
@@ -283,7 +259,7 @@ def delayed(frames, count):
 
 def film(*transforms, steps=10, episodes=1):
     """Return frames with and without faults. Shapes: (T, N, 1, H, W)."""
-    env = with_transforms(DroneEnv(N, LONG_TASK, SMALL), [GrayPixels(), *transforms])
+    env = DroneEnv(N, LONG_TASK, SMALL, transforms=[GrayPixels(), *transforms])
     gray, shown, clean = GrayPixels(), [], []
     for _ in range(episodes):
         state = env.reset()

@@ -11,13 +11,11 @@ from drone_rl.envs import (
     CropRows,
     DroneEnv,
     GrayPixels,
+    Pipeline,
     Resize,
     RgbPixels,
     StandardizePixels,
-    on_pixels,
-    with_transforms,
 )
-from drone_rl.envs.transforms import apply_to_frames, memory_of
 from drone_rl.utils.errors import InputError
 
 
@@ -121,23 +119,30 @@ def test_chromaticity_is_the_fraction_of_each_color_minus_a_third():
     torch.testing.assert_close(seen, torch.tensor(thirds)[:, None])
 
 
-def test_on_pixels_applies_only_pixel_transforms_in_order():
+def test_a_pipeline_applies_only_pixel_transforms_in_order():
     white = torch.full((3, 4, 2, 3), 255, dtype=torch.uint8)
     standard = StandardizePixels(mean=0.5, std=0.25)
-    made = on_pixels([RewardSum(), GrayPixels(), standard, CropRows(1, 4)])(white)
+    made = Pipeline([RewardSum(), GrayPixels(), standard, CropRows(1, 4)])(white)
     torch.testing.assert_close(made, torch.full((3, 1, 3, 2), 2.0))
-    assert on_pixels([])(white) is white
+    assert Pipeline([])(white) is white
 
 
 @pytest.mark.parametrize("padding", ["same", "constant"])
 @pytest.mark.parametrize("sizes", [(3,), (2, 2), (2, 3)])
-def test_stacks_of_stacks_are_those_of_the_environment(sizes, padding):
+def test_stacks_equal_those_of_torchrl(sizes, padding):
+    """In the environment, and of consecutive frames alone."""
     stacks = [CatFrames(N=n, dim=-3, in_keys=["pixels"], padding=padding) for n in sizes]
-    env, film = with_transforms(DroneEnv(2), [GrayPixels(), *stacks]), []
-    transforms, state = [*env.transform], env.reset()
+    env, film = DroneEnv(2, transforms=[GrayPixels(), *stacks]), []
+    other = TransformedEnv(DroneEnv(2), Compose(GrayPixels(), *stacks))
+    state, expected = env.reset(), other.reset()
     for _ in range(6):
-        film.append(env.base_env.last_pixels.clone())
-        seen = apply_to_frames(transforms, film[-1 - memory_of(transforms) :])
-        torch.testing.assert_close(seen, state["pixels"])
-        state = env.step(state.set("action", torch.zeros(2, dtype=torch.int64)))["next"]
+        assert torch.equal(state["pixels"], expected["pixels"])
+        pipeline, _ = Pipeline(env.observer.transforms), film.append(env.last_pixels)
+        seen = pipeline.of_frames(film[-1 - pipeline.earlier :])
+        if padding == "same":
+            torch.testing.assert_close(seen, state["pixels"])
+        action = torch.zeros(2, dtype=torch.int64)
+        state, expected = (
+            e.step(s.set("action", action))["next"] for e, s in ((env, state), (other, expected))
+        )
     env.close()

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
+from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.rollouts import collect, render_frames, select_frames
 from drone_rl.explanations.scenes import Scenes
@@ -36,7 +36,7 @@ def dataset(world):
 @pytest.fixture(scope="package")
 def context():
     """The context of a small untrained policy, shared by the sections as in the program."""
-    env = with_transforms(DroneEnv(8, seed=5), [GrayPixels(), StandardizePixels()])
+    env = DroneEnv(8, seed=5, transforms=[GrayPixels(), StandardizePixels()])
     generator = torch.Generator().manual_seed(0)
     network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,), generator=generator)
     with torch.no_grad():  # a policy with opinions, or every map would be nearly flat

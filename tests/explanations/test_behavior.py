@@ -110,7 +110,8 @@ def test_statistics_of_the_data_set_by_hand():
         actions=np.array([0, 0, 0, 2, 0]),
         event=np.array([0, 1, 1, 0, -1], np.int8),
     )
-    found = dataset_section(SimpleNamespace(dataset=data, flights=flights))
+    context = SimpleNamespace(dataset=data, flights=flights, remembers=False)
+    found = dataset_section(context)
     assert (found.frames, found.episodes, found.steps, found.goals_reached) == (3, 3, 5, 2)
     assert found.action_shares == (0.8, 0.0, 0.2)
     # an episode counts once: 0, and the mean of log 2 / log 3 and 1

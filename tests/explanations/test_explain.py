@@ -10,7 +10,7 @@ import torch
 
 import drone_rl
 from drone_rl.config import TaskSettings
-from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
+from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
 from drone_rl.explanations import explain as explaining
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.explain import Explanations, _named, explain_policy
@@ -147,7 +147,7 @@ def test_an_unknown_layer_is_refused_before_any_work(make_pipeline, tmp_path):
 
 @pytest.fixture
 def posts():
-    env = with_transforms(DroneEnv(6, Posts(), seed=2), [GrayPixels(), StandardizePixels()])
+    env = DroneEnv(6, Posts(), seed=2, transforms=[GrayPixels(), StandardizePixels()])
     generator = torch.Generator().manual_seed(0)
     network = MLP((1, 25, 64), 3, hidden=(8,), generator=generator)
     with torch.no_grad():  # mostly forward, or no post is ever passed

@@ -7,7 +7,7 @@ import torch
 
 from drone_rl.config import AppearanceSettings
 from drone_rl.config.commands import PlacesSettings
-from drone_rl.envs import DroneEnv, GrayPixels, Noise, with_transforms
+from drone_rl.envs import DroneEnv, GrayPixels, Noise
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.scenes import place_target
 from drone_rl.explanations.settings import ExplainSettings
@@ -61,7 +61,7 @@ def test_reasons_for_no_exact_map(context):
 def test_there_is_no_exact_map_where_a_place_has_several_images(look, faults, monkeypatch):
     small = PlacesSettings(farthest=3.5, sideways=3.0)
     monkeypatch.setattr(places_section, "PlacesSettings", lambda: small)
-    env = with_transforms(DroneEnv(1, appearance=look), [GrayPixels(), *faults])
+    env = DroneEnv(1, appearance=look, transforms=[GrayPixels(), *faults])
     network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,))
     settings = ExplainSettings(frames=40, episodes=6, perplexity=5, seed=3)
     found = places_section.places_section(Context(env, network, settings))

@@ -9,7 +9,7 @@ from torch import nn
 from torchrl.envs import CatFrames
 
 from drone_rl.config import DynamicsSettings, TaskSettings
-from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
+from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
 from drone_rl.explanations.rollouts import collect, run_to_end, select_frames, step_fields
 from drone_rl.explanations.scenes import Region, Scenes, place_target
 from drone_rl.policies import ExternalNetwork, make_actor
@@ -99,7 +99,7 @@ def test_frames_are_spread_over_episodes():
 
 def test_a_cube_missed_by_the_last_step_is_an_event():
     task = TaskSettings(num_cubes=1, first_distance=10.0, lateral_bound=8.0, front_margin=0.5)
-    env = with_transforms(DroneEnv(20, seed=0, task=task), [GrayPixels(), StandardizePixels()])
+    env = DroneEnv(20, seed=0, task=task, transforms=[GrayPixels(), StandardizePixels()])
     with closing(env):
         network = ExternalNetwork(always_forward, (1, 25, 64), MOVES)
         flown = collect(env, make_actor(network, env.action_spec), num_episodes=20)
@@ -167,7 +167,7 @@ def test_turning_back_after_a_cube_is_no_loop(two_scenes):
 def test_a_policy_with_memory_gets_earlier_frames():
     stack = CatFrames(N=2, dim=-3, in_keys=["pixels"])
     task = TaskSettings(num_cubes=1, step_limit=20)
-    env = with_transforms(DroneEnv(1, task), [GrayPixels(), stack])
+    env = DroneEnv(1, task, transforms=[GrayPixels(), stack])
     two_scenes, network = Scenes(env), Always(F, L, R, F)
     starts = place_target(two_scenes, torch.tensor([9.0]), torch.tensor([0.0]))
     ends = run_to_end(two_scenes, network, starts)

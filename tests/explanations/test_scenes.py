@@ -10,7 +10,6 @@ from drone_rl.envs import (
     GrayPixels,
     Resize,
     RgbPixels,
-    with_transforms,
 )
 from drone_rl.explanations.scenes import (
     Region,
@@ -50,9 +49,10 @@ def test_depth_is_the_cubes_distance(scenes):
 
 
 def test_maps_return_to_the_frame_of_the_camera():
-    env = with_transforms(
-        DroneEnv(1, camera=CameraSettings(width=64, height=36)),
-        [GrayPixels(), CropRows(6, 30), Resize(height=12, width=32)],
+    env = DroneEnv(
+        1,
+        camera=CameraSettings(width=64, height=36),
+        transforms=[GrayPixels(), CropRows(6, 30), Resize(height=12, width=32)],
     )
     maps = Scenes(env).to_frame(torch.ones(2, 12, 32))
     assert maps.shape == (2, 36, 64)
@@ -67,7 +67,7 @@ def test_channels_by_transform(scenes):
         ([RgbPixels()], "rgb"),
         ([RgbPixels(), ChromaticityPixels()], "chromaticity"),
     ):
-        env = with_transforms(DroneEnv(1), pipeline)
+        env = DroneEnv(1, transforms=pipeline)
         assert Scenes(env).channels == channels
         env.close()
 
@@ -75,7 +75,7 @@ def test_channels_by_transform(scenes):
 def test_the_needed_action_is_known_for_the_default_actions(scenes):
     left = torch.tensor([[9.0, 4.0, 0.0]])
     assert scenes.needed(left).tolist() == [1]
-    env = with_transforms(DroneEnv(1, dynamics=Turning()), [GrayPixels()])
+    env = DroneEnv(1, dynamics=Turning(), transforms=[GrayPixels()])
     assert Scenes(env).needed(left).tolist() == [-1]
     env.close()
 

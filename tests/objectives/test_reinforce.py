@@ -114,7 +114,7 @@ def test_mean_gradients_are_exact_for_the_process_of_fig_3():
         network.theta[0] = torch.tensor([0.4, -0.3])
     p = float(network.theta[0].detach().softmax(-1)[1])
     derivative = SUCCESS_PROBABILITY * horizon * (1 - p) ** (horizon - 1) * p * (1 - p)
-    collector = EpisodeCollector(ThreeStateEnv(episodes, horizon=horizon), actor, next_keys=())
+    collector = EpisodeCollector(ThreeStateEnv(episodes, horizon=horizon), actor, info=())
     loss = ReinforceLoss(actor, reduction="sum", entropy_coeff=0.0)
     estimates = []
     for _ in range(repeats):

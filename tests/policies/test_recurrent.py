@@ -20,6 +20,7 @@ from drone_rl.policies.recurrent import CELL, HIDDEN, Memory
 from drone_rl.policies.zoo import describe
 from drone_rl.training.learners import ReinforceLearner, episode_chunks
 from drone_rl.trust.export import export
+from drone_rl.trust.video import film
 from drone_rl.utils.errors import InputError
 
 TASK = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=9, front_margin=3.0)
@@ -110,11 +111,10 @@ def test_gradient_reaches_the_first_frame():
     assert (frames.grad.flatten(1).norm(dim=1) > 0).all()
 
 
-def test_frames_alone_are_refused():
-    network = make_network()
-    network.owner = "policy=mine"
-    with pytest.raises(InputError, match=r"^policy=mine remembers .* single images needs actions"):
-        network(torch.zeros(2, 1, 8, 16))
+def test_a_frame_alone_is_the_first_of_an_episode():
+    network, frames = make_network(), torch.rand(2, 1, 8, 16)
+    with torch.no_grad():
+        torch.testing.assert_close(network(frames), network.step(frames, network.start(2))[0])
     zeros = torch.zeros(2, 1, 6)
     with pytest.raises(InputError, match=r"images of shape \(1, 8, 16\), not \(1, 9, 16\)"):
         network(torch.zeros(2, 1, 9, 16), torch.ones(2, 1, dtype=torch.bool), zeros, zeros)
@@ -135,8 +135,7 @@ def test_batch_holds_the_states_of_its_steps():
     with torch.no_grad():
         seen = batch["pixels"], Memory(batch[HIDDEN], batch[CELL])
         torch.testing.assert_close(network.step(*seen)[0], batch["logits"])
-    assert "LSTM" not in collector.source.name
-    assert collector.source.name.startswith("stepping collector: ")
+    assert collector.name.startswith("stepping collector: ")
     collector.shutdown()
 
 
@@ -242,15 +241,23 @@ def test_onnx_model_agrees_at_every_step(trained, tmp_path):
     assert found.difference <= 1e-5
 
 
-REFUSED = {
-    "explain": lambda policy, folder: drone_rl.explain(policy, folder=folder),
-    "a class model": lambda policy, folder: drone_rl.class_models(policy),
-    "proofs": lambda policy, folder: drone_rl.prove(policy, folder=folder),
-    "the operating domain": lambda policy, folder: drone_rl.shifts(policy, domain_episodes=50),
-}
+def test_every_command_runs_it(trained, tmp_path):
+    policy, silent = load_policy(trained.folder), {"progress": lambda *_: None}
+    few = {"episodes": 20, "seed": 0, **silent}
+    assert drone_rl.judge(policy, **few).as_dict()["kind"]
+    assert drone_rl.evaluate(policy, **few).success <= 1.0
+    shifted = drone_rl.shifts(policy, axes=["noise"], strengths=[3], domain_episodes=20, **few)
+    assert shifted.numbers["domain"]["plain"]["fragile"] == 0
+    sizes = {"frames": 40, "data_episodes": 30, "perplexity": 5}
+    explained = drone_rl.explain(policy, folder=tmp_path / "explained", **sizes, **few)
+    (numbers,) = explained.numbers.values()
+    assert "left_out" not in numbers and numbers["dataset"]["remembers"]
+    assert "remembers earlier frames" in explained.report.read_text()
+    drone_rl.class_models(policy, steps=2, episodes=2, gallery=False, seed=0)
+    film(policy, tmp_path / "film", 1)
+    assert (tmp_path / "film" / "episode_0.mp4").is_file()
 
 
-@pytest.mark.parametrize("what", REFUSED)
-def test_analyses_of_single_frames_are_refused(what, trained, tmp_path):
-    with pytest.raises(InputError, match=rf"{what}.*; give (another policy|domain=false)"):
-        REFUSED[what](trained.policy, tmp_path)
+def test_proofs_are_refused(trained, tmp_path):
+    with pytest.raises(InputError, match="remembers earlier ones"):
+        drone_rl.prove(trained.policy, folder=tmp_path)

@@ -11,7 +11,7 @@ from drone_rl.config import CameraSettings
 from drone_rl.config.networks import Mlp
 from drone_rl.config.training import CloningSettings, TrainSettings
 from drone_rl.config.transforms import Gray, Stack, Standardize
-from drone_rl.envs import DroneEnv, with_transforms
+from drone_rl.envs import DroneEnv
 from drone_rl.policies.zoo import describe
 from drone_rl.training import Callback
 from drone_rl.training.cloning import (
@@ -93,7 +93,7 @@ def test_frames_are_joined_and_stacked_within_their_flight():
 @pytest.mark.parametrize("more", [(), (Stack(N=2),)])
 def test_observations_are_those_of_an_environment(more):
     steps = [t.make() for t in (*SETTINGS.transforms, *more)]
-    env = with_transforms(DroneEnv(1, camera=SETTINGS.camera, seed=3), steps)
+    env = DroneEnv(1, camera=SETTINGS.camera, seed=3, transforms=steps)
     raw = DroneEnv(1, camera=SETTINGS.camera, seed=3)
     state, image = env.reset(), raw.reset()
     images, seen = [], []

@@ -40,18 +40,18 @@ def test_confirmation_uses_the_most_probable_action():
 
 
 def test_each_update_confirms_in_new_environments(monkeypatch):
-    calls, fly = [], confirming.run_episodes
+    calls, fly = [], confirming.rollout
 
-    def note(env, actor, episodes, **how):
+    def note(actor, env, episodes, **how):
         base = env.base_env
         base.reset()
         calls.append(
             (base.stream, base.first_world, len(base.worlds.state), base.worlds.state.cubes.clone())
         )
         base.set_seed(SETTINGS.seed)
-        return fly(env, actor, episodes, **how)
+        return fly(actor, env, episodes, **how)
 
-    monkeypatch.setattr(confirming, "run_episodes", note)
+    monkeypatch.setattr(confirming, "rollout", note)
     confirmation = Confirmation(SETTINGS, always(1.0, 0.0, 0.0))
     shares = [(confirmation(update), confirmation.succeeded)[1] for update in (1, 1, 2)]
     assert shares[0] == shares[1]

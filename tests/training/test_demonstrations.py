@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.collectors.complete_episodes import StepLog, run_episodes
+from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import (
     ActionSettings,
     CameraSettings,
@@ -215,13 +215,12 @@ def test_the_oracle_is_recorded_as_it_flies(tmp_path, kind):
     found = read_demonstrations(tmp_path, FlightConditions.of(settings))
     assert [path.name for path in paths] == [f"flight_0000{i}.npz" for i in range(3)]
     env = DroneEnv(3, settings.task, settings.camera, seed=5, actions=settings.actions)
-    log = StepLog()
-    flown = run_episodes(env, oracle_policy(settings.task, env.worlds.dynamics.actions), 3, log=log)
+    flown = rollout(oracle_policy(settings.task, env.worlds.dynamics.actions), env, 3)
     assert bool(flown.success.all())
     env.set_seed(5)
     first = env.reset()["pixels"].numpy()
     for i, one in enumerate(found):
-        assert torch.equal(torch.from_numpy(one.actions), log.actions[i])
+        assert torch.equal(torch.from_numpy(one.actions), flown.each("action")[i])
         assert len(one) == int(flown.length[i]) and bool(one.done[-1])
         assert one.rewards.sum() == 1.0 and one.pilot == "oracle"
         assert np.array_equal(one.images[0], first[i])

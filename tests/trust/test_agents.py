@@ -1,20 +1,17 @@
 import pytest
 import torch
-from torchrl.envs import CatFrames
 
 from drone_rl.config import CameraSettings, PillarsSettings, TaskSettings
-from drone_rl.envs import GrayPixels
+from drone_rl.envs import GrayPixels, Observer
 from drone_rl.envs.fault_models import dead_rows, noise
-from drone_rl.envs.transforms import PixelTransform
-from drone_rl.policies import ImageNetwork
+from drone_rl.envs.rollout import StepContext
+from drone_rl.policies import ImageNetwork, RecurrentNetwork
 from drone_rl.sim.actions import MOVES
-from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.tasks import as_task
 from drone_rl.sim.worlds import Worlds
-from drone_rl.trust.agents import BaselineAgent, OracleAgent, PolicyAgent, StepContext, has_oracle
+from drone_rl.trust.agents import OracleAgent, PolicyAgent, has_oracle
 from drone_rl.trust.paired_evaluation import PairedEvaluator
 from drone_rl.trust.perturbations import Condition
-from tests.continuous import SETTINGS
 from tests.trust.subjects import TASK, subject
 
 
@@ -30,40 +27,44 @@ class Looking(ImageNetwork):
         return torch.tensor([0.0, 1.0, 0.0]).expand(len(pixels), 3)
 
 
-def sight(worlds, flying, spoil=lambda pictures, flying, nothing=0.0: pictures):
-    state = worlds.state[flying]
-    return StepContext(worlds, state, flying, worlds.poses(state), None, spoil, [])
-
-
 def make_env():
     return Worlds(3, TASK, CameraSettings(width=16, height=5), num_shards=1)
 
 
-def test_policy_observes_transformed_images_with_faults():
+def sight(worlds, *rows, starts=True, pixels=None):
+    """Return what an agent may use, with pixels of one gray level in each environment."""
+    flying = torch.tensor(rows)
+    is_start = torch.full((len(rows),), starts)
+    context = StepContext(Observer(worlds, [GrayPixels()]), worlds.state[flying], flying, is_start)
+    if pixels is not None:
+        context.inputs = {"pixels": torch.tensor(pixels)[:, None, None, None].expand(-1, 1, 12, 16)}
+    return context
+
+
+def test_policy_acts_on_what_is_observed():
     worlds, network = make_env(), Looking()
-    flying = torch.tensor([0, 2])
-    agent = PolicyAgent(network, [GrayPixels()], 3)
-    action, seen = agent.act(sight(worlds, flying, lambda p, f, nothing=0.0: p / 2))
-    gray = GrayPixels()._apply_transform(worlds.render(worlds.state[flying]))
+    act = PolicyAgent(network).act(sight(worlds, 0, 2))
+    gray = GrayPixels()._apply_transform(worlds.render(worlds.state[torch.tensor([0, 2])]))
     worlds.close()
-    assert action.tolist() == [1, 1]
-    torch.testing.assert_close(network.shown[0], gray / 2)
-    assert seen is network.shown[0]
+    assert act.action.tolist() == [1, 1] and act.distribution.shape == (2, 3)
+    torch.testing.assert_close(network.shown[0], gray)
 
 
-def test_frame_stack_of_the_active_environments():
-    worlds, network = make_env(), Looking()
-    agent = PolicyAgent(network, [GrayPixels(), CatFrames(N=2, dim=-3, in_keys=["pixels"])], 3)
-    step = iter((0.25, 0.5))
-
-    def mark(pictures, flying, nothing=0.0):
-        return torch.zeros_like(pictures) + next(step) + flying[:, None, None, None]
-
-    agent.act(sight(worlds, torch.arange(3), mark))
-    agent.act(sight(worlds, torch.tensor([1, 2]), mark))
+def test_recurrent_policies_keep_a_state_of_each_environment():
+    """As the same network in one environment at a time, restarted where an episode starts."""
+    worlds = make_env()
+    network = RecurrentNetwork((1, 12, 16), 3, generator=torch.Generator().manual_seed(0)).eval()
+    network.actions, agent = MOVES, PolicyAgent(network)
+    with torch.no_grad():
+        agent.act(sight(worlds, 0, 1, 2, pixels=[0.1, 0.5, 0.9]))
+        second = agent.act(sight(worlds, 0, 2, starts=False, pixels=[0.2, 0.3])).distribution
+        again = agent.act(sight(worlds, 2, pixels=[0.9])).distribution
+        for i, (before, now) in enumerate(((0.1, 0.2), (0.9, 0.3))):
+            frames = [torch.full((1, 1, 12, 16), level) for level in (before, now)]
+            first, memory = network.step(frames[0], network.start(1))
+            torch.testing.assert_close(second[i : i + 1], network.step(frames[1], memory)[0])
+        torch.testing.assert_close(again, first)  # of 0.9, as at a start
     worlds.close()
-    assert network.shown[0][:, :, 0, 0].tolist() == [[0.25] * 2, [1.25] * 2, [2.25] * 2]
-    assert network.shown[1][:, :, 0, 0].tolist() == [[1.25, 1.5], [2.25, 2.5]]
 
 
 class Tied(ImageNetwork):
@@ -78,50 +79,12 @@ class Tied(ImageNetwork):
 
 def test_fragile_episodes_are_recorded():
     worlds = make_env()
-    bright = torch.tensor([1.0, 0.0, 0.0])
     for examines in (True, False):
-        agent = PolicyAgent(Tied(), [GrayPixels()], 3, examines_rounding=examines)
-        for flying in (torch.arange(3), torch.tensor([1, 2])):
-            agent.act(sight(worlds, flying, lambda p, f: 0 * p + bright[f, None, None, None]))
+        agent = PolicyAgent(Tied(), examines_rounding=examines)
+        agent.act(sight(worlds, 0, 1, 2, pixels=[1.0, 0.0, 0.0]))
+        agent.act(sight(worlds, 1, 2, starts=False, pixels=[0.0, 0.0]))
         assert agent.is_fragile.tolist() == [examines, False, False]
     worlds.close()
-
-
-def test_baseline_agents():
-    worlds = make_env()
-    where = sight(worlds, torch.arange(3))
-    generator = torch.Generator().manual_seed(0)
-    action, seen = BaselineAgent("right", MOVES, generator).act(where)
-    assert (action.tolist(), seen) == ([2, 2, 2], None)
-    agent = BaselineAgent("random", MOVES, generator)
-    drawn = torch.cat([agent.act(where)[0] for _ in range(200)])
-    worlds.close()
-    assert (drawn.bincount() / 600 - 1 / 3).abs().max() < 0.08
-
-
-def test_baseline_agents_with_continuous_actions():
-    worlds, actions = make_env(), ContinuousActions.of(SETTINGS)
-    where, generator = sight(worlds, torch.arange(2)), torch.Generator().manual_seed(0)
-    action, _ = BaselineAgent("forward", actions, generator).act(where)
-    assert action.tolist() == [[1, 0, 0]] * 2
-    assert BaselineAgent("random", actions, generator).act(where)[0].shape == (2, 3)
-    worlds.close()
-
-
-class Signed(PixelTransform):
-    """Gray levels from -1 to 1."""
-
-    def _apply_transform(self, obs):
-        return 2 * GrayPixels()._apply_transform(obs) - 1
-
-
-def test_faults_come_before_a_users_first_transform():
-    worlds, network = make_env(), Looking()
-    agent = PolicyAgent(network, [Signed()], 3)
-    agent.act(sight(worlds, torch.arange(3), lambda p, f, nothing=0.0: p.clamp(0, 1)))
-    wanted = Signed()._apply_transform(worlds.render(worlds.state))
-    worlds.close()
-    torch.testing.assert_close(network.shown[0], wanted)
 
 
 @pytest.fixture

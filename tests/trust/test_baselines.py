@@ -3,7 +3,7 @@ from types import SimpleNamespace
 import pytest
 import torch
 
-from drone_rl.collectors.complete_episodes import run_episodes
+from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.policies.baselines import constant_policy, make_baseline, oracle_policy, random_policy
@@ -35,7 +35,7 @@ def test_baselines_run_from_the_same_initial_states(policies, monkeypatch):
     assert tuple(flown) == BASELINES and set(BASELINES) == set(policies)
     for name, episodes in flown.items():
         env.load_state_dict(worlds)
-        expected = run_episodes(env, policies[name], 6)
+        expected = rollout(policies[name], env, 6)
         assert torch.equal(episodes.length, expected.length), name
         for field, values in vars(expected.goals).items():
             found = getattr(episodes.goals, field)

@@ -124,6 +124,6 @@ def test_other_dynamics_are_named(good, monkeypatch):
 def test_oracle_of_other_actions_is_refused(good, monkeypatch):
     rule = OracleRule(("drone",), lambda drone: drone[..., 0].long(), MOVES_3D)
     monkeypatch.setattr(CollectCubes, "oracle", property(lambda _: rule, lambda _, value: None))
-    monkeypatch.setattr("drone_rl.trust.evaluate.run_episodes", None)
+    monkeypatch.setattr("drone_rl.trust.evaluate.rollout", None)
     with pytest.raises(InputError, match="acts by forward, left, right, up, down, these drones"):
         drone_rl.evaluate(good, episodes=2, progress=silent)

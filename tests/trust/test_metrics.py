@@ -89,11 +89,10 @@ def test_intervals_count_episodes_not_goals():
 
 
 def test_selecting_episodes(episodes):
-    assert len(episodes[1:]) == 2
-    assert episodes[torch.tensor([2])].offered(Side.RIGHT).tolist() == [True]
+    assert len(episodes.first(2)) == 2
     assert episodes.stratum_share(Side.LEFT).tolist() == [1.0, 0.5]
     assert episodes.success.tolist() == [1.0, 0.0, 0.0]
-    assert episodes[1:].goals.world.tolist() == [[2.0], [-4.0]]
+    assert episodes.first(1).success.tolist() == [1.0]
 
 
 def test_summary_of_another_task():

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 import drone_rl
-from drone_rl.envs import on_pixels
+from drone_rl.envs import Pipeline
 from drone_rl.policies.zoo import open_onnx, parse
 from drone_rl.trust import onnx_export as exporting
 from drone_rl.trust.onnx_export import agreement
@@ -17,7 +17,7 @@ from drone_rl.utils.errors import InputError
 def flown(make_pipeline):
     """Worlds, a policy, and the same policy as a function of frames."""
     env, actor = make_pipeline(8, seed=3)
-    network, transform = actor.module[0].module, on_pixels(env.transform)
+    network, transform = actor.module[0].module, Pipeline(env.observer.transforms)
     network.layers.logits.weight.data.mul_(100)  # so that pictures matter
     return env, actor, lambda frames: network(transform(frames)).softmax(-1)
 

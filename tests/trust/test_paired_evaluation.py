@@ -4,7 +4,7 @@ import pytest
 import torch
 
 import drone_rl
-from drone_rl.collectors.complete_episodes import run_episodes
+from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.envs.fault_models import late_frames
 from drone_rl.sim.rendering.scene import SemanticClass
@@ -38,7 +38,7 @@ def test_with_nothing_different_flights_are_those_of_the_environment(make_bed):
     )
     flown = evaluator.run(Condition()).episodes
     with policy.flying(6, stream=Stream.SHIFTED) as (env, actor):
-        expected = run_episodes(env, actor, 6)
+        expected = rollout(actor, env, 6)
     order = [expected.goals.world.tolist().index(world) for world in flown.goals.world.tolist()]
     assert sorted(order) == [*range(6)]
     assert torch.equal(flown.length, expected.length[order])
@@ -138,7 +138,7 @@ def test_flights_in_another_body_are_those_of_the_environment(make_bed):
     told = EvaluatedPolicy(network, policy.task, described.camera, pipeline, dynamics=gusty)
     flown = make_bed(told, 3).run(Condition()).episodes
     with policy.flying(3, stream=Stream.SHIFTED) as (env, actor):
-        expected = run_episodes(env, actor, 3)
+        expected = rollout(actor, env, 3)
     order = [expected.goals.world.tolist().index(world) for world in flown.goals.world.tolist()]
     assert sorted(order) == [*range(3)]
     assert torch.equal(flown.length, expected.length[order])

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 import drone_rl
-from drone_rl.collectors.complete_episodes import StepLog, run_episodes
+from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.policies.external_network import ExternalNetwork
 from drone_rl.policies.external_policy import policy_from
 from drone_rl.sim.actions import MOVES, Move
@@ -25,10 +25,10 @@ EPISODES = 20
 
 def examined(policy):
     with policy.flying(EPISODES, seed=1) as (env, actor):
-        state, log = env.base_env.state_dict(), StepLog()
-        flown = run_episodes(env, actor, EPISODES, is_compiled=True, log=log)
+        state = env.base_env.state_dict()
+        flown = rollout(actor, env, EPISODES, compiled=True)
         env.base_env.load_state_dict(state)
-        return check_rounding(env, actor, EPISODES, greedy=flown, log=log), flown, log
+        return check_rounding(env, actor, EPISODES, flown), flown
 
 
 def with_unit(by_unit):
@@ -48,9 +48,8 @@ def with_unit(by_unit):
 
 
 def test_an_honest_policy_takes_the_same_actions_in_both_implementations():
-    found, flown, log = examined(drone_rl.load_policy("good"))
-    assert log.implementation == "fused kernel"
-    assert [len(a) for a in log.actions] == flown.length.tolist()
+    found, flown = examined(drone_rl.load_policy("good"))
+    assert flown.implementation == "fused kernel"
     assert (found.compared, found.compared_episodes, found.unexplained) == ("PyTorch", EPISODES, 0)
     assert found.frames == int(flown.length.sum())
     assert not found.excessive
@@ -58,7 +57,7 @@ def test_an_honest_policy_takes_the_same_actions_in_both_implementations():
 
 
 def test_a_policy_that_acts_by_the_order_of_sums_is_found():
-    found, _, _ = examined(with_unit(1000.0))
+    found, _ = examined(with_unit(1000.0))
     assert found.fragile == found.frames
     assert found.excessive
     assert found.differing == EPISODES
@@ -86,7 +85,7 @@ def test_callables_that_act_by_more_than_the_frame_are_refused(kind):
 
 
 def test_a_callable_that_acts_by_the_frame_passes():
-    found, _, _ = examined(policy_from(lambda x: x[:, 0, 10:13, 5] * 100))
+    found, _ = examined(policy_from(lambda x: x[:, 0, 10:13, 5] * 100))
     assert not found.bound
     assert found.unexplained == 0
 

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import drone_rl
-from drone_rl.collectors.complete_episodes import run_episodes
+from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.policies.baselines import constant_policy, oracle_policy
@@ -168,7 +168,7 @@ def test_other_initial_states_are_refused(make_episodes, make_baselines):
     with pytest.raises(ValueError, match="different initial states"):
         apply_rule(ours, make_baselines(theirs))
     with pytest.raises(ValueError, match="different initial states"):
-        apply_rule(ours, make_baselines(ours), sampled=ours[:1])
+        apply_rule(ours, make_baselines(ours), sampled=ours.first(1))
 
 
 def test_sampled_episodes_are_compared_pairwise(judged, make_episodes):
@@ -237,11 +237,11 @@ def test_verdict_on_another_task():
 def test_greedy_and_sampled_episodes_share_initial_states(monkeypatch):
     flown = []
 
-    def run(env, actor, episodes, **how):
+    def run(actor, env, episodes, **how):
         flown.append((how.get("greedy", True), episodes, env.state_dict()))
-        return run_episodes(env, actor, episodes, **how)
+        return rollout(actor, env, episodes, **how)
 
-    monkeypatch.setattr("drone_rl.trust.verdict.run_episodes", run)
+    monkeypatch.setattr("drone_rl.trust.verdict.rollout", run)
     task = TaskSettings(num_cubes=1)
     env = DroneEnv(2, task, pixels=False)
     before = env.state_dict()
@@ -260,7 +260,7 @@ def test_task_without_an_oracle_is_refused(monkeypatch):
         raise AssertionError("episodes were flown")
 
     for module in ("verdict", "baselines"):
-        monkeypatch.setattr(f"drone_rl.trust.{module}.run_episodes", refused)
+        monkeypatch.setattr(f"drone_rl.trust.{module}.rollout", refused)
     env = DroneEnv(2, Blind(), pixels=False)
     with pytest.raises(InputError, match="task=fog has no oracle"):
         judge_policy(env, constant_policy(Move.LEFT), 2)

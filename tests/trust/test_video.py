@@ -3,7 +3,6 @@ import math
 import numpy as np
 import pytest
 import torch
-from tensordict import TensorDict
 from torchrl.envs.utils import exploration_type
 
 import drone_rl
@@ -14,6 +13,7 @@ from drone_rl.config import (
     PillarsSettings,
     TaskSettings,
 )
+from drone_rl.envs.rollout import Act
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.entities import CHASE
 from drone_rl.sim.rendering.appearance import product, rotate, turned
@@ -95,8 +95,7 @@ def test_bars_of_action_probabilities(actions):
     canvas, count = Canvas(), len(actions)
     logits = torch.zeros(1, count)
     logits[0, actions.left] = 50.0
-    acted = TensorDict({"action": torch.tensor([actions.left]), "logits": logits}, [1])
-    _draw_bars(canvas, None, acted, actions)
+    _draw_bars(canvas, None, Act(torch.tensor([actions.left]), logits), actions)
     assert [text.split()[0] for _, text in canvas.texts] == [
         actions.names[i] for i in actions.order
     ]
@@ -110,7 +109,7 @@ def test_bars_of_action_probabilities(actions):
 
 def test_bars_without_logits():
     canvas = Canvas()
-    _draw_bars(canvas, None, TensorDict({"action": torch.tensor([2])}, [1]), MOVES)
+    _draw_bars(canvas, None, Act(torch.tensor([2])), MOVES)
     assert [text for _, text in canvas.texts] == ["left 0.00", "forward 0.00", "right 1.00"]
 
 

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 import drone_rl
-from drone_rl.collectors.complete_episodes import CompleteEpisodes, run_episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes, rollout
 from drone_rl.policies.zoo import certificate_path
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes import CubeGoals, CubesEnd
@@ -208,7 +208,7 @@ def test_certificate_next_to_a_policy_is_rechecked(poor, tmp_path):
 
 def test_tampered_certificates_prove_nothing(poor, truth, tmp_path):
     with poor.flying(20) as (env, actor):
-        episodes = run_episodes(env, actor, 20)
+        episodes = rollout(actor, env, 20)
     for name, content in tampered(truth).items():
         (tmp_path / "mine.certificate.json").write_bytes(content)
         quoted = find_claim(poor, flights=20).quote(episodes)

@@ -15,7 +15,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
 from drone_rl.config.transforms import Fault, Stack, Transform, as_transforms
-from drone_rl.envs.transforms import on_pixels
+from drone_rl.envs.observer import Pipeline
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import shown
 
@@ -56,7 +56,7 @@ class Sb3Worlds(VecEnv):
             raise InputError(f"the transform {strange[0]} needs a TorchRL environment; omit it")
         self.env = env
         self.transforms = transforms
-        self._transform = on_pixels([transform.make() for transform in transforms])
+        self._transform = Pipeline([transform.make() for transform in transforms])
         self._actions: NDArray[Any] = np.zeros(env.num_envs, np.int64)
         space = env.single_observation_space
         if transforms:

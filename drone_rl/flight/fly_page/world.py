@@ -4,14 +4,14 @@ import dataclasses
 import math
 from collections import deque
 from collections.abc import Mapping
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import torch
 from tensordict import TensorDict
 from torch import Tensor
 
 from drone_rl.config import ActionSettings, DynamicsSettings
-from drone_rl.envs import DroneEnv
+from drone_rl.envs import base_env
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.policies.actor import exploring
 from drone_rl.policies.policy import Policy
@@ -62,7 +62,7 @@ class World:
         """
         self.policy = policy
         self._env = policy.make_env(1, seed=seed, renderer=renderer)
-        self._base = cast(DroneEnv, self._env.base_env)
+        self._base = base_env(self._env)
         self.worlds = self._base.worlds
         self.task: Any = self.worlds.task
         self.actions: Actions = self.worlds.dynamics.actions

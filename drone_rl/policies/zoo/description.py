@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any, Unpack
 
 import torch
-from torchrl.envs import InitTracker, TransformedEnv
+from torchrl.envs import EnvBase, InitTracker
 from torchrl.envs import Transform as TorchrlTransform
 
 from drone_rl.config import (
@@ -29,7 +29,7 @@ from drone_rl.config.networks import Lstm, Network
 from drone_rl.config.registry import own_place
 from drone_rl.config.training import MOST_TRANSFORMS, TrainSettings
 from drone_rl.config.transforms import Fault, Frame, Stack, Transform
-from drone_rl.envs import DroneEnv, with_transforms
+from drone_rl.envs import DroneEnv, with_others
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.environment import EnvOptions
 from drone_rl.sim.actions import Actions
@@ -149,7 +149,7 @@ class PolicyDescription:
         stream: Stream = Stream.WORLDS,
         task: Task[Any] | None = None,
         **options: Unpack[EnvOptions],
-    ) -> TransformedEnv:
+    ) -> EnvBase:
         """Build environments with the described camera and transforms; see `DroneEnv`.
 
         `task` is the same task with other starts of episodes. Without `pixels`: no transforms.
@@ -158,16 +158,18 @@ class PolicyDescription:
         parts["dynamics"] = options.get("dynamics") or self.dynamics
         if isinstance(parts["dynamics"], DynamicsSettings):  # others have actions of their own
             parts.setdefault("actions", self.actions)
+        transforms = self.make_transforms() if options.get("pixels", True) else ()
         env = DroneEnv(
             num_envs,
             task or self.task,
             self.camera,
+            transforms=transforms,
             seed=seed,
             stream=stream,
             device=device,
             **parts,
         )
-        return with_transforms(env, self.make_transforms() if options.get("pixels", True) else ())
+        return with_others(env, transforms)
 
     def make_dynamics(self) -> Dynamics:
         """Return the vehicle dynamics."""

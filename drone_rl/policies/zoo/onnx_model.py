@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from drone_rl.envs import on_pixels
+from drone_rl.envs import Pipeline
 from drone_rl.policies import ImageNetwork, RecurrentNetwork
 from drone_rl.policies.recurrent import Memory
 from drone_rl.policies.zoo.description import PolicyDescription
@@ -34,7 +34,7 @@ class _FullPolicy(nn.Module):
                 "export it with format=safetensors"
             )
         self._network = network
-        self._transform = on_pixels(description.make_transforms())
+        self._transform = Pipeline(description.make_transforms())
         self.has_action = bool(network.actions.entry.shape)
         """Whether there is an output for the action, which is not the most probable part."""
 

@@ -1,7 +1,7 @@
 """Check a certificate: it must be consistent, and simulated episodes must end as stated."""
 
 import dataclasses
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -11,9 +11,8 @@ import torch
 from numpy.typing import NDArray
 from tensordict import TensorDict
 from torch import Tensor
-from torchrl.envs import Transform
 
-from drone_rl.envs import worlds_of
+from drone_rl.envs import base_env, worlds_of
 from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.tasks import State
 from drone_rl.sim.tasks.collect_cubes import CubesEnd, WorldState
@@ -113,8 +112,7 @@ class Simulator:
         self._env = described.build_env(count, seed=0, device=device, renderer=renderer)
         self._worlds = worlds_of(self._env)
         self._task = require_cubes(described, "certificates")
-        every: Iterable[Transform] = self._env.transform  # type: ignore[assignment]
-        self._transforms = [t for t in every if "pixels" in (t.in_keys or [])]
+        self._transforms = base_env(self._env).observer.transforms
         self._network = described.load_network(weights).to(self._worlds.device)
         self._dtype = torch.float32
 

@@ -1,16 +1,15 @@
 """Exact success probabilities of a policy that samples its actions, and bounds on them."""
 
 import dataclasses
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
-from torchrl.envs import Transform, TransformedEnv
+from torchrl.envs import EnvBase
 
-from drone_rl.envs import worlds_of
-from drone_rl.envs.transforms import pixel_transforms
+from drone_rl.envs import base_env, worlds_of
 from drone_rl.policies.rounding import RoundingBound
 from drone_rl.sim.tasks.collect_cubes import CubesEnd, WorldState
 from drone_rl.utils.batch import Batch
@@ -122,12 +121,11 @@ def _propagate(graph: Graph, evaluate: Evaluate) -> tuple[NDArray, NDArray, NDAr
 class NodeEvaluator:
     """Render graph nodes and evaluate the policy's action probabilities at them."""
 
-    def __init__(self, env: TransformedEnv, network: nn.Module) -> None:
+    def __init__(self, env: EnvBase, network: nn.Module) -> None:
         self.num_images = 0  # images rendered so far
         self._worlds, self._network = worlds_of(env), network
         self._rounding = RoundingBound.find(network)
-        pipeline: Iterable[Transform] = env.transform  # type: ignore[assignment]
-        self._transforms = pixel_transforms(pipeline)
+        self._transforms = base_env(env).observer.transforms
 
     def on(self, graph: Graph) -> Evaluate:
         """Return a function from nodes of a graph to action probabilities; it caches images."""

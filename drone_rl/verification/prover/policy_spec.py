@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from drone_rl.config import TaskSettings
-from drone_rl.envs import GrayPixels, StandardizePixels, on_pixels
+from drone_rl.envs import GrayPixels, Pipeline, StandardizePixels
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.actions import MOVES
@@ -122,7 +122,7 @@ def make_compositor(description: PolicyDescription, images: CubeImages) -> Compo
     made = [choice.make() for choice in chosen]
     shades = (GrayPixels, StandardizePixels)
     count = next((i for i, t in enumerate(made) if not isinstance(t, shades)), len(made))
-    shade, rest = on_pixels(made[:count]), on_pixels(made[count:])
+    shade, rest = Pipeline(made[:count]), Pipeline(made[count:])
     background = shade(images.background[None])[0, 0]
     faces = shade(images.colors[None, None, FRONT:])[0, 0, 0]
     return Compositor(background, faces, rest)

@@ -6,7 +6,7 @@ import shutil
 import pytest
 import torch
 
-from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
+from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
 from drone_rl.explanations.explain import explain_policy
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.settings import ExplainSettings
@@ -37,7 +37,7 @@ def report(explanations, tmp_path_factory):
 
 
 def explain_twice(root):
-    env = with_transforms(DroneEnv(30), [GrayPixels(), StandardizePixels()])
+    env = DroneEnv(30, transforms=[GrayPixels(), StandardizePixels()])
     generator = torch.Generator().manual_seed(0)
     network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,), generator=generator)
     settings = ExplainSettings(frames=90, episodes=6, perplexity=5)

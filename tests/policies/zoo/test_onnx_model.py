@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from drone_rl.config.registry import register_network
-from drone_rl.envs import on_pixels
+from drone_rl.envs import Pipeline
 from drone_rl.policies import MLP, make_actor
 from drone_rl.policies.zoo import make_onnx, open_onnx, parse
 from drone_rl.sim.continuous_actions import ContinuousActions
@@ -94,7 +94,7 @@ def test_continuous_actions_are_outputs():
         )
     )
     with torch.no_grad():
-        outputs = network(on_pixels(description.make_transforms())(frames))
+        outputs = network(Pipeline(description.make_transforms())(frames))
     assert set(found) == {"probabilities", "action"}
     expected = {
         "probabilities": network.actions.probabilities(outputs),

@@ -4,7 +4,7 @@ import pytest
 import torch
 from torchrl.envs.utils import check_env_specs
 
-from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
+from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
 from drone_rl.explanations.scenes import Scenes, place_target
 from drone_rl.sim.rendering import Appearance, Raytracer
 from drone_rl.sim.rendering.mujoco_warp import WarpRenderer
@@ -64,7 +64,7 @@ def test_environment_uses_and_closes_the_renderer():
 
 
 def test_explanations_use_its_images():
-    env = with_transforms(DroneEnv(2, renderer=OneColor), [GrayPixels(), StandardizePixels()])
+    env = DroneEnv(2, renderer=OneColor, transforms=[GrayPixels(), StandardizePixels()])
     scenes = Scenes(env)
     seen = scenes.observe(place_target(scenes, torch.tensor([5.0, 9.0]), torch.zeros(2)))
     assert seen.shape == (2, 1, 25, 64) and len(seen.unique()) == 1

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 import drone_rl
-from drone_rl.collectors.complete_episodes import run_episodes
+from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
@@ -124,7 +124,7 @@ def make():
 def test_simulator_matches_evaluation(make):
     policy = drone_rl.load_policy("right_and_forward")
     with policy.flying(20) as (env, actor):
-        episodes = run_episodes(env, actor, 20)
+        episodes = rollout(actor, env, 20)
     lateral = episodes.goals.world.reshape(20, 3, 3)[..., 1].double().numpy()
     flown = make("right_and_forward").fly(lateral)
     assert flown.end.tolist() == episodes.end_reason.tolist()

@@ -10,7 +10,7 @@ import torch
 from torch import nn
 
 import drone_rl
-from drone_rl.collectors.complete_episodes import run_episodes
+from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import TaskSettings
 from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import parse, policy_path, read_policy
@@ -136,7 +136,7 @@ def test_sampled_episodes_agree(place, monkeypatch):
     done = propagate(graph, NodeEvaluator(env, network).on(graph))
     monkeypatch.setattr(task, "sample", lambda random_state: cubes[0])
     actor = make_actor(network, env.action_spec, torch.Generator().manual_seed(0))
-    flown = run_episodes(env, actor, flights, greedy=False)
+    flown = rollout(actor, env, flights, greedy=False)
     env.close()
     share = float(done.success[0])
     assert 0.05 < share < 0.95
@@ -152,7 +152,7 @@ def test_sampled_episodes_agree(place, monkeypatch):
 def test_greedy_episodes_agree():
     env, network = flying("right_and_forward", 20, factor=1e9)
     actor = make_actor(network, env.action_spec)
-    flown = run_episodes(env, actor, 20)
+    flown = rollout(actor, env, 20)
     settings = env.base_env.worlds.task.settings
     cubes = flown.goals.world.view(20, settings.num_cubes, 3).double()
     graph = explore(settings, cubes)

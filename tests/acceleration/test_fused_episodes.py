@@ -4,15 +4,12 @@ import threading
 
 import pytest
 import torch
-from torchrl.envs import RewardSum
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
-from drone_rl.acceleration import fused_collector
-from drone_rl.acceleration.direct_collector import DirectCollector
-from drone_rl.acceleration.fused_collector import FusedCollector, RolloutBuffer
+from drone_rl.acceleration import FusedEpisodes, fused_episodes
+from drone_rl.acceleration.fused_episodes import RolloutBuffer
 from drone_rl.acceleration.fused_network import FusedNetwork
 from drone_rl.collectors import EpisodeCollector
-from drone_rl.collectors.episodes import SteppingCollector
 from drone_rl.config import (
     AppearanceSettings,
     CameraSettings,
@@ -27,7 +24,6 @@ from drone_rl.envs import (
     Resize,
     RgbPixels,
     StandardizePixels,
-    with_transforms,
 )
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN, make_actor
 from drone_rl.sim.dynamics import Quadrotor
@@ -51,8 +47,8 @@ def make(
     dynamics=None,
     **how,
 ):
-    env = DroneEnv(num_envs, task, dynamics=dynamics)
-    env = with_transforms(env, [transform() for transform in transforms])
+    made = [transform() for transform in transforms]
+    env = DroneEnv(num_envs, task, dynamics=dynamics, transforms=made)
     generator = torch.Generator().manual_seed(0)
     if network is None:
         shape = tuple(env.observation_spec["pixels"].shape[1:])
@@ -60,7 +56,7 @@ def make(
         with torch.no_grad():
             network.layers.logits.weight.mul_(100)
     actor = make_actor(network, env.action_spec, generator)
-    return EpisodeCollector(env, actor, **{"acceleration": "fused", **how})
+    return EpisodeCollector(env, actor, **{"compiled": True, **how})
 
 
 GIMBAL = FLYING.replace(camera_mount="gimbal")
@@ -96,10 +92,9 @@ def test_fused_episodes_equal_their_replay_by_torchrl_bit_for_bit(first, second)
     task, camera = WORLDS[(first + second) % 3]
 
     def make_env():
-        env = DroneEnv(5, task, dynamics=dynamics, camera=camera)
-        return with_transforms(env, transforms(camera))
+        made = transforms(camera)
+        return DroneEnv(5, task, dynamics=dynamics, camera=camera, transforms=made)
 
-    kept = [REASON, ("next", "info", "collected"), ("next", "info", "drone")]
     generator, env, acting = torch.Generator().manual_seed(0), make_env(), make_env()
     shape, sizes = (
         tuple(env.observation_spec["pixels"].shape[1:]),
@@ -109,8 +104,8 @@ def test_fused_episodes_equal_their_replay_by_torchrl_bit_for_bit(first, second)
     with torch.no_grad():
         network.layers.logits.weight.mul_(100)
     actor = make_actor(network, env.action_spec, generator)
-    collector = EpisodeCollector(acting, actor, acceleration="fused", next_keys=kept)
-    assert isinstance(collector.source, FusedCollector)
+    collector = EpisodeCollector(acting, actor, compiled=True, info=("collected", "drone"))
+    assert isinstance(collector.fused, FusedEpisodes)
     for _ in range(2):
         batch, state = collector.collect(), env.reset()
         ids = batch["collector", "traj_ids"]
@@ -141,8 +136,8 @@ def test_cropped_frames_and_a_network_with_pooling_are_fused(is_cropped_first):
     transforms = [GrayPixels, StandardizePixels]
     transforms.insert(1 if is_cropped_first else 2, lambda: CropRows(3, 23))
     network = OriginalCNN((1, 20, 64), 3, generator=torch.Generator().manual_seed(0))
-    made = [make(transforms=transforms, network=network, acceleration=a) for a in ("fused", "none")]
-    assert isinstance(made[0].source, FusedCollector)
+    made = [make(transforms=transforms, network=network, compiled=c) for c in (True, False)]
+    assert isinstance(made[0].fused, FusedEpisodes)
     with set_exploration_type(DETERMINISTIC):
         one, other = (collector.collect() for collector in made)
     for key in other.keys(True, True):
@@ -153,7 +148,7 @@ def test_cropped_frames_and_a_network_with_pooling_are_fused(is_cropped_first):
 
 
 def test_stepping_collector_returns_entries_of_the_same_types():
-    one, other = make().collect(), make(acceleration="direct").collect()
+    one, other = make().collect(), make(compiled=False).collect()
     assert {*one.keys(True, True)} == {*other.keys(True, True)}
     for key in one.keys(True, True):
         assert one[key].dtype == other[key].dtype and one[key].shape[1:] == other[key].shape[1:]
@@ -170,9 +165,9 @@ def test_batches_do_not_depend_on_the_number_of_cores(how):
 def test_greedy_episodes_do_not_depend_on_the_split_into_launches(monkeypatch):
     with set_exploration_type(DETERMINISTIC):
         whole = make()
-        monkeypatch.setattr(fused_collector, "_MAX_STEPS", 2)
+        monkeypatch.setattr(fused_episodes, "_MAX_STEPS", 2)
         parts = make()
-        assert parts.source._length == 2
+        assert parts.fused._length == 2
         for _ in range(2):
             expected, found = whole.collect(), parts.collect()
             assert torch.bincount(found["collector", "traj_ids"]).max() > 4
@@ -235,10 +230,8 @@ def test_log_states_why_a_collector_is_not_fused(how, reason):
     if collector is None:
         channels = 3 if how["transforms"] == (RgbPixels,) else 1
         collector = make(network=SmallCNN((channels, 18 if channels == 1 else 25, 64), 3), **how)
-    assert reason in collector.source.name and collector.source.name.startswith("direct collector")
-    stepping = make(transforms=(GrayPixels, StandardizePixels, RewardSum))
-    assert stepping.source.name == "stepping collector: transform RewardSum is not fused"
-    assert make().source.name == "fused collector"
+    assert reason in collector.name and collector.name.startswith("stepping collector: ")
+    assert make().name == "fused collector"
 
 
 def test_resuming_from_a_state_gives_the_same_batches():
@@ -255,10 +248,9 @@ def test_resuming_from_a_state_gives_the_same_batches():
 
 
 def test_other_renderers_fall_back():
-    env = with_transforms(DroneEnv(2, SHORT, renderer="mujoco_warp"), [GrayPixels()])
+    env = DroneEnv(2, SHORT, renderer="mujoco_warp", transforms=[GrayPixels()])
     actor = make_actor(SmallCNN((1, 25, 64), 3), env.action_spec)
-    source = EpisodeCollector(env, actor, acceleration="fused").source
-    assert isinstance(source, DirectCollector) and "WarpRenderer on cpu" in str(source.reasons)
+    assert "WarpRenderer on cpu" in EpisodeCollector(env, actor, compiled=True).name
     env.close()
 
 
@@ -281,11 +273,11 @@ def test_shutdown_ends_the_threads():
 @pytest.mark.parametrize("visibility", [30.0, (10.0, 30.0)])
 def test_environments_with_fog_fall_back(visibility):
     look = AppearanceSettings(fog_visibility=visibility)
-    env = with_transforms(DroneEnv(3, SHORT, appearance=look), [GrayPixels(), StandardizePixels()])
+    env = DroneEnv(3, SHORT, appearance=look, transforms=[GrayPixels(), StandardizePixels()])
     network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,))
     actor = make_actor(network, env.action_spec, torch.Generator().manual_seed(0))
-    collector = EpisodeCollector(env, actor, acceleration="fused")
-    assert isinstance(collector.source, DirectCollector | SteppingCollector)
+    collector = EpisodeCollector(env, actor, compiled=True)
+    assert "visual randomization" in collector.name or "effects" in collector.name
     batch, plain = collector.collect(), make(num_envs=3).collect()
     assert batch["next", "done"].sum() == 3
     assert batch["pixels"][0].mean() > plain["pixels"][0].mean()  # fog is bright
@@ -294,13 +286,13 @@ def test_environments_with_fog_fall_back(visibility):
 def test_kernel_ends_the_episode_of_a_lost_drone():
     """One of five drones is lost from the start."""
     collector = make(dynamics=Quadrotor(FLYING))
-    begin = collector.source._rules.begin
+    begin = collector.fused._rules.begin
 
     def lose(state):
         state.body.numbers[2, LOST] = 1.0
         begin(state)
 
-    collector.source._rules.begin = lose
+    collector.fused._rules.begin = lose
     batch = collector.collect()
     lengths = batch["collector", "traj_ids"].bincount()
     assert lengths[2] == 1 and (lengths[[0, 1, 3, 4]] > 1).all()
@@ -310,7 +302,7 @@ def test_kernel_ends_the_episode_of_a_lost_drone():
 @pytest.mark.parametrize(("shape", "num_actions"), [((1, 25, 32), 3), ((1, 25, 64), 5)])
 def test_networks_for_other_frames_or_actions_are_not_fused(shape, num_actions):
     collector = make(network=SmallCNN(shape, num_actions))
-    assert "outputs is not fused with frames of (1, 25, 64) and 3 outputs" in collector.source.name
+    assert "outputs is not fused with frames of (1, 25, 64) and 3 outputs" in collector.name
 
 
 def make_buffer(num_rows=4):
@@ -356,16 +348,16 @@ class TestRecordedActivations:
     def episodes(self):
         """Collector whose kernel records, the fused network that reads, and torch's network."""
         collector = make(num_envs=4)
-        assert isinstance(collector.source, FusedCollector)
+        assert isinstance(collector.fused, FusedEpisodes)
         network = collector.actor.network
-        activations = collector.source.activations
+        activations = collector.fused.activations
         return collector, FusedNetwork.try_create(network, 1, activations=activations), network
 
     @staticmethod
     def recorded(episodes, pixels):
         """Logits of the fused network after the recorded ones were replaced by 7."""
         collector, fused, _ = episodes
-        collector.source.activations.outputs.fill_(7)
+        collector.fused.activations.outputs.fill_(7)
         return fused(pixels).unique().tolist() == [7]
 
     def test_gradients_of_a_batch_equal_torch(self, episodes):

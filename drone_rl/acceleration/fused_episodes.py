@@ -1,4 +1,4 @@
-"""Collects complete episodes in one fused kernel, without Python between their steps.
+"""Runs complete episodes in one fused kernel, without Python between their steps.
 
 Stepping in Python takes most of the time: a small network is evaluated on a frame in ten
 microseconds, and a frame is rendered in as many.
@@ -15,9 +15,8 @@ from torchrl.envs.utils import ExplorationType
 
 from drone_rl.acceleration import rollout_kernel
 from drone_rl.acceleration.activations import ActivationRecorder
-from drone_rl.acceleration.direct_collector import DirectCollector
-from drone_rl.acceleration.packed_layers import PackedNetwork, unsupported
-from drone_rl.envs.direct_renderer import DirectRenderer, Entries, Reasons
+from drone_rl.acceleration.packed_layers import PackedNetwork, Reasons, unsupported
+from drone_rl.envs import DroneEnv, Observer
 from drone_rl.envs.transforms import CropRows, StandardizePixels
 from drone_rl.policies.actor import CategoricalActor
 from drone_rl.policies.networks import require_finite
@@ -33,44 +32,41 @@ _MAX_ACTIVATIONS = 2**24
 """Maximum number of recorded activations: 64 MiB."""
 
 
-class FusedCollector:
-    """Collect complete episodes; renderer, network and task run in one kernel.
+class FusedEpisodes:
+    """Run complete episodes; renderer, network and task run in one kernel.
 
     The kernel steps a copy of the environments: their own state stays that of the reset.
     """
 
-    implementation = "fused kernel"
-    name = "fused collector"
-    reasons = Reasons()
-
     def __init__(
         self,
-        direct: DirectCollector,
+        env: DroneEnv,
+        actor: CategoricalActor,
+        keeps_inputs: bool,
         network: PackedNetwork,
         rules: Any,
         num_threads: int,
     ) -> None:
-        self._direct, actor = direct, direct.actor
-        assert isinstance(actor, CategoricalActor)
-        self._actor = actor
-        renderer = self._renderer = direct.renderer
+        """Build the kernel; see `try_create`."""
+        self._env, self._actor, self._keeps_inputs = env, actor, keeps_inputs
         self._network, self._rules = network, rules
-        count, view = renderer.worlds.num_envs, renderer.view
+        worlds, view = env.worlds, env.observer.view
+        count = worlds.num_envs
         self._workers = WorkerPool(count, num_threads)
-        raytracer: Any = renderer.worlds.renderer
+        raytracer: Any = worlds.renderer
         camera: Any = rollout_kernel.CameraView()
         inputs = raytracer.kernel_inputs(view, self._workers.size)
         camera.view, camera.geoms, camera.materials, camera.scratch = inputs
         camera.poses = rules.poses
-        camera.mean, camera.deviation = _mean_and_deviation(renderer)
+        camera.mean, camera.deviation = _mean_and_deviation(env.observer)
         self._camera = camera
-        self._rows = _cropped_rows(renderer)
+        self._rows = _cropped_rows(env.observer)
         shape = (self._workers.size, network.workspace_size)
         self._workspaces = wp.empty(shape, dtype=float, device="cpu")
         pixels = view.height * view.width
         self._length = max(1, min(_MAX_STEPS, _MAX_PIXELS // (count * pixels)))
         self._num_rows = rows = count * self._length
-        num_actions = renderer.worlds.dynamics.actions.num_outputs
+        num_actions = worlds.dynamics.actions.num_outputs
         self._buffer = RolloutBuffer(
             {
                 "pixels": torch.empty(rows, 1, view.height, view.width),
@@ -90,43 +86,48 @@ class FusedCollector:
         load_kernels(self._kernel.module)
 
     @classmethod
-    def try_create(cls, direct: DirectCollector, num_threads: int) -> Self | Reasons:
-        """Return the fused form of a collector, or the reasons why it is not supported."""
-        reasons = [*_not_fused(direct.renderer), *_not_fused_policy(direct)]
-        worlds = direct.renderer.worlds
+    def try_create(
+        cls, env: DroneEnv, actor: Any, keeps_inputs: bool, num_threads: int
+    ) -> Self | Reasons:
+        """Return the kernel for an actor, or the reasons why it is not supported.
+
+        Args:
+            env: The environments.
+            actor: The policy.
+            keeps_inputs: Whether batches have what the actor reads and writes.
+            num_threads: Threads of the kernel; no result depends on it.
+        """
+        reasons = [*_not_fused(env), *_not_fused_policy(env, actor)]
+        worlds = env.worlds
         rules = worlds.task.fused_rules(worlds.dynamics, worlds.num_envs)
         if rules is None:
             names = f"{type(worlds.task).__name__} with {type(worlds.dynamics).__name__}"
             reasons.append(f"task {names} is not fused")
         if reasons or rules is None:
             return Reasons(reasons)
-        actor: Any = direct.actor
-        first_pixel = _cropped_rows(direct.renderer).start * direct.renderer.view.width
+        first_pixel = _cropped_rows(env.observer).start * env.observer.view.width
         network = PackedNetwork(actor.network, int(rollout_kernel.TOGETHER), first_pixel)
-        return cls(direct, network, rules, num_threads)
+        return cls(env, actor, keeps_inputs, network, rules, num_threads)
 
-    def collect(self, num_envs: int) -> TensorDictBase:
-        """Run an episode in each of the first environments; traj_ids are 0 to `num_envs` - 1."""
+    def run(self, num_envs: int) -> TensorDictBase | None:
+        """Run an episode in each of the first environments, which have just started.
+
+        Returns:
+            A batch as `EpisodeCollector`'s, whose traj_ids are 0 to `num_envs` - 1; None if actions
+            are chosen in another way than by sampling or greedily.
+        """
         if self._actor.exploration not in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC):
-            return self._direct.collect(num_envs)
+            return None
         load_kernels(self._kernel.module).result()
-        self._renderer.env.start()
-        state: Any = self._renderer.worlds.state
+        state: Any = self._env.worlds.state
         self._rules.begin(state)
         self.activations.recording = None
         self._network.update()
         env_of_step, logged = self._run(num_envs)
-        for name in ("action", "end_reason"):
-            logged[name] = logged[name].long()
-        if self._renderer.needs_info:
-            entries = self._replay(env_of_step, logged)
-        else:
-            entries = self._renderer.flags(logged["reward"], logged["end_reason"])
+        logged["action"] = logged["action"].long()
+        outcome = self._env.outcome(logged.pop("end_reason").long(), logged.pop("reward"))
         batch = TensorDict({}, [len(env_of_step)])
-        for key in ("pixels", "logits", "action"):
-            if key in logged:
-                batch.set(key, logged[key])
-        for key, value in entries.items():
+        for key, value in {**logged, **outcome}.items():
             batch.set(key, value)
         return batch.set(("collector", "traj_ids"), env_of_step)
 
@@ -137,7 +138,7 @@ class FusedCollector:
     def _run(self, num_envs: int) -> tuple[Tensor, dict[str, Tensor]]:
         """Return the environment of each step, episode after episode, and what the kernel wrote."""
         taken, end_reasons = self._rules.steps[:num_envs], self._rules.end_reasons[:num_envs]
-        is_observed = self._direct.keep_actor_entries
+        is_observed = self._keeps_inputs
         seen = ("pixels", "logits") if is_observed else ()
         names, parts = ("action", "reward", "end_reason", *seen), []
         while not (parts and bool(end_reasons.all())):
@@ -150,7 +151,7 @@ class FusedCollector:
         order = envs.argsort(stable=True)
         envs, rows = envs[order], rows[order]
         logged = self._buffer.read(rows, names)
-        if is_observed and self._rows != slice(0, self._renderer.view.height):
+        if is_observed and self._rows != slice(0, self._env.observer.view.height):
             logged["pixels"] = logged["pixels"][..., self._rows, :].contiguous()
         if is_observed:
             self.activations.record(rows, self._network.weights, logged["pixels"])
@@ -188,52 +189,35 @@ class FusedCollector:
         rows = is_step.flatten().nonzero()[:, 0]
         return rows // self._length, rows
 
-    def _replay(self, env_of_step: Tensor, logged: Mapping[str, Tensor]) -> Entries:
-        """Compute the kept entries by the task's batched step; nothing is rendered again."""
-        worlds = self._renderer.worlds
-        lengths = env_of_step.bincount()
-        first = lengths.cumsum(0) - lengths
-        state, going, entries = worlds.state, torch.arange(len(lengths)), Entries()
-        state = state if len(state) == len(going) else state[going]
-        for step in range(int(lengths.max())):
-            is_running = lengths[going] > step
-            if not bool(is_running.all()):
-                state, going = state[is_running], going[is_running]
-            rows = first[going] + step
-            state, reward = worlds.advance(state, logged["action"][rows])
-            for key, value in self._renderer.entries(state, reward)[0].items():
-                if step == 0:
-                    entries[key] = value.new_empty(len(env_of_step), *value.shape[1:])
-                entries[key].index_copy_(0, rows, value)
-        return entries
 
-
-def _mean_and_deviation(renderer: DirectRenderer) -> tuple[float, float]:
+def _mean_and_deviation(observer: Observer) -> tuple[float, float]:
     """Return what the kernel subtracts from gray pixels, and then divides them by."""
-    for transform in renderer.after:
+    for transform in observer.pipeline.transforms:
         if type(transform) is StandardizePixels:
             return transform.mean, transform.std
     return 0.0, 1.0
 
 
-def _cropped_rows(renderer: DirectRenderer) -> slice:
+def _cropped_rows(observer: Observer) -> slice:
     """Return the rows of rendered frames that the policy sees."""
-    for transform in renderer.after:
+    for transform in observer.pipeline.transforms:
         if type(transform) is CropRows:
             return slice(transform.top, transform.bottom)
-    return slice(0, renderer.view.height)
+    return slice(0, observer.view.height)
 
 
-def _not_fused(renderer: DirectRenderer) -> list[str]:
+def _not_fused(env: DroneEnv) -> list[str]:
     """Return reasons against fusing the renderer, the appearance or the transforms."""
-    worlds, reasons = renderer.worlds, []
+    worlds, reasons = env.worlds, []
     if type(worlds.renderer) is not Raytracer or worlds.renderer.device.type != "cpu":
         device = worlds.state.end_reason.device.type
         reasons.append(f"renderer {type(worlds.renderer).__name__} on {device} is not fused")
-    if renderer.view.modalities != ("gray",):
+    if type(env) is not DroneEnv:
+        reasons.append(f"environment {type(env).__name__} is not fused")
+    if env.observer.view.modalities != ("gray",):
         reasons.append("frames that are not gray are not fused")
-    fusable = [CropRows, StandardizePixels]
-    for transform in renderer.after:
+    fusable: list[type] = [CropRows, StandardizePixels]
+    for transform in env.observer.pipeline.transforms:
         if type(transform) in fusable:
             fusable.remove(type(transform))
         else:
@@ -243,15 +227,15 @@ def _not_fused(renderer: DirectRenderer) -> list[str]:
     return reasons
 
 
-def _not_fused_policy(direct: DirectCollector) -> list[str]:
+def _not_fused_policy(env: DroneEnv, actor: Any) -> list[str]:
     """Return reasons against fusing the actor."""
-    if type(direct.actor) is not CategoricalActor:
-        return [f"policy {type(direct.actor).__name__} is not fused"]
-    network, renderer = direct.actor.network, direct.renderer
+    if type(actor) is not CategoricalActor:
+        return [f"policy {type(actor).__name__} is not fused"]
+    network = actor.network
     if reasons := unsupported(network):
         return reasons
-    rows, num_actions = _cropped_rows(renderer), renderer.worlds.dynamics.actions.num_outputs
-    shape = (1, rows.stop - rows.start, renderer.view.width)
+    rows, num_actions = _cropped_rows(env.observer), env.worlds.dynamics.actions.num_outputs
+    shape = (1, rows.stop - rows.start, env.observer.view.width)
     if (network.in_shape, network.num_actions) != (shape, num_actions):
         return [
             f"a network from {network.in_shape} to {network.num_actions} outputs is not fused "

@@ -1,0 +1,85 @@
+"""What policies see: rendering, transforms, and memory of each environment."""
+
+import pytest
+import torch
+from torchrl.envs import CatFrames, Compose, TransformedEnv
+
+from drone_rl.config import CameraSettings, TaskSettings
+from drone_rl.envs import (
+    CropRows,
+    DroneEnv,
+    GrayPixels,
+    Noise,
+    Pipeline,
+    Resize,
+    RgbPixels,
+    StandardizePixels,
+)
+from drone_rl.envs.fault_models import late_frames
+from drone_rl.envs.observer import Observer, Stage
+
+SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
+
+
+class Dark(GrayPixels):
+    """A subclass, which may transform images differently."""
+
+
+@pytest.mark.parametrize(
+    ("first", "modality"), [(GrayPixels(), "gray"), (RgbPixels(), "rgb"), (Dark(), "rgb")]
+)
+def test_observations_equal_transformed_images(first, modality):
+    """Gray is rendered directly, with the same result as from colors."""
+    transforms = [first, CropRows(5, 25), StandardizePixels()]
+    env = DroneEnv(3, SHORT, transforms=transforms)
+    assert env.observer.view.modalities == (modality,)
+    plain = TransformedEnv(DroneEnv(3, SHORT), Compose(*transforms))
+    assert torch.equal(env.reset()["pixels"], plain.reset()["pixels"])
+    assert env.observation_spec["pixels"].shape == plain.observation_spec["pixels"].shape
+
+
+@pytest.mark.parametrize(("size", "kept"), [((25, 64), 1), ((13, 32), 2), ((50, 128), 2)])
+def test_resize_to_the_camera_size_is_skipped(size, kept):
+    camera = CameraSettings(height=size[0], width=size[1])
+    transforms = [GrayPixels(), Resize(height=25, width=64), StandardizePixels()]
+    env = DroneEnv(2, SHORT, camera, transforms=transforms)
+    steps = [type(t) for t in env.observer.pipeline.transforms]
+    assert steps == [Resize, StandardizePixels][-kept:]
+    assert env.reset()["pixels"].shape == (2, 1, 25, 64)
+
+
+def numbers(*values):
+    return torch.tensor(values, dtype=torch.float32).reshape(-1, 1, 1, 1)
+
+
+def test_stacks_repeat_the_first_frame_of_each_environment():
+    pipeline = Pipeline([CatFrames(3, -3, in_keys=["pixels"])])
+    assert pipeline(numbers(1, 2))[:, :, 0, 0].tolist() == [[1, 1, 1], [2, 2, 2]]
+    assert pipeline(numbers(3, 4), starts=False)[:, :, 0, 0].tolist() == [[1, 1, 3], [2, 2, 4]]
+    mixed = pipeline(numbers(5, 6), starts=torch.tensor([True, False]))
+    assert mixed[:, :, 0, 0].tolist() == [[5, 5, 5], [2, 4, 6]]
+    assert pipeline(numbers(7), torch.tensor([1]), False)[0, :, 0, 0].tolist() == [4, 6, 7]
+    again = pipeline(numbers(0, 0), starts=None)
+    assert again[:, :, 0, 0].tolist() == [[5, 5, 5], [4, 6, 7]]
+    frames = [numbers(n) for n in (1, 2)]
+    assert pipeline.of_frames(frames)[0, :, 0, 0].tolist() == [1, 1, 2] and pipeline.earlier == 2
+
+
+def test_faults_need_random_streams():
+    images = torch.rand(2, 1, 4, 4)
+    assert torch.equal(Pipeline([Noise(0.5)])(images), images)
+
+
+def test_faults_of_an_evaluation_act_before_the_transforms():
+    """Colors arrive one step late, at a policy that takes the camera's bytes, too."""
+    env = DroneEnv(1, SHORT)
+    env.reset()
+    worlds = env.worlds
+    state, rows = worlds.state, torch.tensor([0])
+    moved, _ = worlds.advance(state, torch.tensor([0]))
+    for transforms in ((), (RgbPixels(),), (GrayPixels(),)):
+        seen = Observer(worlds, transforms).observe(state, rows, True, None)["pixels"]
+        late = Observer(worlds, transforms, faults=Pipeline(stages=[Stage(late_frames(1))]))
+        assert torch.equal(late.observe(state, rows, True, None)["pixels"], seen)
+        assert torch.equal(late.observe(moved, rows, False, None)["pixels"], seen)
+        assert not torch.equal(late.observe(moved, rows, False, None)["pixels"], seen)
