@@ -26,6 +26,6 @@ def test_train_save_judge_and_explain(example, tmp_path, capsys, monkeypatch):
     assert "episodes are too few to be certain" in verdict
     page = Path(report).read_text()
     assert (
-        "Grad-CAM of layer policy.features_extractor.cnn.5" in page
+        "of layer policy.features_extractor.cnn.5" in page
     )  # the nonlinearity after the last convolution
     assert "What is left out" not in page
