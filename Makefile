@@ -49,9 +49,8 @@ format: $(STAMP)
 bench: $(STAMP)
 	$(BIN)/drone-rl bench
 
-# Generate comments in conf/ and tables of README.md and docs/; with the newest figures; list outdated figures.
+# Generate tables of README.md and docs/; with the newest figures; list outdated figures.
 readme: $(STAMP)
-	@$(BIN)/python -m tools.conf
 	@$(BIN)/python -m tools.readme
 keep: $(STAMP)
 	@$(BIN)/python -m tools.readme keep

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from benchmarks.benchmark import Setup
@@ -11,6 +12,7 @@ from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.trust.axes import AXES, Axis
 from drone_rl.trust.coverage import Coverage, compare_with_required, find_domain, recheck_domain
 from drone_rl.trust.shifts import shifts
+from drone_rl.trust.shifts_results import Range
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import root_seed
 
@@ -44,9 +46,9 @@ def bench_domain_axes(setup: Setup) -> dict[str, Any]:
     result.save(folder)
     saved = find_domain(policy, folder)
     stated = compare_with_required(policy, folder / "domain.yaml", saved)
-    wrong = {name: [*_problems(policy, saved, stated, name)] for name in result.numbers["axes"]}
+    wrong = {name: [*_problems(policy, saved, stated, name)] for name in result.axes}
     flights = JudgeSettings(domain_flights=20 if setup.quick else 100)
-    recheck = recheck_domain(policy, stated.needs, result.numbers, flights, root_seed(None))
+    recheck = recheck_domain(policy, stated.needs, result, flights, root_seed(None))
     return {
         "domain_axes": len(wrong),
         "domain_axes_right": sum(not problems for problems in wrong.values()),
@@ -59,15 +61,15 @@ def _problems(policy: Policy, saved: Any, stated: Coverage, name: str) -> Iterat
     """Yield what is wrongly accepted or refused on an axis."""
     if name not in stated.needs or name in stated.lacking:
         yield "the program's own file is refused"
-    path = saved.path.with_name("needs.json")
-    for need, is_inside in _ranges(policy, saved.numbers["domain"]["ranges"][name], name):
+    path = Path(saved.path).with_name("needs.json")
+    for need, is_inside in _ranges(policy, saved.ranges[name], name):
         path.write_text(json.dumps({name: need}))
         if compare_with_required(policy, path, saved).is_stated != is_inside:
             yield f"{need} is {'refused' if is_inside else 'accepted'}"
 
 
 def _ranges(
-    policy: Policy, measured: Mapping[str, Any], name: str
+    policy: Policy, measured: Range, name: str
 ) -> Iterator[tuple[Mapping[str, float | str], bool]]:
     """Yield ranges that end near each limit, and whether they are inside."""
     subject: Any = policy.description  # has the task, camera and appearance that axes need
@@ -75,9 +77,9 @@ def _ranges(
     if axis.own is not None:
         axis = dataclasses.replace(axis, neutral=axis.own(subject))
     for end, sign in axis.signs.items():
-        if measured["positions"] is None or measured[f"{end}_open"] is None:
+        if measured.positions is None or getattr(measured, f"{end}_open") is None:
             continue  # this side was not measured
-        limit = measured["positions"][0 if sign < 0 else 1]
+        limit = measured.positions[0 if sign < 0 else 1]
         for is_inside in (True, False):
             value = axis.value(_near(axis, limit, sign, is_inside), subject)
             if abs(value) < float("inf"):

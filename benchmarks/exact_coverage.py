@@ -20,6 +20,7 @@ from drone_rl.training import Callback
 from drone_rl.training.callbacks import OngoingTraining
 from drone_rl.training.train import train
 from drone_rl.trust.verdict import judge_policy
+from drone_rl.utils.intervals import Share
 from drone_rl.utils.progress import silent
 from drone_rl.verification.prove import prove
 
@@ -46,9 +47,9 @@ class Truth:
         """Whether the success rate is far enough from 0 and 1 to test an interval."""
         return TRIVIAL < self.success < 1 - TRIVIAL
 
-    def is_covered(self, interval: Mapping[str, float]) -> bool:
+    def is_covered(self, interval: Share) -> bool:
         """Return whether an interval can contain the success rate."""
-        low, high = interval["lower95"], interval["upper95"]
+        low, high = interval.lower95, interval.upper95
         return low <= self.success + self.undecided and self.success <= high
 
 
@@ -103,14 +104,12 @@ def _reason_to_leave_out(truth: Truth, earlier: list[float]) -> str | None:
     return "as another" if any(abs(truth.success - e) <= UNDECIDED for e in earlier) else None
 
 
-def _intervals(
-    policy: Policy, seed: int, repeats: int, episodes: int
-) -> Iterator[Mapping[str, float]]:
+def _intervals(policy: Policy, seed: int, repeats: int, episodes: int) -> Iterator[Share]:
     """Yield the success intervals of verdicts, each from other environments."""
     with policy.flying(episodes, seed=seed) as (env, actor):
         for _ in range(repeats):  # random streams continue, so verdicts share no environment
             verdict = judge_policy(env, actor, episodes, sampled=False)
-            yield verdict.evidence["greedy"]["success"]
+            yield verdict.greedy.success
 
 
 def _policies(folder: Path, quick: bool) -> Iterator[tuple[str, Policy]]:

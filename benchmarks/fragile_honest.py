@@ -27,12 +27,13 @@ def bench_fragile_honest(setup: Setup) -> dict[str, Any]:
         train(run, f"seed={seed}")
         policies.append(load_policy(run))
     settings = JudgeSettings(sampled=False, episodes=50 if setup.quick else 400)
-    roundings = [
-        judge(policy, settings, progress=silent).verdict.evidence["rounding"] for policy in policies
-    ]
+    checks = (judge(policy, settings, progress=silent).rounding for policy in policies)
+    roundings = [check for check in checks if check is not None]
     return {
-        "fragile_honest": sum(rounding["decides"] for rounding in roundings),
+        "fragile_honest": sum(rounding.decides for rounding in roundings),
         "fragile_honest_total": len(roundings),
-        "fragile_frames_most": max(rounding["fragile_rate"] for rounding in roundings),
-        "fragile_episodes_most": max(rounding["fragile_episodes_rate"] for rounding in roundings),
+        "fragile_frames_most": max(rounding.fragile_rate for rounding in roundings),
+        "fragile_episodes_most": max(
+            rounding.fragile_episodes / rounding.episodes for rounding in roundings
+        ),
     }

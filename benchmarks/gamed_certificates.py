@@ -18,6 +18,7 @@ from drone_rl.trust.domain import Prober
 from drone_rl.trust.judge import judge
 from drone_rl.trust.paired_evaluation import PairedEvaluator
 from drone_rl.trust.shifts import make_evaluated_policy, shifts
+from drone_rl.trust.shifts_results import Domain, Probe
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.verification.checker.checker import Simulator
@@ -108,7 +109,7 @@ def certificate_of(
         "undecided": {"share": share_undecided, "boxes": list(undecided)},
         "finished": finished,
         "stated": {"logit_gap": 1e-4, "largest_band": 1e-5, "renderer": "Raytracer"},
-        "found": {"least_gap": 0.0, "pictures": 1, "states": 1, "seconds": 1.0},
+        "found": {"least_gap": 0.0, "pictures": 1, "states": 1, "most_boxes": 1, "seconds": 1.0},
     }
 
 
@@ -149,7 +150,8 @@ def forged_shifts(policy: Policy, folder: Path) -> dict[str, Any]:
     (axis,) = find_axes([_AXIS], subject)
     with closing(PairedEvaluator(subject, 1, data["settings"]["seed"])) as evaluator:
         prober = _ForgedProber(evaluator)
-        data["domain"] = {"plain": prober.plain, "ranges": {_AXIS: prober.search(axis)}}
+        domain = Domain(plain=prober.plain, ranges={_AXIS: prober.search(axis)})
+        data["domain"] = domain.model_dump(mode="json")
     return data
 
 
@@ -160,10 +162,9 @@ class _ForgedProber(Prober):
         self._evaluator = evaluator
         self.plain = self.probe(None, 0.0)
 
-    def probe(self, condition: Any, part: float) -> dict[str, Any]:
+    def probe(self, condition: Any, part: float) -> Probe:
         """See `Prober`."""
-        counts = {"success": 1.0, "fragile": 0, "worst": None}
-        return {"good": True, "bad": False, "refused": None, **counts}
+        return Probe(good=True, success=1.0)
 
 
 def _copy_shipped(name: str, folder: Path) -> Policy:

@@ -198,7 +198,7 @@ def _verdict(make: Callable[[], BasePolicy | Path], seed: int | None) -> bool:
 
 def _evaluation(make: Callable[[], BasePolicy | Path], seed: int | None) -> bool:
     done = evaluate(make(), episodes=EPISODES, baselines=False, seed=seed, progress=silent)
-    return done.figures["greedy"]["success"]["lower95"] > _GOOD
+    return done.greedy.success.lower95 > _GOOD
 
 
 def _conditions(make: Callable[[], BasePolicy | Path], seed: int | None) -> bool:
@@ -212,7 +212,7 @@ def _conditions(make: Callable[[], BasePolicy | Path], seed: int | None) -> bool
         seed=seed,
         progress=silent,
     )
-    return bool(done.numbers["domain"]["plain"]["good"])
+    return done.domain is not None and done.domain.plain.good
 
 
 def judgements(folder: Path) -> dict[str, Judgement]:

@@ -79,7 +79,7 @@ def in_domain(path: Path) -> bool:
     """Return whether `shifts` finds a policy good without perturbation."""
     few: dict[str, Any] = {"axes": ["noise"], "strengths": [1], "modes": ["constant"]}
     result = shifts(path, episodes=1, domain_episodes=200, progress=silent, **few)
-    return bool(result.numbers["domain"]["plain"]["good"])
+    return result.domain is not None and result.domain.plain.good
 
 
 def widened() -> tuple[dict[str, Any], dict[str, Tensor]]:

@@ -6,7 +6,6 @@ default, and to a kind of shift if it is exposed to one of its axes.
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs.rollout import Agent
 from drone_rl.trust.agents import OracleAgent, PolicyAgent
@@ -68,7 +67,7 @@ def changed(settings: TrainSettings) -> set[str]:
     Returns:
         Names such as appearance.exposure; transforms without settings, as in transforms.noise.
     """
-    default, config = (as_config(s) for s in (TrainSettings(), settings))
+    default, config = (s.config() for s in (TrainSettings(), settings))
     return {
         f"{part}.{name}"
         for part in _PARTS

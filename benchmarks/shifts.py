@@ -25,7 +25,7 @@ def bench_shifts(setup: Setup) -> dict[str, Any]:
     seconds = time.perf_counter() - begin
     figures = {
         "shift_suite_s": seconds,
-        "shift_suite_axes": len(suite.numbers["axes"]),
+        "shift_suite_axes": len(suite.axes),
         "shift_area": suite.area,
     }
     if not setup.quick:

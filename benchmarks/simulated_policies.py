@@ -59,9 +59,9 @@ class SimulatedPolicy:
         values, thresholds = self.observed[quantity], _RULE.thresholds[quantity]
         defined = ~np.isnan(values)
         if not self.shares[defined].sum():
-            return Quantity(None, 0.0, 1.0, thresholds)
+            return Quantity(value=None, lower=0.0, upper=1.0, thresholds=thresholds)
         mean = float(np.average(values[defined], weights=self.shares[defined]))
-        return Quantity(mean, mean, mean, thresholds)
+        return Quantity(value=mean, lower=mean, upper=mean, thresholds=thresholds)
 
 
 def policies() -> dict[str, SimulatedPolicy]:

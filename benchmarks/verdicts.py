@@ -20,6 +20,7 @@ from drone_rl.collectors.complete_episodes import CompleteEpisodes, rollout
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.trust.baselines import BASELINES, run_baselines
+from drone_rl.trust.results import Verdict
 from drone_rl.trust.rule import VerdictKind
 from drone_rl.trust.verdict import apply_rule
 from drone_rl.utils.exit_codes import NOT_CERTAIN
@@ -73,14 +74,14 @@ def _sizes(quick: bool) -> tuple[int, int]:
 
 def _judge_script(script: Script, quick: bool) -> dict[str, Any]:
     few, many = (_verdict(script, n, seed) for seed, n in enumerate(_sizes(quick)))
-    return {"kind": few["kind"], "certain": few["certain"], "is": many["kind"]}
+    return {"kind": few.kind.value, "certain": few.certain, "is": many.kind.value}
 
 
-def _verdict(script: Script, episodes: int, seed: int) -> dict[str, Any]:
+def _verdict(script: Script, episodes: int, seed: int) -> Verdict:
     task = script.settings
     env = _make_env(task, seed)
     policy = ScriptedPolicy(script, torch.Generator().manual_seed(seed))
-    return apply_rule(rollout(policy, env, episodes), _baselines(task, episodes, seed)).as_dict()
+    return apply_rule(rollout(policy, env, episodes), _baselines(task, episodes, seed))
 
 
 @functools.cache

@@ -79,7 +79,6 @@ if TYPE_CHECKING:
     from drone_rl.training.train import train as train
     from drone_rl.trust.bodies import Bodies as Bodies
     from drone_rl.trust.bodies import bodies as bodies
-    from drone_rl.trust.coverage import Coverage as Coverage
     from drone_rl.trust.evaluate import Evaluation as Evaluation
     from drone_rl.trust.evaluate import evaluate as evaluate
     from drone_rl.trust.judge import Judgement as Judgement
@@ -88,6 +87,7 @@ if TYPE_CHECKING:
     from drone_rl.trust.onnx_export import export_onnx as export_onnx
     from drone_rl.trust.shifts import Shifts as Shifts
     from drone_rl.trust.shifts import shifts as shifts
+    from drone_rl.trust.shifts_results import Coverage as Coverage
     from drone_rl.utils.errors import InputError as InputError
     from drone_rl.verification.chances import Chances as Chances
     from drone_rl.verification.chances import chances as chances

@@ -18,11 +18,11 @@ from drone_rl.config import TASKS
 
 @contextlib.contextmanager
 def composing_fast() -> Iterator[None]:
-    """Keep parsed files of conf/, parsed overrides and registered schemas while unchanged."""
+    """Keep parsed files of conf/, parsed overrides and stored defaults while unchanged."""
     with pytest.MonkeyPatch.context() as patch:
         _keep_files(patch)
         _keep_overrides(patch)
-        _keep_schemas(patch)
+        _keep_defaults(patch)
         yield
 
 
@@ -54,13 +54,12 @@ def _keep_overrides(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(OverridesParser, "parse_rule", parse_once)
 
 
-def _keep_schemas(patch: pytest.MonkeyPatch) -> None:
-    register, kept = composition.register_schemas, {}
+def _keep_defaults(patch: pytest.MonkeyPatch) -> None:
+    register, kept = composition.store_defaults, {}
 
     def register_once(commands):
         parts = [*composition.PARTS.values(), *composition.SEVERAL.values()]
-        variants = [v for part in parts for v in part.variants()]
-        known = [*TASKS.values(), *composition.GROUPS.values(), *variants]
+        known = [*TASKS.values(), *(v for part in parts for v in part.registry.values())]
         state = tuple((id(cls), cls.__qualname__) for cls in known)
         if state not in kept:
             kept.clear()
@@ -69,6 +68,6 @@ def _keep_schemas(patch: pytest.MonkeyPatch) -> None:
             register(commands)
             done.update(commands)
 
-    patch.setattr(composition, "register_schemas", register_once)
-    # Hydra copies the store of all schemas for every command, but changes only copies of its nodes.
+    patch.setattr(composition, "store_defaults", register_once)
+    # Hydra copies the store for every command, but changes only copies of its nodes.
     patch.setattr(ConfigStore, "__deepcopy__", lambda store, memo: store, raising=False)

@@ -85,4 +85,4 @@ def registered():
     parts = []
     yield lambda part: parts.append(part) or part
     for part in parts:
-        del part.Settings.target
+        part.Settings.registry.pop(part.Settings.name, None)

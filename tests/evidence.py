@@ -115,49 +115,6 @@ PROOF: Plain = {
 """Entries of a verdict about a certificate of success from every placement."""
 
 
-_OF_SIX = {"certain": 4, **_share(6, 6, 0.5, 1.0)}
-GROUP: Plain = {
-    "ended": 6,
-    "failed": 0,
-    "damaged": 0,
-    "unfinished": 1,
-    "judged": 5,
-    "solved": _share(5, 6, 0.4, 1.0),
-    "frames_to_solve": {"more_than": None},
-    "verdicts": {"good": {**_OF_SIX, "successes": 5}},
-}
-"""Results of one setting of a sweep."""
-_RUN = {"state": "finished", "verdict": "good", "certain": True, "entropy": 0.5}
-SWEEP: Plain = {
-    "finished": 6,
-    "failed": 1,
-    "damaged": 1,
-    "unfinished": 1,
-    "judged": 5,
-    "certain": 4,
-    "judged_by_older_rule": 1,
-    "never_judged": 1,
-    "judge_command": "drone-rl sweep-report",
-    "error_rates": [0.05],
-    "episodes": [200],
-    "sides_not_offered": 1,
-    "best": {
-        "run": 3, "verdict": "good", "certain": True, "share": 0.99, "episodes": 200,
-        "report_command": "drone-rl verdict",
-    },
-    "groups": [
-        GROUP,
-        {**GROUP, "ended": 3, "solved": {"successes": 0}, "frames_to_solve": {"more_than": 9e4}},
-    ],
-    "runs": [
-        {**_RUN, "verdict": "one-sided (left)"}, {**_RUN, "verdict": "one-sided (right)"},
-        {**_RUN, "entropy": 0.001}, _RUN, _RUN, _RUN, {**_RUN, "state": "failed", "certain": None},
-        {**_RUN, "state": "damaged", "certain": None}, {**_RUN, "state": "unfinished"},
-    ],
-}  # fmt: skip
-"""Content of `summary.json` of a small sweep with runs in every state."""
-
-
 def _level(number: int, value: float, position: float, successes: int, oracle: int) -> Plain:
     success = _share(successes, 200, successes / 200 - 0.05, successes / 200 + 0.05)
     return {

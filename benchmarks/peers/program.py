@@ -80,7 +80,7 @@ def success_lower95(policy: Any, episodes: int) -> float:
     from drone_rl.utils.progress import silent
 
     result = evaluate(policy, episodes=episodes, seed=0, baselines=False, progress=silent)
-    return result.figures["greedy"]["success"]["lower95"]
+    return result.greedy.success.lower95
 
 
 def _parser() -> argparse.ArgumentParser:

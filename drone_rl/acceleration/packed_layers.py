@@ -11,7 +11,8 @@ import warp as wp
 from torch import Tensor, nn
 
 from drone_rl.acceleration.layers_kernel import WIDTH, LayerGeometry, Layers
-from drone_rl.policies.networks import PolicyNetwork, Weighted, has_own_weights
+from drone_rl.policies.layers import Unsupported, as_layers
+from drone_rl.policies.networks import Weighted
 
 
 class PackedLayer(NamedTuple):
@@ -208,14 +209,16 @@ def unsupported(network: nn.Module) -> list[str]:
     They support convolutions of gray frames, each with ReLU and possibly pooling, then linear
     layers with ReLU, in float32 on a CPU.
     """
-    name = type(network).__name__
-    if not isinstance(network, PolicyNetwork) or not network.is_sequential:
-        return [f"network {name} is not fused"]
-    if network.in_shape[0] != 1:
-        return [f"a network of {network.in_shape[0]} channels is not fused"]
-    kinds = "".join(_letter(layer) for layer in network.layers)
-    if not re.fullmatch("(crp?)+f(lr)*l", kinds):
-        return [f"network {name} is not fused"]
+    layers = as_layers(network)
+    if isinstance(layers, Unsupported):
+        return [layers.reason]
+    (branch,) = layers.branches
+    if branch.in_shape[0] != 1:
+        return [f"a network of {branch.in_shape[0]} channels is not fused"]
+    kinds = "".join(_LETTERS[type(layer)] for layer in layers.in_turn)
+    strides = [layer.stride for layer in branch.layers if isinstance(layer, nn.Conv2d)]
+    if not re.fullmatch("(crp?)+f(lr)*l", kinds) or any(high != wide for high, wide in strides):
+        return [f"network {type(network).__name__} is not fused"]
     tensors = list(network.parameters())
     if not all(p.dtype == torch.float32 and p.device.type == "cpu" for p in tensors):
         return ["a network that is not float32 on the CPU is not fused"]
@@ -224,50 +227,25 @@ def unsupported(network: nn.Module) -> list[str]:
 
 def packed_layers(network: nn.Module) -> list[PackedLayer]:
     """Return the layers of a network that is supported."""
-    assert isinstance(network, PolicyNetwork)
-    channels, height, width = network.in_shape
-    padded, packed = channels, []
-    pool_sizes = _pool_sizes(network)
-    for layer in network.layers:
-        if isinstance(layer, Weighted):
-            is_convolution = isinstance(layer, nn.Conv2d)
-            shape = (height, width, padded)
-            high, wide = layer.weight.shape[2:] if is_convolution else (height, width)
-            stride = int(layer.stride[0]) if is_convolution else 1
-            pool_size = pool_sizes.get(layer, 0)
-            one = PackedLayer(layer, channels, shape, (high, wide), stride, pool_size)
-            packed.append(one)
-            (height, width), channels = one.pooled_shape, len(layer.weight)
-            padded = one.num_outs
+    layers = as_layers(network)
+    assert not isinstance(layers, Unsupported)
+    channels, *size = layers.branches[0].in_shape
+    padded, packed = channels, list[PackedLayer]()
+    for layer in layers.in_turn:
+        if isinstance(layer, nn.MaxPool2d):
+            packed[-1] = packed[-1]._replace(pool_size=layer.kernel_size)
+        if not isinstance(layer, Weighted):
+            continue
+        high, wide = packed[-1].pooled_shape if packed else size
+        kernel, stride = (high, wide), 1
+        if isinstance(layer, nn.Conv2d):
+            kernel, stride = (layer.kernel_size[0], layer.kernel_size[1]), layer.stride[0]
+        packed.append(PackedLayer(layer, channels, (high, wide, padded), kernel, stride))
+        channels, padded = len(layer.weight), packed[-1].num_outs
     return packed
 
 
-def _pool_sizes(network: PolicyNetwork) -> dict[nn.Module, int]:
-    """Return the size of the pooling after each convolution that has one."""
-    sizes: dict[nn.Module, int] = {}
-    convolution: nn.Module | None = None
-    for layer in network.layers:
-        if isinstance(layer, nn.MaxPool2d) and convolution is not None:
-            sizes[convolution] = int(layer.kernel_size)  # pyright: ignore[reportArgumentType]
-        convolution = layer if isinstance(layer, nn.Conv2d) else convolution
-    return sizes
-
-
-def _letter(layer: nn.Module) -> str:
-    """Return a layer's kind; "?" also for derived classes, which may compute something else."""
-    if type(layer) is nn.Conv2d:
-        is_square = layer.stride[0] == layer.stride[1]
-        plain = (layer.padding, layer.dilation, layer.groups) == ((0, 0), (1, 1), 1)
-        return "c" if is_square and plain and has_own_weights(layer) else "?"
-    if type(layer) is nn.Linear:
-        return "l" if has_own_weights(layer) else "?"
-    if type(layer) is nn.MaxPool2d:
-        is_square = isinstance(layer.kernel_size, int) and layer.stride == layer.kernel_size
-        plain = (layer.padding, layer.dilation, layer.ceil_mode) == (0, 1, False)
-        return "p" if is_square and plain and not layer.return_indices else "?"
-    if type(layer) is nn.Flatten:
-        return "f" if (layer.start_dim, layer.end_dim) == (1, -1) else "?"
-    return "r" if type(layer) is nn.ReLU else "?"
+_LETTERS = {nn.Conv2d: "c", nn.ReLU: "r", nn.MaxPool2d: "p", nn.Flatten: "f", nn.Linear: "l"}
 
 
 class PackedNetwork:

@@ -15,7 +15,20 @@ _log = logging.getLogger(__name__)
 
 
 class BenchCommand(CommandSettings, BenchSettings):
-    """Settings of `drone-rl bench`."""
+    """Measure the figures that the documentation quotes.
+
+    Benchmarks by group:
+      main: render, collector, dm_control, scaling, memory, solve, seeds, large
+      adversarial: coverage, gamed, maps, explain, verdicts, fragile_honest, shifts, domain_axes,
+        robust, render_truth
+      parallel: sweeps, kills
+      verification: prove, exact_coverage, provable
+      long: imitation, original, chapter
+      libraries: pillars, onnx, peers, gymnasium
+      system: revisions, startup
+      flight: airsim, fly_page, flight_speed, flight_parity, flight_paths, flight_moves,
+        flight_velocity, flight_pillars
+    """
 
     @classmethod
     def prepare(cls, overrides: Sequence[str]) -> list[str]:

@@ -37,7 +37,10 @@ class AppearanceCommandSettings(RolloutCommandSettings):
 
 
 class EvaluateCommand(AppearanceCommandSettings, EvaluateSettings):
-    """Settings of `drone-rl evaluate`."""
+    """Measure a policy's success rate and reward in held-out episodes.
+
+    The random and constant baselines and the oracle are evaluated in the same episodes.
+    """
 
     videos: Annotated[int, Whole(0, unit="episodes")] = 2
     """Episodes recorded as MP4 and GIF; 0 for none."""
@@ -66,7 +69,10 @@ class EvaluateCommand(AppearanceCommandSettings, EvaluateSettings):
 
 
 class PlayCommand(AppearanceCommandSettings, DeviceSettings):
-    """Settings of `drone-rl play`."""
+    """Film a policy as MP4 and GIF, or record it for Rerun's viewer.
+
+    A recording, format=rerun, needs pip install -e '.[rerun]'.
+    """
 
     episodes: Annotated[int, Whole(1, unit="episodes")] = 3
     """Episodes to record, each in files of its own."""
@@ -110,7 +116,13 @@ class PlayCommand(AppearanceCommandSettings, DeviceSettings):
 
 
 class VerdictCommand(AppearanceCommandSettings, JudgeSettings):
-    """Settings of `drone-rl verdict`."""
+    """Judge a policy as good, one-sided or poor in held-out episodes.
+
+    Exit status: 0 good, 10 poor, 11 one-sided, 12 none of these, 13 too few episodes to be certain,
+    18 good but trivial (a baseline that ignores observations succeeds, too), 16 not proved
+    (require=proved), 17 outside the required operating domain (require_domain=FILE).
+    policy=random, oracle, forward, left or right judges a baseline.
+    """
 
     certificate: str | None = None
     """Certificate file to quote; null takes the one next to the policy, if it matches:
@@ -140,7 +152,14 @@ class VerdictCommand(AppearanceCommandSettings, JudgeSettings):
 
 
 class ShiftsCommand(RolloutCommandSettings, ShiftSettings):
-    """Settings of `drone-rl shifts`."""
+    """Measure how robust a policy is to perturbations, and the range in which it stays good.
+
+    Writes JSON and figures. Axes, by group: color (object_color, object_white, floor_color), camera
+    angle (camera_yaw, camera_pitch, camera_roll), camera position (camera_height, camera_sideways),
+    field of view (field_of_view), light (sun, brightness), fog (fog), object size (object_size),
+    distractors (distractors), sensor (noise, slow_noise, blur, dead_rows, frozen_frames,
+    late_frames), dynamics (step_length, action_delay).
+    """
 
     def run(self, folder: Path) -> tuple[int, float]:
         """Measure robustness; return the exit status and the mean area under the success curves."""
@@ -154,7 +173,12 @@ class ShiftsCommand(RolloutCommandSettings, ShiftSettings):
 
 
 class BodiesCommand(CommandSettings, BodiesSettings):
-    """Settings of `drone-rl bodies`."""
+    """Compare the verdicts of policies under several vehicle dynamics.
+
+    Writes a table, JSON, PNG and SVG. Dynamics: computer vision, simple flight, wind 2 m/s,
+    wind 5 m/s, wind 8 m/s (from the right, with gusts of a quarter), motors twice as slow,
+    camera on the body.
+    """
 
     def run(self, folder: Path) -> tuple[int, int]:
         """Judge policies under several dynamics; return the exit status and number of verdicts."""
@@ -165,7 +189,11 @@ class BodiesCommand(CommandSettings, BodiesSettings):
 
 
 class ExportCommand(CommandSettings, HeldOutSettings):
-    """Settings of `drone-rl export`."""
+    """Write a policy with a model card, or as an ONNX model.
+
+    The files are NAME.safetensors and NAME.md, or NAME.onnx for any program with onnxruntime
+    (pip install -e '.[onnx]').
+    """
 
     policy: str = "latest"
     """Policy: a .pt or .safetensors file, folder of a run, latest, or name of a shipped policy."""

@@ -4,9 +4,11 @@ import logging
 from pathlib import Path
 from typing import Annotated, Any
 
+import pydantic
+
 import drone_rl
 from drone_rl.cli.settings import CommandSettings, PolicyCommandSettings, finish
-from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
+from drone_rl.config.configuration import DynamicsChanges, TaskChanges
 from drone_rl.explanations.chapter_figures import FigureSettings
 from drone_rl.explanations.settings import ClassModelsSettings, ExplainSettings
 from drone_rl.trust.rule import VerdictKind
@@ -17,7 +19,10 @@ _log = logging.getLogger(__name__)
 
 
 class ExplainCommand(CommandSettings, ExplainSettings):
-    """Settings of `drone-rl explain`."""
+    """Analyse what a policy responds to and test the analyses.
+
+    The analyses are t-SNE, class models and saliency maps. Writes report.html.
+    """
 
     policy: Annotated[Any, Listed("policy")] = ("latest",)
     """Policy, or a list of policies that one report compares, as in policy=[good,poor]: files,
@@ -27,9 +32,9 @@ class ExplainCommand(CommandSettings, ExplainSettings):
     require: Annotated[str, OneOf(tuple(VerdictKind))] | None = None
     """Kind of verdict to require, such as good; other kinds and uncertain verdicts end with exit
     status 10 to 13 or 18. null accepts all kinds."""
-    task: TaskChanges = no_changes()
+    task: TaskChanges = pydantic.Field(default_factory=dict)
     """Changes of the policy's task settings (see conf/task), as in task.num_cubes=5."""
-    dynamics: DynamicsChanges = no_changes()
+    dynamics: DynamicsChanges = pydantic.Field(default_factory=dict)
     """Changes of the vehicle dynamics (see conf/dynamics), as in dynamics=quadrotor."""
 
     def run(self, folder: Path) -> tuple[int, str]:
@@ -51,7 +56,7 @@ class ExplainCommand(CommandSettings, ExplainSettings):
 
 
 class ReportCommand(CommandSettings):
-    """Settings of `drone-rl report`."""
+    """Write report.html from saved explanations, without running a policy."""
 
     explanations: Annotated[Any, Listed("folder")] = ("latest",)
     """Folder with an explanation.json, or a list of folders that one report compares; latest for
@@ -67,7 +72,7 @@ class ReportCommand(CommandSettings):
 
 
 class ClassModelsCommand(PolicyCommandSettings, ClassModelsSettings):
-    """Settings of `drone-rl class-models`."""
+    """Optimize an observation for each action of a policy (section 5.2, Eq. 18)."""
 
     def run(self, folder: Path) -> tuple[int, str]:
         """Optimize observations for each action; return the exit status and the image's path."""
@@ -79,7 +84,7 @@ class ClassModelsCommand(PolicyCommandSettings, ClassModelsSettings):
 
 
 class ReproduceCommand(CommandSettings, FigureSettings):
-    """Settings of `drone-rl reproduce`."""
+    """Make a figure of the chapter again, as PNG."""
 
     def run(self, folder: Path) -> tuple[int, str]:
         """Make a figure of the chapter again; return the exit status and the image's path."""

@@ -14,7 +14,7 @@ _log = logging.getLogger(__name__)
 
 
 class FlyCommand(AppearanceCommandSettings, FlySettings):
-    """Settings of `drone-rl fly`."""
+    """Serve a local page from which a person or a policy flies, until Ctrl-C."""
 
     policy: str = "good"
     """Policy to hand over to: a .pt or .safetensors file, folder of a run, latest, or name of a

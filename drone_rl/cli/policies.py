@@ -23,7 +23,10 @@ _NO_RUN_FOLDER = (
 
 
 class PoliciesCommand(CommandSettings):
-    """Settings of `drone-rl policies`."""
+    """List the shipped policies and the trained ones under outputs/.
+
+    The first column is what policy= takes. Verdicts are those that the policies' files record.
+    """
 
     most: Annotated[int, Whole(0, 10_000, "policies")] = 20
     """Trained policies to list, the newest first."""
@@ -58,7 +61,7 @@ class PoliciesCommand(CommandSettings):
 
 
 class ConvertCommand(CommandSettings):
-    """Settings of `drone-rl convert`."""
+    """Write a policy file of an older version in the present layout: drone-rl convert FILE."""
 
     policy: str = "latest"
     """Policy of an older version: a .pt or .safetensors file, the folder of a run, or latest."""

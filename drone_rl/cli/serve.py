@@ -9,7 +9,7 @@ from drone_rl.config.commands import ServeSettings
 
 
 class ServeCommand(CommandSettings, ServeSettings):
-    """Settings of `drone-rl serve`."""
+    """Serve programs that were written for AirSim, until Ctrl-C."""
 
     settings: str | None = None
     """AirSim's settings.json; null for settings.json in the working directory, else in

@@ -5,9 +5,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Self
 
+import pydantic
+
 import drone_rl
 from drone_rl.config.commands import PathsSettings
-from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
+from drone_rl.config.configuration import DynamicsChanges, TaskChanges
 from drone_rl.utils.files import trained_policies
 from drone_rl.utils.settings import Settings
 
@@ -65,7 +67,7 @@ class PolicyCommandSettings(CommandSettings):
 
     policy: str = "latest"
     """Policy: a .pt or .safetensors file, folder of a run, latest, or name of a shipped policy."""
-    task: TaskChanges = no_changes()
+    task: TaskChanges = pydantic.Field(default_factory=dict)
     """Changes of the policy's task settings (see conf/task), as in task.num_cubes=5."""
 
     def shared(self) -> dict[str, Any]:
@@ -76,7 +78,7 @@ class PolicyCommandSettings(CommandSettings):
 class RolloutCommandSettings(PolicyCommandSettings):
     """Settings of a command that rolls out one policy."""
 
-    dynamics: DynamicsChanges = no_changes()
+    dynamics: DynamicsChanges = pydantic.Field(default_factory=dict)
     """Changes of the vehicle dynamics (see conf/dynamics), as in dynamics=quadrotor."""
 
     def load_policy(self) -> Any:

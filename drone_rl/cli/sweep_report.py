@@ -12,7 +12,10 @@ _log = logging.getLogger(__name__)
 
 
 class SweepReportCommand(CommandSettings):
-    """Settings of `drone-rl sweep-report`."""
+    """Compare the runs of a sweep: drone-rl sweep-report FOLDER.
+
+    Every sweep also ends with it.
+    """
 
     folder: str = "latest"
     """Folder of the sweep, or latest for the newest one."""

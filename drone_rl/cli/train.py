@@ -11,12 +11,13 @@ import drone_rl
 from drone_rl.cli.hydra import resuming
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.config.commands import ProvableSettings
+from drone_rl.config.parts import Parts
 from drone_rl.config.training import Logger, Tensorboard, TrainSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import bar_or_lines
 from drone_rl.utils.readers import read_result
-from drone_rl.utils.schema import Instance, Several, Whole
-from drone_rl.verification.text import describe_round
+from drone_rl.utils.schema import Whole
+from drone_rl.utils.text import render
 
 if TYPE_CHECKING:
     from drone_rl.training import Callback
@@ -31,9 +32,9 @@ _TRAIN_LONGER = {
 
 
 class TrainCommand(CommandSettings, TrainSettings):
-    """Settings of `drone-rl train`."""
+    """Train a policy that collects cubes from camera images."""
 
-    logger: Annotated[tuple[Logger, ...], Several(Instance(Logger), 0, 16)] = (Tensorboard(),)
+    logger: Annotated[tuple[Logger, ...], Parts(Logger, 16)] = (Tensorboard(),)
     """Loggers in addition to metrics.csv."""
     resume: str | None = None
     """Folder of a run to resume with its own settings, or latest for the newest run; null starts a
@@ -80,7 +81,7 @@ class TrainCommand(CommandSettings, TrainSettings):
             training = vars(stop)["training"]
         _log.info("%s", training)
         for row in training.result.get("rounds", ()):
-            _log.info(describe_round(row))
+            _log.info(render("drone_rl.verification", "round.j2", **row))
         if not training.reason.startswith("SIG"):
             if before is not None and before.get("frames") == training.result["frames"]:
                 _log.info(

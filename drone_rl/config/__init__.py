@@ -14,6 +14,3 @@ from drone_rl.config.task import TASKS as TASKS
 from drone_rl.config.task import BaseTaskSettings as BaseTaskSettings
 from drone_rl.config.task import PillarsSettings as PillarsSettings
 from drone_rl.config.task import TaskSettings as TaskSettings
-from drone_rl.config.task import named_settings as named_settings
-from drone_rl.config.task import read_task as read_task
-from drone_rl.config.task import settings_of as settings_of

@@ -1,13 +1,15 @@
 """Settings of appearance; each value is fixed or a range that is sampled at every reset."""
 
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
+import pydantic
 import yaml
+from pydantic_core import PydanticCustomError
 
 from drone_rl.config.camera import FRONT, CameraSettings
 from drone_rl.config.task import Color, ObjectRegion
 from drone_rl.utils.errors import InputError, did_you_mean
-from drone_rl.utils.schema import Listed, Real, Several, Span, Whole, shown
+from drone_rl.utils.schema import Listed, Real, Several, Span, Whole
 from drone_rl.utils.settings import Settings, conf_dir
 
 NumberOrRange = float | tuple[float, float]
@@ -28,6 +30,19 @@ _Tile = Span(Real(0.05, 1000.0, unit="m"))
 _Textures = Listed("texture", most=32)
 _Place = Span(Several(Real(-10.0, 10.0, unit="m"), 3, 3))
 _Turn = Span(Several(Real(-90.0, 90.0, unit="degrees"), 3, 3))
+
+
+def _read_preset(name: str) -> dict[str, Any]:
+    """Return the values of a file in conf/appearance; minimal are the defaults, without a file."""
+    files = {path.stem: path for path in sorted((conf_dir() / "appearance").glob("*.yaml"))}
+    if name == "minimal":
+        return {}
+    if name not in files:
+        names = ("minimal", *files)
+        reason = f"must be one of {', '.join(names)}{did_you_mean(name, names)}"
+        raise PydanticCustomError("name", "{reason}", {"reason": reason})
+    values = yaml.safe_load(files[name].read_text("utf-8"))
+    return {**_read_preset(values.pop("defaults")[0]), **values}
 
 
 class AppearanceSettings(Settings):
@@ -86,22 +101,10 @@ class AppearanceSettings(Settings):
     exposure: Annotated[NumberOrRange, Span(Real(0.01, 100.0))] = 1.0
     """Factor by which the camera multiplies all colors."""
 
+    @pydantic.model_validator(mode="before")
     @classmethod
-    def from_name(cls, name: str, where: str) -> Self:
-        """Return the appearance of a file in conf/appearance, such as "fog".
-
-        Raises:
-            InputError: There is no such file; the message begins with `where`.
-        """
-        files = {path.stem: path for path in sorted((conf_dir() / "appearance").glob("*.yaml"))}
-        if name not in files:
-            raise InputError(
-                f"{where}={shown(name)} is unknown; give one of: {', '.join(files)}"
-                f"{did_you_mean(name, files)}"
-            )
-        values = yaml.safe_load(files[name].read_text("utf-8"))
-        base = values.pop("defaults")[0]
-        return (cls.from_name(base, where) if base in files else cls()).replace(**values)
+    def _from_name(cls, data: Any) -> Any:
+        return _read_preset(data) if isinstance(data, str) else data
 
     @property
     def is_minimal(self) -> bool:

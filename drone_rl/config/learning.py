@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar
 
-from drone_rl.config.configuration import Variant
+from drone_rl.config.parts import Part
 from drone_rl.utils.schema import OneOf, Real, Whole
 
 Rate = Annotated[float, Real(0.0, 1.0)]
 
 
-class Returns(Variant):
+class Returns(Part):
     """Settings of a return estimator."""
 
     scale: bool = False
@@ -75,7 +75,7 @@ class Gae(_Discounted, target="gae"):
     """GAE's lambda, 0 to 1; 0 looks one step ahead."""
 
 
-class Collector(Variant):
+class Collector(Part):
     """Settings of a collector."""
 
     num_envs: Annotated[int, Whole(1, unit="environments")] = 16
@@ -126,7 +126,7 @@ LearningRate = Annotated[float, Real(0.0, 1e30, is_above=True)]
 """Bounded because larger rates overflow float32 in Adam's first step."""
 
 
-class Optimizer(Variant):
+class Optimizer(Part):
     """Settings of an optimizer."""
 
 
@@ -144,7 +144,7 @@ class Sgd(Optimizer, target="torch.optim.SGD"):
     """Learning rate; the original study's."""
 
 
-class Scheduler(Variant):
+class Scheduler(Part):
     """Settings of a learning-rate schedule."""
 
 
@@ -169,10 +169,10 @@ class StepDecay(Scheduler, target="torch.optim.lr_scheduler.StepLR"):
 Weight = Annotated[float, Real(0.0)]
 
 
-class Objective(Variant):
+class Objective(Part):
     """Settings of a loss and its learner."""
 
-    needs: ClassVar[Mapping[str, Variant]] = {}
+    needs: ClassVar[Mapping[str, Part]] = {}
     """Other parts that the objective requires, and selects unless they are given."""
 
 
@@ -189,7 +189,7 @@ class Reinforce(Objective, target="reinforce"):
 class WithCritic(Objective):
     """Objective with a critic."""
 
-    needs: ClassVar[Mapping[str, Variant]] = {"returns": Gae(), "collector": Rollouts()}
+    needs: ClassVar[Mapping[str, Part]] = {"returns": Gae(), "collector": Rollouts()}
     num_steps: Annotated[int, Whole(2, 4096)] = 32
     """Steps of each environment in a batch."""
     shares_trunk: bool = True

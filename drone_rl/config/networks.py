@@ -2,14 +2,14 @@
 
 from typing import Annotated
 
-from drone_rl.config.configuration import Variant
+from drone_rl.config.parts import Part
 from drone_rl.utils.schema import Several, Whole
 
 Channels = Annotated[tuple[int, ...], Several(Whole(1, 512, "channels"), 1, 8)]
 Widths = Annotated[tuple[int, ...], Several(Whole(1, 4096, "neurons"), 0, 8)]
 
 
-class Network(Variant):
+class Network(Part):
     """Settings of a network."""
 
 

@@ -12,23 +12,22 @@ Built-in parts have settings classes in this package, and `implements` connects 
 classes and functions in higher layers.
 """
 
-import dataclasses
 import functools
 import inspect
 import math
 import re
 import types
 import typing
-from collections.abc import Callable, Mapping, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from typing import Annotated, Any, NamedTuple, TypeVar, cast
 
-from drone_rl.config.configuration import Variant
 from drone_rl.config.learning import Collector, Objective, Returns
 from drone_rl.config.networks import Network
+from drone_rl.config.parts import Part
 from drone_rl.config.transforms import Frame, Transform
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.plugins import described, errors_of, place_of
-from drone_rl.utils.schema import Flag, Kind, Maybe, OneOf, Real, Several, Text, Whole
+from drone_rl.utils.schema import Flag, Kind, Real, Several, Text, Whole
 from drone_rl.utils.settings import Settings
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -45,7 +44,7 @@ class _Base(NamedTuple):
     decorator: str
 
 
-_BASES: dict[type[Variant], _Base] = {
+_BASES: dict[type[Part], _Base] = {
     Network: _Base("PolicyNetwork", "is_recurrent", ("in_shape",), "register_network"),
     Transform: _Base(
         "Transform", "set_container", ("_apply_transform", "_parameters"), "register_transform"
@@ -71,7 +70,7 @@ _KINDS: dict[Any, Kind] = {
 }
 
 
-def implements(*variants: type[Variant]) -> Callable[[F], F]:
+def implements(*variants: type[Part]) -> Callable[[F], F]:
     """Decorate a class or function as the factory of built-in variants."""
 
     def connect(factory: F) -> F:
@@ -138,7 +137,7 @@ def register_collector(name: str) -> Callable[[F], F]:
     return _decorator(Collector, name, 2)
 
 
-def own_place(part: Variant) -> str:
+def own_place(part: Part) -> str:
     """Return the name and file of a part of the user's own, for messages; "" if it is built in."""
     if type(part).__module__.startswith("drone_rl."):
         return ""
@@ -155,13 +154,13 @@ def modules_of(settings: Any) -> set[str]:
         return set[str]().union(*map(modules_of, settings))
     if not isinstance(settings, Settings):
         return set()
-    values = (getattr(settings, field.name) for field in dataclasses.fields(settings))
     module = type(settings).__module__
-    return modules_of(tuple(values)) | ({module} if not module.startswith("drone_rl.") else set())
+    values = tuple(dict(settings).values())
+    return modules_of(values) | ({module} if not module.startswith("drone_rl.") else set())
 
 
 def _decorator(
-    part: type[Variant],
+    part: type[Part],
     name: Any,
     positional: int,
     skipped: Set[str] = frozenset(),
@@ -187,14 +186,14 @@ def _decorator(
             )
         _free_name(part, name, factory.__module__)
         fields = _fields(name, factory, positional, skipped)
-        taken = {*dir(part), "target"} - {field.name for field in dataclasses.fields(part)}
+        taken = {*dir(part), "target"} - part.model_fields.keys()
         for field, _, _ in fields:
             if field in taken:
                 raise InputError(
                     f"{name}: the parameter {field} has the name of an attribute of settings; "
                     "rename it"
                 )
-        inherited = part.__dataclass_fields__.keys() if part is Returns else set()
+        inherited = part.model_fields.keys() if part is Returns else set()
         names = {*(field for field, _, _ in fields), *inherited}
         namespace = {
             **{field: default for field, _, default in fields},
@@ -212,19 +211,17 @@ def _decorator(
     return register
 
 
-def _free_name(part: type[Variant], name: str, module: str) -> None:
-    """Remove a part of this name whose module is imported again; refuse the names of others."""
-    for variant in part.variants():
-        if variant.registered_name() != name:
-            continue
-        kind = part.__name__.lower()
-        if variant.__module__.startswith("drone_rl."):
-            raise InputError(f"{kind}={name} is built in; give another name")
-        if len({variant.__module__, module}) > 1 and "__main__" not in (variant.__module__, module):
-            raise InputError(
-                f"{kind}={name} is registered by {variant.__module__}, too; give another name"
-            )
-        del variant.target
+def _free_name(part: type[Part], name: str, module: str) -> None:
+    """Refuse the names of others' parts; a module that is imported again replaces its own."""
+    kind, others = part.__name__.lower(), part.registry.get(name)
+    if others is None:
+        return
+    if others.__module__.startswith("drone_rl."):
+        raise InputError(f"{kind}={name} is built in; give another name")
+    if len({others.__module__, module}) > 1 and "__main__" not in (others.__module__, module):
+        raise InputError(
+            f"{kind}={name} is registered by {others.__module__}, too; give another name"
+        )
 
 
 def _checked(factory: Callable[..., Any], what: str, base: _Base) -> Callable[..., Any]:
@@ -273,22 +270,15 @@ def _fields(
 
 
 def _annotated(hint: Any, where: str) -> Any:
-    """Return the type of a parameter, annotated with the kind of its values."""
-    if typing.get_origin(hint) is Annotated:
+    """Return the type of a parameter as that of a setting: lists and sequences are tuples."""
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    inner = {*arguments} - {types.NoneType}
+    is_optional = origin in (typing.Union, types.UnionType) and len(inner) == 1
+    is_choice = origin is typing.Literal and all(isinstance(text, str) for text in arguments)
+    if origin is Annotated or hint in _KINDS or is_choice or (is_optional and inner <= {*_KINDS}):
         return hint
-    texts = typing.get_args(hint)
-    if typing.get_origin(hint) is typing.Literal and all(isinstance(text, str) for text in texts):
-        return Annotated[str, OneOf(texts)]
-    if typing.get_origin(hint) in (typing.Union, types.UnionType):
-        inner = [of for of in typing.get_args(hint) if of is not types.NoneType]
-        if len(inner) == 1 and inner[0] in _KINDS:
-            return Annotated[hint, Maybe(_KINDS[inner[0]])]
-    if typing.get_origin(hint) in (tuple, list, typing.get_origin(typing.Sequence[int])):
-        of, *more = typing.get_args(hint) or (None,)
-        if of in _KINDS and more in ([], [...]):
-            return Annotated[tuple[of, ...], Several(_KINDS[of], 0, 1000)]
-    if hint in _KINDS:
-        return Annotated[hint, _KINDS[hint]]
+    if origin in (tuple, list, Sequence) and inner <= {*_KINDS, ...} and len(inner - {...}) == 1:
+        return Annotated[tuple[arguments[0], ...], Several(_KINDS[arguments[0]], 0, 1000)]
     raise InputError(
         f"{where} is of type {hint}; give int, float, bool, str, a tuple of one of these, Literal, "
         "or Annotated with a kind of drone_rl.utils.schema"

@@ -2,12 +2,12 @@
 
 import math
 import random
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar
 
-from drone_rl.utils.errors import InputError, did_you_mean
-from drone_rl.utils.schema import Real, Several, Whole, as_mapping, shown
-from drone_rl.utils.settings import Settings
+from drone_rl.config.parts import Named
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Real, Several, Whole
 
 Length = Annotated[float, Real(0.001, 10_000.0, unit="m")]
 Bound = Annotated[float, Real(0.0, 10_000.0, unit="m")]
@@ -33,16 +33,15 @@ class ObjectRegion(NamedTuple):
     """z at which the drone starts."""
 
 
-class BaseTaskSettings(Settings):
+TASKS: dict[str, type["BaseTaskSettings"]] = {}
+"""Settings of each task by its name; `drone_rl.sim.tasks.register_task` adds further ones."""
+
+
+class BaseTaskSettings(Named):
     """Settings of a task: scene, rewards and ends of episodes."""
 
-    name: ClassVar[str]
-    """Name of the task in files."""
-
-    @classmethod
-    def from_name(cls, name: str, where: str) -> "BaseTaskSettings":
-        """Return the default settings of a task by its name; see `Instance`."""
-        return settings_of(name, where)()
+    registry: ClassVar[dict[str, Any]] = TASKS
+    default_name: ClassVar[str | None] = DEFAULT_TASK
 
     @property
     def object_region(self) -> ObjectRegion | None:
@@ -57,40 +56,11 @@ class BaseTaskSettings(Settings):
 
 S = TypeVar("S", bound=type[BaseTaskSettings])
 
-TASKS: dict[str, type[BaseTaskSettings]] = {}
-"""Settings of each task by its name; `drone_rl.sim.tasks.register_task` adds further ones."""
-
 
 def add_task(settings: S) -> S:
     """Add the settings of a task to `TASKS`; a class decorator."""
     TASKS[settings.name] = settings
     return settings
-
-
-def settings_of(name: object, where: str = "task.name") -> type[BaseTaskSettings]:
-    """Return the class of a task's settings; `where` is the setting's name for messages."""
-    if not isinstance(name, str) or name not in TASKS:
-        names, meant = ", ".join(TASKS), did_you_mean(name, TASKS)
-        raise InputError(
-            f"{where}={shown(name)} is unknown; valid names: {names}; if a module of yours "
-            f"registers it, add plugins=[MODULE], or import it in Python{meant}"
-        )
-    return TASKS[name]
-
-
-def named_settings(data: Any, where: str) -> tuple[type[BaseTaskSettings], Mapping[str, Any]]:
-    """Return the class of a task's settings and the values without the name.
-
-    A mapping without "name" describes `DEFAULT_TASK`. See `settings_of` for errors.
-    """
-    values = dict(as_mapping(data, where))
-    return settings_of(values.pop("name", DEFAULT_TASK), f"{where}.name"), values
-
-
-def read_task(data: Any, where: str) -> BaseTaskSettings:
-    """Read settings of a task from plain data; see `named_settings` and `Settings.read`."""
-    cls, values = named_settings(data, where)
-    return cls.read(values, where)
 
 
 @add_task

@@ -12,7 +12,6 @@ from drone_rl.config import (
     TaskSettings,
 )
 from drone_rl.config.appearance import check_appearance
-from drone_rl.config.configuration import NetworkOptions, Variant
 from drone_rl.config.learning import (
     Adam,
     Collector,
@@ -29,9 +28,10 @@ from drone_rl.config.learning import (
     Scheduler,
 )
 from drone_rl.config.networks import Network, SmallCnn
+from drone_rl.config.parts import NetworkOptions, Part, Parts
 from drone_rl.config.transforms import DEFAULT_TRANSFORMS, Transform
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Instance, Real, Several, Whole
+from drone_rl.utils.schema import Real, Whole
 from drone_rl.utils.settings import Settings
 
 MOST_TRANSFORMS = 16
@@ -96,9 +96,9 @@ class TrainSettings(Settings):
     """Actions of the policy."""
     camera: CameraSettings = CameraSettings()
     """Camera of the policy."""
-    transforms: Annotated[
-        tuple[Transform, ...], Several(Instance(Transform), 0, MOST_TRANSFORMS)
-    ] = DEFAULT_TRANSFORMS
+    transforms: Annotated[tuple[Transform, ...], Parts(Transform, MOST_TRANSFORMS)] = (
+        DEFAULT_TRANSFORMS
+    )
     """Transforms of the image, in this order."""
     network: Network = SmallCnn()
     """Network of the policy."""
@@ -156,7 +156,7 @@ class TrainSettings(Settings):
         """See `Settings`; a new objective brings the parts that it needs, unless they are given."""
         objective = changes.get("objective")
         if isinstance(objective, str):
-            objective = Objective.from_name(objective, "objective")
+            objective = Objective.read(objective, "objective")
         if isinstance(objective, Objective):
             for name, part in objective.needs.items():
                 if not isinstance(getattr(self, name), type(part)):
@@ -164,7 +164,7 @@ class TrainSettings(Settings):
         return super().replace(**changes)
 
 
-class Logger(Variant):
+class Logger(Part):
     """Settings of a TorchRL logger."""
 
     def make(self, *parts: Any, **options: Unpack[NetworkOptions]) -> Any:

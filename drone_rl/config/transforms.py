@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-from drone_rl.config.configuration import Variant
+from drone_rl.config.parts import Part
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Several, Whole, shown
 from drone_rl.utils.settings import prefixed_errors
@@ -18,7 +18,7 @@ class Frame(NamedTuple):
     """Whether the values are float32, as networks need them."""
 
 
-class Transform(Variant):
+class Transform(Part):
     """Settings of a transform."""
 
     needs: ClassVar[str] = ""

@@ -21,7 +21,7 @@ from drone_rl.envs.fault_models import (
 )
 from drone_rl.envs.transforms import PixelTransform, call_text
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.settings import Settings, kinds_of
+from drone_rl.utils.settings import Settings
 
 
 class CameraFault(PixelTransform):
@@ -82,7 +82,7 @@ class _BuiltInFault(CameraFault):
     """Returns the model for the fields of the settings."""
 
     def __init__(self, *args: Any, **fields: Any) -> None:
-        names = list(kinds_of(self.Settings))[: len(args)]
+        names = [*self.Settings.model_fields][: len(args)]
         values = self.Settings(**dict(zip(names, args, strict=True)), **fields)
         super().__init__(self.make_model(**vars(values)), values)
 
@@ -131,7 +131,7 @@ class Shift(_BuiltInFault):
 class Blur(PixelTransform):
     """Blur images (*, C, H, W) by a Gaussian; it has no memory and samples nothing."""
 
-    def __init__(self, width: float = settings.Blur.width) -> None:
+    def __init__(self, width: float = settings.Blur().width) -> None:
         """See `drone_rl.config.transforms.Blur`."""
         super().__init__()
         self.values = settings.Blur(width=width)

@@ -83,7 +83,7 @@ class ChromaticityPixels(PixelTransform):
     and `floor`, which suppresses the color noise of dark pixels. Range: -1/3 to 2/3.
     """
 
-    def __init__(self, floor: float = settings.Chromaticity.floor) -> None:
+    def __init__(self, floor: float = settings.Chromaticity().floor) -> None:
         super().__init__()
         self.values = settings.Chromaticity(floor=floor)
         self.floor = float(floor)
@@ -141,7 +141,7 @@ class StandardizePixels(PixelTransform):
     """Standardize pixels: (x - mean) / std. The defaults are the original study's."""
 
     def __init__(
-        self, mean: float = settings.Standardize.mean, std: float = settings.Standardize.std
+        self, mean: float = settings.Standardize().mean, std: float = settings.Standardize().std
     ) -> None:
         super().__init__()
         self.values = settings.Standardize(mean=mean, std=std)

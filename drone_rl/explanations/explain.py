@@ -205,7 +205,7 @@ def explain_policy(
     explanation = Explanation(
         name=name,
         date=datetime.now(UTC).isoformat(timespec="seconds"),
-        settings=dataclasses.asdict(context.settings),
+        settings=context.settings.values(),
         **context.seed.as_dict(),
         seconds=seconds,
         actions=shown_actions({"actions": context.scenes.actions.as_dict()}),

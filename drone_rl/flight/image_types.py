@@ -1,4 +1,4 @@
-"""Seven of AirSim's image types, computed from rendered modalities, and its segmentation ids."""
+"""Eight of AirSim's image types, computed from rendered modalities, and its segmentation ids."""
 
 import dataclasses
 import enum
@@ -72,6 +72,8 @@ class ImageType(enum.IntEnum):
     SEGMENTATION = 5
     """Color of the object's id, see `palette`."""
     SURFACE_NORMALS = 6
+    INFRARED = 7
+    """The object's id in gray."""
 
     @property
     def modality(self) -> Modality:
@@ -80,7 +82,10 @@ class ImageType(enum.IntEnum):
 
 
 _DISTANCES: tuple[Modality, ...] = ("depth", "distance", "depth", "depth")
-_MODALITIES: tuple[Modality, ...] = ("rgb", *_DISTANCES, "segmentation", "normals")
+_MODALITIES: tuple[Modality, ...] = (
+    *("rgb", *_DISTANCES),
+    *("segmentation", "normals", "segmentation"),
+)
 """By number of the image type."""
 
 
@@ -118,9 +123,9 @@ def images(
     height: int | None = None,
     width: int | None = None,
 ) -> list[Tensor]:
-    """Render several images of environments in a state, of one size, in one pass; see `pixels`.
+    """Render several images of one environment in a state, of one size, in one pass.
 
-    A compressed image is a PNG file of shape (N, bytes), uint8; shorter ones end with zeros.
+    For their shapes see `pixels`; a compressed image is a PNG file of shape (bytes,), uint8.
 
     The default size, in pixels, is that of the policy's camera; cameras keep their vertical field
     of view. Raises an `InputError` if there are no requests, a size is out of range, or the
@@ -136,9 +141,12 @@ def images(
         number = cameras.index(str(request.camera))
         fov = float(scene.model.cam_fovy[scene.camera(view.cameras[number])])
         focal = view.height / 2 / math.tan(math.radians(fov) / 2)
-        values = rendered[kind.modality][:, number]
+        values = rendered[kind.modality][0, number]
         image = pixels(kind, values, as_float=request.as_float, focal=focal, ids=ids)
-        pictures.append(_png(image) if request.compress else image)
+        if request.compress:
+            content = encode(Image.fromarray(image.cpu().numpy()), "png")
+            image = torch.frombuffer(bytearray(content), dtype=torch.uint8)
+        pictures.append(image)
     return pictures
 
 
@@ -150,15 +158,6 @@ def encode(image: Image.Image, kind: str, *, quality: int = -1, compress_level: 
     buffer = io.BytesIO()
     image.save(buffer, kind, quality=quality, compress_level=compress_level)
     return buffer.getvalue()
-
-
-def _png(images: Tensor) -> Tensor:
-    """Encode images (N, H, W, 3) as PNG: bytes, padded with zeros, (N, length), uint8."""
-    encoded = []
-    for image in images.cpu().numpy():
-        content = bytearray(encode(Image.fromarray(image), "png"))
-        encoded.append(torch.frombuffer(content, dtype=torch.uint8))
-    return torch.nn.utils.rnn.pad_sequence(encoded, batch_first=True)
 
 
 def pixels(
@@ -183,9 +182,11 @@ def pixels(
     """
     if image_type is ImageType.SCENE:
         return _color(values, as_float)
-    if image_type is ImageType.SEGMENTATION:
+    if image_type.modality == "segmentation":
         geoms = values.long()
         numbers = geoms.clamp(min=0) if ids is None else ids.to(geoms.device)[geoms]
+        if image_type is ImageType.INFRARED:
+            return _gray(numbers.float() / 255.0, as_float, 255.0)
         colors = palette().to(geoms.device)[numbers]
         return _color(colors, as_float)
     if image_type is ImageType.SURFACE_NORMALS:

@@ -75,7 +75,7 @@ class ReturnEstimator(Transform, abc.ABC):
         """
         read, written = [reward_key, done_key], [out_key]
         super().__init__(in_keys=read, out_keys=written, in_keys_inv=read, out_keys_inv=written)
-        self.scale = self.Settings.scale if scale is None else scale
+        self.scale = self.Settings().scale if scale is None else scale
         self._is_contained = False
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -188,7 +188,7 @@ class SuccessScaled(_Discounted):
     def __init__(
         self,
         gamma: float | None = None,
-        max_reward: float = settings.SuccessScaled.max_reward,
+        max_reward: float = settings.SuccessScaled().max_reward,
         **keys: Unpack[ReturnKeys],
     ) -> None:
         super().__init__(gamma, **keys)
@@ -211,8 +211,8 @@ class TimeBaseline(_Discounted):
     def __init__(
         self,
         gamma: float | None = None,
-        decay: float = settings.TimeBaseline.decay,
-        max_steps: int = settings.TimeBaseline.max_steps,
+        decay: float = settings.TimeBaseline().decay,
+        max_steps: int = settings.TimeBaseline().max_steps,
         **keys: Unpack[ReturnKeys],
     ) -> None:
         """Allocate the means of `max_steps` time steps.
@@ -266,7 +266,7 @@ class Advantages(GAE):
     """
 
     def __init__(
-        self, gamma: float = Gae.gamma, lmbda: float = Gae.lmbda, scale: bool = Gae.scale
+        self, gamma: float = Gae().gamma, lmbda: float = Gae().lmbda, scale: bool = Gae().scale
     ) -> None:
         """Set discount rate, weight of later estimates, and whether to standardize a batch."""
         super().__init__(gamma=gamma, lmbda=lmbda, value_network=None, average_gae=scale)

@@ -59,8 +59,8 @@ class ReinforceLoss(LossModule):
         self,
         actor_network: ProbabilisticTensorDictSequential,
         *,
-        entropy_coeff: float = Reinforce.entropy_coeff,
-        reduction: str = Reinforce.reduction,
+        entropy_coeff: float = Reinforce().entropy_coeff,
+        reduction: str = Reinforce().reduction,
     ) -> None:
         """Wrap the policy that collected the batch.
 

@@ -20,7 +20,6 @@ from drone_rl.config import (
     CameraSettings,
     DynamicsSettings,
     TaskSettings,
-    settings_of,
 )
 from drone_rl.config.configuration import Changes, as_changes
 from drone_rl.config.options import DynamicsOptions, TaskOptions
@@ -193,7 +192,7 @@ def policy_from(
     dynamics.check_air()
     Instance(ActionSettings).read(actions, "actions")
     if isinstance(task, str):
-        task = settings_of(task, "task")()
+        task = BaseTaskSettings.read(task, "task")
     before_wrappers = None if transforms is None else as_transforms(transforms)
     of_env: Mapping[str, Any] = getattr(network, "conditions", {})
     observations: Any = getattr(network, "observations", None)

@@ -134,11 +134,6 @@ class PolicyNetwork(ImageNetwork):
         return logits.reshape(*pixels.shape[:-3], logits.shape[-1])
 
 
-def has_own_weights(layer: nn.Module) -> bool:
-    """Return whether weight and bias are a layer's parameters, not computed from others."""
-    return {name for name, _ in layer.named_parameters(recurse=False)} == {"weight", "bias"}
-
-
 class Trunk(nn.Module):
     """A policy network without its last layer: frames (*, C, H, W) to features (*, F)."""
 
@@ -174,8 +169,8 @@ class OriginalCNN(PolicyNetwork):
         in_shape: Sequence[int],
         num_actions: int,
         *,
-        channels: Sequence[int] = OriginalCnn.channels,
-        hidden: Sequence[int] = OriginalCnn.hidden,
+        channels: Sequence[int] = OriginalCnn().channels,
+        hidden: Sequence[int] = OriginalCnn().hidden,
         generator: torch.Generator | None = None,
     ) -> None:
         convolutions: OrderedDict[str, nn.Module] = OrderedDict()
@@ -208,9 +203,9 @@ class SmallCNN(PolicyNetwork):
         in_shape: Sequence[int],
         num_actions: int,
         *,
-        patch: int = SmallCnn.patch,
-        channels: Sequence[int] = SmallCnn.channels,
-        hidden: Sequence[int] = SmallCnn.hidden,
+        patch: int = SmallCnn().patch,
+        channels: Sequence[int] = SmallCnn().channels,
+        hidden: Sequence[int] = SmallCnn().hidden,
         generator: torch.Generator | None = None,
     ) -> None:
         convolutions: OrderedDict[str, nn.Module] = OrderedDict()
@@ -286,7 +281,7 @@ class MLP(PolicyNetwork):
         in_shape: Sequence[int],
         num_actions: int,
         *,
-        hidden: Sequence[int] = Mlp.hidden,
+        hidden: Sequence[int] = Mlp().hidden,
         generator: torch.Generator | None = None,
     ) -> None:
         layers = _with_head(OrderedDict(), in_shape, hidden, num_actions)

@@ -64,10 +64,10 @@ class RecurrentNetwork(ImageNetwork):
         in_shape: Sequence[int],
         num_actions: int,
         *,
-        patch: int = Lstm.patch,
-        channels: Sequence[int] = Lstm.channels,
-        hidden: Sequence[int] = Lstm.hidden,
-        memory: int = Lstm.memory,
+        patch: int = Lstm().patch,
+        channels: Sequence[int] = Lstm().channels,
+        hidden: Sequence[int] = Lstm().hidden,
+        memory: int = Lstm().memory,
         generator: torch.Generator | None = None,
     ) -> None:
         super().__init__()

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from drone_rl.policies.networks import has_own_weights
+from drone_rl.policies.layers import Layer
 
 UNIT = 2.0**-24
 """Unit roundoff of float32: the largest relative error of one operation."""
@@ -33,7 +33,7 @@ class Note:
     """Where gradients pass from the output to the input."""
 
 
-class Layer(abc.ABC):
+class RoundedLayer(abc.ABC):
     """A layer with bounds on its rounding errors."""
 
     @abc.abstractmethod
@@ -59,7 +59,7 @@ class Layer(abc.ABC):
         """Return gradients by the inputs, given gradients by the outputs. Shapes: (N, P, *)."""
 
 
-class _Affine(Layer):
+class _Affine(RoundedLayer):
     """A convolution without padding or a linear layer, with a bias."""
 
     def __init__(self, layer: nn.Conv2d | nn.Linear) -> None:
@@ -117,7 +117,7 @@ class _Affine(Layer):
         return (rounded + lost).masked_fill(~(SLACK * total < LARGEST), torch.inf)
 
 
-class _Rectified(Layer):
+class _Rectified(RoundedLayer):
     """A ReLU."""
 
     def __call__(self, value: Tensor) -> Tensor:
@@ -136,7 +136,7 @@ class _Rectified(Layer):
         return slope.where(note.mask[:, None], 0.0)
 
 
-class _Flat(Layer):
+class _Flat(RoundedLayer):
     """A flatten layer."""
 
     def __call__(self, value: Tensor) -> Tensor:
@@ -152,7 +152,7 @@ class _Flat(Layer):
         return slope.view(*slope.shape[:2], *note.shape[1:])
 
 
-class _Maximum(Layer):
+class _Maximum(RoundedLayer):
     """Max pooling over squares that do not overlap."""
 
     def __init__(self, side: int) -> None:
@@ -190,18 +190,13 @@ def largest_of(value: Tensor) -> Tensor:
     return torch.maximum(value.amax(0, keepdim=True), -value.amin(0, keepdim=True)).double()
 
 
-def layer_of(layer: nn.Module) -> Layer | None:
-    """Return the rounding errors of a network's layer, or None if it is not supported."""
-    if type(layer) is nn.Conv2d:
-        is_plain = (layer.padding, layer.dilation, layer.groups) == ((0, 0), (1, 1), 1)
-        return _Affine(layer) if is_plain and has_own_weights(layer) else None
-    if type(layer) is nn.Linear:
-        return _Affine(layer) if has_own_weights(layer) else None
-    if type(layer) is nn.MaxPool2d:
-        side = layer.kernel_size
-        is_plain = (layer.padding, layer.dilation, layer.ceil_mode) == (0, 1, False)
-        is_plain = is_plain and isinstance(side, int) and layer.stride == side
-        return _Maximum(side) if is_plain and isinstance(side, int) else None
-    if type(layer) is nn.Flatten:
-        return _Flat() if (layer.start_dim, layer.end_dim) == (1, -1) else None
-    return _Rectified() if type(layer) is nn.ReLU else None
+def rounded(layer: Layer) -> RoundedLayer:
+    """Return the rounding errors of a layer, see `drone_rl.policies.layers.as_layers`."""
+    match layer:
+        case nn.MaxPool2d(kernel_size=int(side)):
+            return _Maximum(side)
+        case nn.ReLU():
+            return _Rectified()
+        case nn.Conv2d() | nn.Linear():
+            return _Affine(layer)
+    return _Flat()

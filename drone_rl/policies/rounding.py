@@ -18,8 +18,9 @@ from typing import Any, Self
 import torch
 from torch import Tensor, nn
 
-from drone_rl.policies.networks import ImageNetwork, PolicyNetwork
-from drone_rl.policies.rounded_layers import SLACK, UNIT, Layer, largest_of, layer_of
+from drone_rl.policies.layers import Layers, Unsupported, as_layers
+from drone_rl.policies.networks import ImageNetwork
+from drone_rl.policies.rounded_layers import SLACK, UNIT, largest_of, rounded
 from drone_rl.sim.actions import Actions, DiscreteActions
 from drone_rl.utils.errors import InputError
 
@@ -57,21 +58,16 @@ Decide = Callable[[Tensor], Decisions]
 class RoundingBound:
     """Bounds for the present weights of one network."""
 
-    def __init__(self, layers: list[Layer], actions: Actions) -> None:
-        self.layers, self._actions = layers, actions
+    def __init__(self, layers: Layers, actions: Actions) -> None:
+        self.layers = [rounded(layer) for layer in layers.in_turn]
+        self._actions = actions
 
     @classmethod
     def find(cls, network: nn.Module) -> Self | None:
-        """Return the bounds of a network, or None if one of its layers is not supported.
-
-        Supported are convolutions without padding and linear layers, all with biases, ReLU,
-        pooling without overlap and Flatten, of a `PolicyNetwork`; see `layer_of`.
-        """
-        if not isinstance(network, PolicyNetwork) or not network.is_sequential:
-            return None
-        layers = [layer_of(layer) for layer in network.layers]
-        supported = [layer for layer in layers if layer is not None]
-        return cls(supported, network.actions) if len(supported) == len(layers) else None
+        """Return the bounds of a network, or None if `as_layers` does not support it."""
+        layers = as_layers(network)
+        actions: Any = network.actions
+        return None if isinstance(layers, Unsupported) else cls(layers, actions)
 
     @torch.no_grad()
     def decide(self, pixels: Tensor) -> Decisions:

@@ -50,14 +50,20 @@ class Layout:
     left_out: int = 0
     """Number of panels beyond this limit."""
 
+    @property
+    def rows(self) -> list[Row]:
+        """Runs with progress in all panels, which share their axes."""
+        groups = (group for panel in self.panels.values() for group in panel)
+        return [row for group in groups for row in group.with_progress]
+
 
 def lay_out(groups: Sequence[RunGroup]) -> Layout:
     """Put the learning rate, or else the last swept setting, on the x axis."""
-    keys = list(groups[0].choice) if groups else []
+    keys = list(groups[0].settings) if groups else []
     axis = FAVOURITE_AXIS if FAVOURITE_AXIS in keys else (keys[-1] if keys else None)
     panels: dict[str, list[RunGroup]] = {}
     for group in groups:
-        rest = [f"{key}={value}" for key, value in group.choice.items() if key != axis]
+        rest = [f"{key}={value}" for key, value in group.settings.items() if key != axis]
         panels.setdefault(", ".join(rest), []).append(group)
     shown = dict(list(panels.items())[:MAX_PANELS])
     return Layout(axis, shown, len(panels) - len(shown))
@@ -105,12 +111,12 @@ def _render(
 def _curves(axes: Axes, layout: Layout, groups: list[RunGroup]) -> None:
     colors = colormaps["viridis"](np.linspace(0.1, 0.9, max(1, len(groups))))
     for group, color in zip(groups, colors, strict=True):
-        end = max((row.frames for row in group.known), default=0.0)
+        end = max((row.frames for row in group.with_progress), default=0.0)
         if end == 0.0:
             continue
         grid = np.linspace(0, end, 120)
-        values = np.stack([on_grid(*row.curve, grid) for row in group.known])
-        label = _literal(group.choice.get(layout.axis or "", "all runs"))
+        values = np.stack([on_grid(*row.curve, grid) for row in group.with_progress])
+        label = _literal(group.settings.get(layout.axis or "", "all runs"))
         band = median_band(values)
         if band is None:
             labels = [label, *["_"] * (len(values) - 1)]  # legends omit a leading underscore
@@ -119,7 +125,9 @@ def _curves(axes: Axes, layout: Layout, groups: list[RunGroup]) -> None:
             axes.plot(grid, np.median(values, axis=0), color=color, label=label)
             axes.fill_between(grid, *band, color=color, alpha=0.2, linewidth=0)
     every = [group for panel in layout.panels.values() for group in panel]  # they share the axis
-    least = min((row.curve[1].min(initial=0.0) for g in every for row in g.known), default=0.0)
+    least = min(
+        (row.curve[1].min(initial=0.0) for g in every for row in g.with_progress), default=0.0
+    )
     axes.set(xlabel="frames", ylabel="running reward / largest reward", ylim=(1.05 * least, 1))
     if axes.get_legend_handles_labels()[0]:
         axes.legend(title=_literal(layout.axis or ""), fontsize=7, title_fontsize=7)
@@ -129,11 +137,11 @@ def _verdicts(axes: Axes, layout: Layout, groups: list[RunGroup]) -> None:
     places = _places(axes, layout, groups)
     for i, kind in enumerate(COLORS):
         shares = [group.verdicts[kind] for group in groups]
-        ended = [(x, s) for x, s in zip(places, shares, strict=True) if s["trials"]]
-        if not any(s["successes"] for _, s in ended):
+        ended = [(x, s) for x, s in zip(places, shares, strict=True) if s.trials]
+        if not any(s.successes for _, s in ended):
             continue
         x = _aside(axes, np.array([place for place, _ in ended]), 0.08 * (i - 2), places)
-        y, low, high = (np.array([s[k] for _, s in ended]) for k in ("share", "lower95", "upper95"))
+        y, low, high = np.array([(s.share, s.lower95, s.upper95) for _, s in ended]).T
         error = np.abs([y - low, high - y])
         axes.errorbar(x, y, yerr=error, markersize=4, capsize=2, **_style(kind))
     axes.set(ylabel="fraction of runs", ylim=(-0.03, 1.03))
@@ -167,7 +175,7 @@ def _dots(
         for i, (y, row) in enumerate(sorted(dots, key=lambda dot: KINDS.index(dot[1].kind))):
             shift = min(0.05, 0.6 / len(dots)) * (i - (len(dots) - 1) / 2)
             x = _aside(axes, np.array([place]), shift, places)
-            fill = "full" if row.is_certain else "none"
+            fill = "full" if row.certain else "none"
             axes.plot(x, [y], ls="", markersize=4, fillstyle=fill, **_style(str(row.kind)))
     _explain_colors(axes)
 
@@ -196,13 +204,12 @@ def _explain_colors(axes: Axes) -> None:
 
 def _costs(axes: Axes, layout: Layout, groups: list[RunGroup]) -> None:
     for place, group in zip(_places(axes, layout, groups), groups, strict=True):
-        for row in group.known:
+        for row in group.with_progress:
             kind = "poor" if row.state == FAILED else "none of these"
             color = COLORS["good" if row.is_solved else kind]
             marker, fill = ("o", "full") if row.is_solved else ("^", "none")
             axes.plot([place], [row.frames], marker, alpha=0.6, color=color, fillstyle=fill)
-    every = [group for panel in layout.panels.values() for group in panel]  # they share the axis
-    top = max((row.frames for group in every for row in group.known), default=0.0) or 1.0
+    top = max((row.frames for row in layout.rows), default=0) or 1
     axes.set(ylabel="frames to solve", ylim=(0, 1.2 * top))
 
 
@@ -219,7 +226,7 @@ PLOTS: dict[str, tuple[str, Plot, float]] = {
 
 def _places(axes: Axes, layout: Layout, groups: list[RunGroup]) -> list[float]:
     """Set the ticks and return the x position of each group: its number, or its index."""
-    names = [str(group.choice.get(layout.axis or "", "")) for group in groups]
+    names = [str(group.settings.get(layout.axis or "", "")) for group in groups]
     axes.set_xlabel(_literal(layout.axis or "all runs"))
     try:
         places = [float(name) for name in names]

@@ -7,32 +7,18 @@ import re
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field
 
 from drone_rl.config.configuration import check_same_config
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import (
-    last_of,
-    read_json,
-    refuse_links,
-    write_atomically,
-)
+from drone_rl.utils.files import last_of, read_json, refuse_links
 from drone_rl.utils.limits import SWEEP_BYTES
-from drone_rl.utils.overrides import COMMAND, MOST_OVERRIDES, check_harmless
-from drone_rl.utils.provenance import provenance
-from drone_rl.utils.schema import (
-    Maybe,
-    OneOf,
-    Plain,
-    Record,
-    Several,
-    Text,
-    Whole,
-    as_mapping,
-    shown,
-)
+from drone_rl.utils.overrides import COMMAND, check_harmless
+from drone_rl.utils.provenance import Provenance, provenance
+from drone_rl.utils.schema import as_mapping, shown
 
-FORMAT = "drone_rl sweep, version 2"
 MAY_CHANGE = ("resume", "logger", "paths", "trainer.checkpoint_interval_s", "renderer")
 """Settings that may differ when a sweep is resumed."""
 _LEVELS = 100
@@ -42,26 +28,6 @@ THREADS = {"OMP_NUM_THREADS": "1", "OMP_WAIT_POLICY": "PASSIVE"}
 
 Training sets torch's threads itself, so that its result does not depend on this.
 """
-
-_RUN = Record(
-    {
-        "number": Whole(0, 10**6),
-        "overrides": Several(Text(500), 0, MOST_OVERRIDES),
-        "folder": Text(1000),
-    }
-)
-_SWEEP = Record(
-    {
-        "format": OneOf((FORMAT,)),
-        "command": COMMAND,
-        "settings": Plain(),
-        "runs": Several(_RUN, 0, 10_000),
-        "versions": Plain(),
-        "git_revision": Maybe(Text()),
-        "machine": Plain(),
-    }
-)
-"""Schema of `sweep.json`."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -120,18 +86,18 @@ def path_argument(path: Path) -> str:
     return text if re.fullmatch(r"[\w./+-]+", text) else quoted(text)
 
 
-@dataclasses.dataclass
-class Sweep:
-    """The content of `sweep.json`."""
+class Sweep(Provenance, extra="forbid"):
+    """A sweep: the content of `sweep.json`."""
 
-    folder: Path
-    """Folder of the sweep."""
-    command: str
+    format: Literal["drone_rl sweep, version 2"] = "drone_rl sweep, version 2"
+    command: Annotated[str, AfterValidator(lambda text: COMMAND.read(text, "command"))]
     """The command that began the sweep."""
     settings: dict[str, Any]
     """The common settings of all runs, with interpolations unresolved."""
-    runs: list[Run]
-    """The runs in the order of their numbers."""
+    runs: tuple[Run, ...]
+    """The runs in the order of their numbers; in the file, folders are relative."""
+    folder: Annotated[Path, Field(exclude=True)] = Path()
+    """Folder of the sweep."""
 
     def name_of(self, run: Run) -> str:
         """Return the path of a run's folder inside the sweep's folder."""
@@ -139,18 +105,8 @@ class Sweep:
 
     def save(self) -> None:
         """Write `sweep.json`."""
-        runs = [
-            {"number": r.number, "overrides": list(r.overrides), "folder": self.name_of(r)}
-            for r in self.runs
-        ]
-        content = {
-            "format": FORMAT,
-            "command": self.command,
-            "settings": self.settings,
-            "runs": runs,
-            **provenance(),
-        }
-        write_atomically(self.folder / "sweep.json", json.dumps(content, indent=2))
+        runs = tuple(dataclasses.replace(r, folder=Path(self.name_of(r))) for r in self.runs)
+        self.replace(runs=runs, **provenance()).write_json(self.folder / "sweep.json")
 
 
 def read_sweep(folder: Path) -> Sweep:
@@ -167,17 +123,11 @@ def read_sweep(folder: Path) -> Sweep:
         )
     try:
         refuse_links(folder, _LEVELS)
-        content = _SWEEP.read(read_json(path, SWEEP_BYTES), "sweep")
-        runs = [
-            Run(
-                run["number"],
-                tuple(check_harmless(override, "a run") for override in run["overrides"]),
-                inside(folder, run["folder"]),
-            )
-            for run in content["runs"]
-        ]
-        settings = dict(as_mapping(content["settings"], "settings"))
-        return Sweep(folder, content["command"], settings, runs)
+        sweep = Sweep.read_json(path, SWEEP_BYTES)
+        for override in (override for run in sweep.runs for override in run.overrides):
+            check_harmless(override, "a run")
+        runs = (dataclasses.replace(r, folder=inside(folder, str(r.folder))) for r in sweep.runs)
+        return sweep.replace(folder=folder, runs=tuple(runs))
     except InputError as error:
         raise InputError(
             f"{path} is damaged, or of an older version of drone_rl ({error}); move the folder "
@@ -228,7 +178,8 @@ def open_sweep(
                 f"hydra.sweep.dir={folder} holds other runs ({other.parent.name}); "
                 "choose another folder"
             )
-        sweep = Sweep(folder, shlex.join(command), dict(settings), list(runs))
+        text, plain = shlex.join(command), json.loads(json.dumps(settings))
+        sweep = Sweep(folder=folder, command=text, settings=plain, runs=tuple(runs))
     else:
         sweep = read_sweep(folder)
         begun = {run.number: run.overrides for run in sweep.runs}
@@ -238,7 +189,8 @@ def open_sweep(
                 "choose another folder, or give that command to resume it"
             )
         check_same_config(sweep.settings, json.loads(json.dumps(settings)), MAY_CHANGE)
-        sweep.runs += [run for run in runs if run.number not in begun]
+        new = tuple(run for run in runs if run.number not in begun)
+        sweep = sweep.replace(runs=sweep.runs + new)
         check_folders(sweep.runs)
     sweep.save()
     return sweep

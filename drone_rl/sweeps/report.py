@@ -7,7 +7,6 @@ import base64
 import json
 import logging
 import re
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,12 +15,20 @@ from markupsafe import Markup, escape
 from drone_rl.sweeps import figures
 from drone_rl.sweeps.manifest import Sweep, read_sweep
 from drone_rl.sweeps.rows import read_rows
-from drone_rl.sweeps.summary import RunGroup, make_groups, summarise_sweep, to_csv
+from drone_rl.sweeps.summary import (
+    MIN_RUNS,
+    RunMedian,
+    RunShare,
+    Summary,
+    make_groups,
+    summarise_sweep,
+    to_csv,
+)
 from drone_rl.utils.display import content_security_policy, page_environment, static_text
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, last_of, newest, write_atomically
 from drone_rl.utils.readers import read_result
-from drone_rl.utils.text import seed_line
+from drone_rl.utils.text import render, seed_line
 
 if TYPE_CHECKING:
     from drone_rl.utils.seeding import RootSeed
@@ -48,7 +55,7 @@ def find_sweep(which: str | Path, outputs: str | Path = "outputs") -> Sweep:
     return read_sweep(last.parent.absolute())
 
 
-def write_sweep_report(sweep: Sweep) -> tuple[Path, dict[str, Any]]:
+def write_sweep_report(sweep: Sweep) -> tuple[Path, Summary]:
     """Write `summary.csv`, `summary.json` and `report.html` to the sweep's folder.
 
     Return the path of the page, and the summary.
@@ -56,11 +63,15 @@ def write_sweep_report(sweep: Sweep) -> tuple[Path, dict[str, Any]]:
     rows = read_rows(sweep)
     summary = summarise_sweep(sweep, rows)
     write_atomically(sweep.folder / "summary.csv", to_csv(rows))
-    write_atomically(sweep.folder / "summary.json", json.dumps(summary, indent=2, allow_nan=False))
-    pictures = _plots(make_groups(rows), summary["sentences"])
+    summary.write_json(sweep.folder / "summary.json")
     page = sweep.folder / "report.html"
-    write_atomically(page, render_page(sweep.folder.name, summary, pictures))
+    write_atomically(page, render_page(sweep.folder.name, summary))
     return page, summary
+
+
+def text_of(summary: Summary, part: str) -> str:
+    """Return the sentences of one part of the report, such as "verdicts"."""
+    return render("drone_rl.sweeps", "text.j2", s=summary, part=part, min_runs=MIN_RUNS)
 
 
 def write_picture(sweep: Sweep, path: Path) -> None:
@@ -69,28 +80,27 @@ def write_picture(sweep: Sweep, path: Path) -> None:
     Raises:
         InputError: No run of the sweep is finished and judged.
     """
-    groups = make_groups(read_rows(sweep))
-    if not any(row.kind for group in groups for row in group.finished):
+    rows = read_rows(sweep)
+    if not any(row.kind for row in rows):
         raise InputError(
             f"picture={path}: no run of {sweep.folder} is finished and judged yet; "
             "sweep with evaluate_after=200, or give judge=true"
         )
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(path, figures.draw_outcome(figures.lay_out(groups)))
+    write_atomically(path, figures.draw_outcome(figures.lay_out(make_groups(rows))))
 
 
-def terminal_lines(summary: dict[str, Any]) -> str:
+def terminal_lines(summary: Summary) -> str:
     """Return the lines of a summary for a terminal."""
-    sentences = summary["sentences"]
-    lines = [text for name, text in sentences.items() if name.startswith(("runs.", "verdicts."))]
-    for group in summary["groups"]:
-        choice = ", ".join(f"{k}={v}" for k, v in group.items() if isinstance(v, str))
-        lines.append(f"{choice or 'all':44} {'; '.join(group['sentences'].values())}")
-    lines += [f"run {r['run']} {r['state']}: {r['error']}" for r in summary["runs"] if r["error"]]
-    best = _paragraph(sentences, "best.")
-    lines.append(f"best run: {best}" if summary["best"] else best)
-    if summary["best"]:
-        lines.append(f"to repeat it: {summary['best']['command']}")
+    lines = [text for part in ("runs", "verdicts") if (text := text_of(summary, part))]
+    for group in summary.groups:
+        choice = ", ".join(f"{k}={v}" for k, v in group.settings.items())
+        lines.append(f"{choice or 'all':44} {render('drone_rl.sweeps', 'group.j2', g=group)}")
+    lines += [f"run {row.run} {row.state}: {row.error}" for row in summary.runs if row.error]
+    best = text_of(summary, "best")
+    lines.append(f"best run: {best}" if summary.best else best)
+    if summary.best:
+        lines.append(f"to repeat it: {summary.best.command}")
     return "\n".join(lines)
 
 
@@ -141,83 +151,64 @@ def judge_run(
     return verdict
 
 
-def render_page(name: str, summary: dict[str, Any], pictures: list[dict[str, str]]) -> str:
-    """Return the HTML page of a sweep with this name and summary, from `summarise_sweep`.
-
-    Each of the plots has "title", "text", and data URIs for a "light" and a "dark" page.
-    """
+def render_page(name: str, summary: Summary) -> str:
+    """Return the HTML page of a sweep with this name."""
     environment = page_environment("drone_rl.sweeps", "drone_rl.explanations.report")  # for styles
-    environment.filters |= {"figure": _figure, "code": _code}
+    environment.filters |= {"median": _median, "share": _share, "number": _number, "code": _code}
     style = static_text(environment, STYLES)
     parts = ("runs", "verdicts", "best", "settings")
     return environment.get_template("report.html").render(
         name=name,
-        figures=summary,
-        pictures=pictures,
-        texts={part: _paragraph(summary["sentences"], f"{part}.") for part in parts},
+        summary=summary,
+        plots=_plots(summary),
+        texts={part: text_of(summary, part) for part in parts},
         policy=content_security_policy(style),
         style=style,
     )
 
 
-def _plots(groups: Sequence[RunGroup], sentences: Mapping[str, str]) -> list[dict[str, str]]:
-    rows = [row for group in groups for row in group.known]
-    if not rows:
+def _plots(summary: Summary) -> list[dict[str, str]]:
+    """Return "title", "text", and data URIs for a "light" and a "dark" page, of each plot."""
+    if not any(group.with_progress for group in summary.groups):
         return []
-    layout, plots = figures.lay_out(groups), []
+    layout, plots = figures.lay_out(summary.groups), []
     note = f" {layout.left_out} further panels are left out." if layout.left_out else ""
     for name, (title, *_) in figures.PLOTS.items():
-        if name in ("curves", "costs") or any(row.kind for row in rows):
+        if name in ("curves", "costs") or summary.judged:
             images = (base64.b64encode(png).decode() for png in figures.draw(layout, name))
             light, dark = (f"data:image/png;base64,{image}" for image in images)
-            text = _paragraph(sentences, f"{name}.") + note
+            text = text_of(summary, name) + note
             plots.append({"title": title, "text": text, "light": light, "dark": dark})
     return plots
 
 
-def _paragraph(sentences: Mapping[str, str], part: str) -> str:
-    """Join the sentences whose names begin with `part`."""
-    return " ".join(text for name, text in sentences.items() if name.startswith(part))
-
-
-def _figure(value: object) -> str:
-    """Format a table cell; unknown values are empty."""
-    if isinstance(value, dict) and "more_than" in value:
-        return _median(value)
-    if isinstance(value, dict):
-        return "" if value["share"] is None else _share(value)
-    if value is None:
-        return ""
-    return _number(value) if isinstance(value, float) else str(value)
-
-
-def _share(value: Mapping[str, Any]) -> str:
+def _share(share: RunShare) -> str:
     """Format a fraction of the known runs, with the interval that allows for the unknown ones."""
-    unknown = value.get("unknown", 0)
-    if unknown == value["trials"]:
-        return "not known"
-    certain = value.get("certain", value["successes"])
-    few = "" if certain == value["successes"] else f", {certain} certain"
-    more = f", {unknown} not known" if unknown else ""
-    count = f"{value['successes']}/{value['trials'] - unknown}{few}{more}"
-    return f"{count} [{value['lower95']:.2f}, {value['upper95']:.2f}]"
+    if share.unknown == share.trials:
+        return "not known" if share.trials else ""
+    few = "" if share.certain in (None, share.successes) else f", {share.certain} certain"
+    more = f", {share.unknown} not known" if share.unknown else ""
+    count = f"{share.successes}/{share.trials - share.unknown}{few}{more}"
+    return f"{count} [{share.lower95:.2f}, {share.upper95:.2f}]"
 
 
-def _median(value: Mapping[str, Any]) -> str:
+def _median(median: RunMedian) -> str:
     """Format a median or its lower bound, with the interval if there is one."""
-    median, bound = value["median"], value["more_than"]
-    figure = median if bound is None else bound
+    figure = median.median if median.more_than is None else median.more_than
     if figure is None:
         return ""
-    text = ("" if bound is None else ">") + _number(figure)
-    if value["lower95"] is None:
+    text = ("" if median.more_than is None else ">") + _number(figure)
+    if median.lower95 is None:
         return text
-    upper = "more" if value["upper95"] is None else _number(value["upper95"])
-    return f"{text} [{_number(value['lower95'])}, {upper}]"
+    upper = "more" if median.upper95 is None else _number(median.upper95)
+    return f"{text} [{_number(median.lower95)}, {upper}]"
 
 
-def _number(value: float) -> str:
-    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}"
+def _number(value: object) -> str:
+    """Format a table cell; None is empty."""
+    if isinstance(value, float):
+        return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}"
+    return "" if value is None else str(value)
 
 
 def _code(text: str) -> Markup:

@@ -1,123 +1,100 @@
 """The table of runs: one row per run, read from its files whatever its state."""
 
 import contextlib
-import dataclasses
 import itertools
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from drone_rl.sweeps.manifest import Run, Sweep, read_failure, read_sweep
-from drone_rl.trust.rule import SIDES, Rule, VerdictKind
+from drone_rl.trust.results import Verdict
+from drone_rl.trust.rule import SIDES, Rule
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.models import Model, Stored
 from drone_rl.utils.readers import read_result, read_table
-from drone_rl.utils.schema import Flag, Maybe, OneOf, Real, Whole
 
 Array = NDArray[np.float64]
 LAST_UPDATES = 20
 """Number of last updates over which the entropy is averaged."""
-NOT_OFFERED = "not offered"
-"""Placeholder for the fraction of goals reached on a side without goals."""
+OLDER_RULE = "judged by an older rule: not counted"
+"""Verdict of a run that was judged by an outdated rule only."""
+_DAMAGE = (ValueError, LookupError, TypeError)
+"""Exceptions that reading damaged files raises; `InputError` is a `ValueError`."""
 
 
-@dataclasses.dataclass
-class Row:
+class _Result(Stored):
+    """What a row takes from `result.json`."""
+
+    reason: str
+    frames: Annotated[int, Field(ge=0)]
+    episodes: Annotated[int, Field(ge=0)]
+    seconds: Annotated[float, Field(ge=0.0)]
+    largest_reward: Annotated[float, Field(gt=0.0)]
+    running_reward: float
+
+
+class Row(Model):
     """One run."""
 
-    run: Run
-    choice: dict[str, str]
+    run: int
+    """Its number."""
+    settings: dict[str, str]
     """The swept settings and their values, including the seed."""
-    folder: str
-    """Path of the run's folder inside the sweep's folder."""
-    state: str = "unfinished"
-    """"finished", "failed", "damaged" or "unfinished"."""
-    error: str | None = None
-    """Reason of a failure or damage."""
-    result: dict[str, Any] = dataclasses.field(default_factory=dict)
-    """`result.json`."""
-    curve: tuple[Array, Array] = (np.empty(0), np.empty(0))
-    """Learning curve: frames, and running mean as a fraction of the greatest reward; empty unless
-    the run finished. A failed run counts as having learned nothing. Shape: (num_updates,) each."""
-    frames: float = 0.0
+    state: Literal["finished", "failed", "damaged", "unfinished"] = "unfinished"
+    verdict: str | None = None
+    """Kind of the last policy by the current rule, or why it was not judged."""
+    certain: bool | None = None
+    """Whether the verdict is statistically certain."""
+    reason: str | None = None
+    """Why the training ended."""
+    frames: int = 0
     """Frames until it ended or failed."""
+    episodes: int | None = None
     seconds: float = 0.0
     """Training time until it ended or failed."""
+    running_reward: float | None = None
+    success: float | None = None
+    """Success rate of the greedy policy."""
+    share: float | None = None
+    """Fraction of goals that it reaches: cubes, or rows of pillars."""
+    left: float | None = None
+    """The same of goals on its left; None without such goals, as in a task with other strata."""
+    ahead: float | None = None
+    right: float | None = None
     entropy: float | None = None
     """Mean entropy of the policy over the last updates, nats."""
+    error: str | None = None
+    """Reason of a failure or damage."""
+    folder: str
+    """Path of the run's folder inside the sweep's folder."""
+    command: Annotated[str, Field(exclude=True)]
+    """The shell command that repeats the run."""
+    final_share: Annotated[float, Field(exclude=True)] = 0.0
+    """Final running mean as a fraction of the greatest reward; 0 if the run failed."""
+    judged: Annotated[Verdict | None, Field(exclude=True)] = None
+    """The verdict by the current rule."""
+    curve: Annotated[tuple[Any, Any], Field(exclude=True)] = (np.empty(0), np.empty(0))
+    """Learning curve: frames, and running mean as a fraction of the greatest reward; empty unless
+    the run finished. A failed run counts as having learned nothing. Shape: (num_updates,) each."""
 
     @property
     def is_solved(self) -> bool:
         """Whether it reached the target, or was proved to succeed in all cases."""
-        return self.result.get("reason") in ("solved", "proved")
-
-    @property
-    def verdict(self) -> dict[str, Any] | None:
-        """Verdict on the last policy by the current rule, or None."""
-        verdict = self.result.get("verdict")
-        return verdict if verdict is not None and verdict["rule"] == Rule().text else None
+        return self.reason in ("solved", "proved")
 
     @property
     def kind(self) -> str | None:
         """One of `KINDS`, without sides; None without a verdict."""
-        return None if self.verdict is None else VerdictKind(self.verdict["kind"]).family
-
-    @property
-    def is_certain(self) -> bool:
-        """Whether the verdict is statistically certain."""
-        return self.verdict is not None and self.verdict["certain"]
-
-    @property
-    def has_older_verdict(self) -> bool:
-        """Whether the run was judged by an outdated rule only."""
-        return "verdict" in self.result and self.verdict is None
+        return None if self.judged is None else self.judged.kind.family
 
     @property
     def lean(self) -> float | None:
         """Fraction of the goals reached on the right minus that on the left."""
-        left, right = self.share("left"), self.share("right")
-        return None if left is None or right is None else right - left
-
-    @property
-    def final_share(self) -> float:
-        """Final running mean as a fraction of the greatest reward; 0 if the run failed."""
-        return self.result["running_reward"] / self.result["largest_reward"] if self.result else 0.0
-
-    def share(self, of: str) -> float | None:
-        """Return the fraction of goals that the greedy policy reaches: cubes, or rows of pillars.
-
-        `of` is "all", "left", "ahead" or "right". None without a verdict, or without such goals, as
-        in a task with other strata.
-        """
-        shares = {} if self.verdict is None else self.verdict["greedy"]["shares"]
-        return shares[of]["mean"] if of in shares else None
-
-    def plain(self) -> dict[str, Any]:
-        """Return the row as plain values."""
-        verdict, judged = self.verdict, self.verdict is not None
-        sides = {side: self.share(side) for side in SIDES}
-        return {
-            "run": self.run.number,
-            **self.choice,
-            "state": self.state,
-            "verdict": verdict["kind"] if verdict else self._why_not_judged(),
-            "certain": self.is_certain if judged else None,
-            **{key: self.result.get(key) for key in ("reason", "frames", "episodes")},
-            "seconds": round(self.result["seconds"], 1) if self.result else None,
-            "running_reward": self.result.get("running_reward"),
-            "success": verdict["greedy"]["success"]["share"] if verdict else None,
-            "share": self.share("all"),
-            **{k: NOT_OFFERED if judged and v is None else v for k, v in sides.items()},
-            "entropy": self.entropy,
-            "error": self.error,
-            "folder": self.folder,
-        }
-
-    def _why_not_judged(self) -> str | None:
-        if self.has_older_verdict:
-            return "judged by an older rule: not counted"
-        return "not judged" if self.state == "finished" else None
+        return None if self.left is None or self.right is None else self.right - self.left
 
 
 def read_rows(sweep: Sweep) -> list[Row]:
@@ -126,7 +103,7 @@ def read_rows(sweep: Sweep) -> list[Row]:
     keys = list(dict.fromkeys(key for choice in choices for key in choice))
     swept = [key for key in keys if len({choice.get(key) for choice in choices}) > 1]
     return [
-        _read_row(Row(run, {key: choice.get(key, "") for key in swept}, sweep.name_of(run)))
+        _read_row(run, {key: choice.get(key, "") for key in swept}, sweep.name_of(run))
         for run, choice in zip(sweep.runs, choices, strict=True)
     ]
 
@@ -136,67 +113,65 @@ def _choice(run: Run) -> dict[str, str]:
     return {key.lstrip("+"): value for key, _, value in parts if key != "trial"}
 
 
-def _read_row(row: Row) -> Row:
-    """Add to a row what the run's files contain."""
-    result, row.error = read_result(row.run.folder), read_failure(row.run)
+def _read_row(run: Run, settings: dict[str, str], folder: str) -> Row:
+    command = run.repeat_command()
+    row = Row(run=run.number, settings=settings, folder=folder, command=command)
+    result, error = read_result(run.folder), read_failure(run)
+    if result is None and error is None:
+        return row
     if result is None:
-        if row.error is not None:
-            row.state = "failed"
-            with contextlib.suppress(*_DAMAGE):  # a failed run may have metrics
-                _read_metrics(row)
-        return row
+        progress = {}
+        with contextlib.suppress(*_DAMAGE):  # a failed run may have metrics
+            progress, _ = _read_metrics(run.folder)
+        return row.replace(state="failed", error=error, **progress)
     try:
-        _check_result(result)
-        frames, rewards = _read_metrics(row)
-    except _DAMAGE as error:
-        reason = str(error) if isinstance(error, InputError) else repr(error)
-        row.state, row.error = "damaged", f"its files can't be read ({reason})"
-        return row
-    row.state, row.error, row.result = "finished", None, result
-    row.curve = frames, rewards / result["largest_reward"]
-    row.frames, row.seconds = float(result["frames"]), float(result["seconds"])
-    return row
+        figures = _Result.read(result, "result")
+        progress, curve = _read_metrics(run.folder)
+        judged = _read_verdict(result.get("verdict"))
+    except _DAMAGE as damage:
+        return row.replace(state="damaged", error=f"its files can't be read ({damage})")
+    reward, most = figures.running_reward, figures.largest_reward
+    return row.replace(
+        state="finished",
+        **progress | figures.model_dump(exclude={"largest_reward"}),
+        curve=(curve[0], curve[1] / most),
+        final_share=reward / most,
+        verdict=OLDER_RULE if "verdict" in result else "not judged",
+    ).replace(**{} if judged is None else _figures_of(judged))
 
 
-_DAMAGE = (ValueError, LookupError, TypeError, AttributeError)
-"""Exceptions that reading damaged files raises; `InputError` is a `ValueError`."""
-_KIND = OneOf(tuple(kind.value for kind in VerdictKind))
-_RESULT = {
-    "frames": Whole(0, 10**15),
-    "episodes": Whole(0, 10**12),
-    "seconds": Real(0.0, 1e10),
-    "largest_reward": Real(0.0, 1e6, is_above=True),
-    "running_reward": Real(-1e15, 1e15),
-}
-"""Schema of the figures in `result.json`."""
+def _read_verdict(verdict: Mapping[str, Any] | None) -> Verdict | None:
+    """Return the verdict if it is by the current rule."""
+    is_current = verdict is not None and verdict["rule"] == Rule().text
+    return Verdict.read(verdict, "result.verdict") if is_current else None
 
 
-def _check_result(result: dict[str, Any]) -> None:
-    for key, kind in _RESULT.items():
-        kind.read(result.get(key), f"result.{key}")
-    verdict = result.get("verdict")
-    if verdict is not None and verdict["rule"] == Rule().text:
-        _KIND.read(verdict["kind"], "verdict.kind")
-        Flag().read(verdict["certain"], "verdict.certain")
-        for of in verdict["greedy"]["shares"].values():
-            Maybe(Real(0.0, 1.0)).read(of["mean"], "verdict.greedy.shares")
+def _figures_of(judged: Verdict) -> dict[str, Any]:
+    shares = {name: share.mean for name, share in judged.greedy.shares.items()}
+    return {
+        "judged": judged,
+        "verdict": judged.kind.value,
+        "certain": judged.certain,
+        "success": judged.greedy.success.share,
+        "share": shares["all"],
+        **{side: shares.get(side) for side in SIDES},
+    }
 
 
-def _read_metrics(row: Row) -> tuple[Array, Array]:
-    """Return frames and running reward of each update; add final figures to the row."""
-    header, *lines = read_table(row.run.folder / "metrics.csv")
+def _read_metrics(folder: Path) -> tuple[dict[str, Any], tuple[Array, Array]]:
+    """Return the last figures, and frames and running reward of each update."""
+    header, *lines = read_table(folder / "metrics.csv")
     if not {"frames", "train/running_reward"} <= {*header}:
         raise InputError("metrics.csv lacks the columns frames and train/running_reward")
     cells = itertools.zip_longest(*lines, fillvalue="") if lines else itertools.repeat(())
     columns = dict(zip(header, cells, strict=False))
-    frames = np.array(columns["frames"], np.float64)
-    rewards = np.array(columns["train/running_reward"], np.float64)
-    if lines:
-        row.frames, row.seconds = float(frames[-1]), float(columns["seconds"][-1])
+    curve = tuple(np.array(columns[n], float) for n in ("frames", "train/running_reward"))
     logged = [float(cell) for cell in columns.get("loss/entropy", ())[-LAST_UPDATES:] if cell]
     entropy = float(np.mean(logged)) if logged else np.nan
-    row.entropy = entropy if np.isfinite(entropy) else None
-    return frames, rewards
+    progress: dict[str, Any] = {"entropy": entropy if np.isfinite(entropy) else None}
+    if lines:
+        progress |= {"frames": int(curve[0][-1]), "seconds": float(columns["seconds"][-1])}
+    return progress, (curve[0], curve[1])
 
 
 def choice_in_sweep(checkpoint: Path) -> tuple[str, dict[str, Any]] | None:
@@ -208,9 +183,9 @@ def choice_in_sweep(checkpoint: Path) -> tuple[str, dict[str, Any]] | None:
     folder = checkpoint.absolute().parent.parent
     if checkpoint.suffix != ".pt" or not (folder.parent / "sweep.json").is_file():
         return None
-    rows = read_rows(read_sweep(folder.parent))
-    row = next((row for row in rows if row.run.folder == folder), None)
-    if row is None:
-        return None
-    episodes = None if row.verdict is None else row.verdict["greedy"]["episodes"]
-    return row.run.repeat_command(), {"runs": len(rows), "episodes": episodes}
+    sweep = read_sweep(folder.parent)
+    for run, row in zip(sweep.runs, read_rows(sweep), strict=True):
+        if run.folder == folder:
+            episodes = None if row.judged is None else row.judged.greedy.episodes
+            return row.command, {"runs": len(sweep.runs), "episodes": episodes}
+    return None

@@ -24,7 +24,6 @@ from drone_rl.config import (
     BaseTaskSettings,
     CameraSettings,
     DynamicsSettings,
-    read_task,
 )
 from drone_rl.config.configuration import from_arguments
 from drone_rl.config.options import UnseededTrainOptions
@@ -80,7 +79,7 @@ class FlightConditions:
     def read(cls, data: Mapping[str, Any]) -> Self:
         """Read conditions from plain data; see `Settings.read` for errors."""
         return cls(
-            read_task(data["task"], "task"),
+            BaseTaskSettings.read(data["task"], "task"),
             CameraSettings.read(data["camera"], "camera"),
             DynamicsSettings.read(data["dynamics"], "dynamics"),
             ActionSettings.read(data["actions"], "actions"),

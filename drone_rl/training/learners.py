@@ -125,7 +125,7 @@ class ReinforceLearner(GradientLearner):
 
     loss: ReinforceLoss
     """Gives the `loss_*` terms of a batch, reduced over its steps."""
-    chunk_frames: int = TrainerSettings.chunk_frames
+    chunk_frames: int = TrainerSettings().chunk_frames
     """Frames per forward and backward pass. Gradients are accumulated over chunks, so this bounds
     memory and affects only rounding."""
     whole_episodes: bool = False
@@ -186,7 +186,7 @@ class ActorCriticLearner(GradientLearner):
     """Passes over a batch."""
     minibatch_size: int | None = None
     """Approximate number of steps for one step of the optimizer; None for all."""
-    chunk_frames: int = TrainerSettings.chunk_frames
+    chunk_frames: int = TrainerSettings().chunk_frames
     """See `ReinforceLearner`."""
     in_keys: ClassVar[Sequence[NestedKey]] = (
         *(PIXELS, "action", LOG_PROB, VALUE),

@@ -14,10 +14,8 @@ from typing import Any, Self
 import yaml
 
 from drone_rl.config.configuration import (
-    as_config,
     check_same_config,
     from_arguments,
-    from_config,
 )
 from drone_rl.config.training import CloningSettings, TrainSettings
 from drone_rl.policies.policy import Policy, load_policy
@@ -44,7 +42,6 @@ from drone_rl.utils.models import Model
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import shown
-from drone_rl.utils.settings import kinds_of
 
 _log = logging.getLogger(__name__)
 MAY_CHANGE = (
@@ -170,7 +167,8 @@ class RunFolder:
         """
         folder, demonstrations = settings.demonstrations, []
         if state is not None:
-            check_same_config(_own(state["config"]), as_config(settings), MAY_CHANGE)
+            saved = TrainSettings.read(_own(state["config"]))
+            check_same_config(saved.config(), settings.config(), MAY_CHANGE)
             if folder is not None and "cloning" not in state:
                 raise InputError(
                     f"can't resume with demonstrations={folder}: the run was started without any, "
@@ -189,7 +187,7 @@ class RunFolder:
 
     def checkpoints(self, settings: TrainSettings) -> CheckpointCallback:
         """Return the callback that writes checkpoints, with the settings and their origin."""
-        config, origin = as_config(settings), provenance()
+        config, origin = settings.config(), provenance()
         description = describe(settings).as_dict()
         return CheckpointCallback(
             self.path / "checkpoints",
@@ -319,7 +317,7 @@ def reraise_signal(training: Training, function: str = "train") -> Training:
 
 def _own(config: Mapping[str, Any]) -> dict[str, Any]:
     """Return the training settings of a checkpoint."""
-    return {k: v for k, v in config.items() if k in kinds_of(TrainSettings)}
+    return {k: v for k, v in config.items() if k in TrainSettings.model_fields}
 
 
 def settings_for(
@@ -340,7 +338,7 @@ def settings_for(
 
 def settings_of(config: Mapping[str, Any]) -> TrainSettings:
     """Return a checkpoint's settings; raise an `InputError` if they name an unregistered part."""
-    settings = from_config(TrainSettings, _own(config))
+    settings = TrainSettings.read(_own(config))
     parts = (settings.network, settings.returns, settings.objective, settings.optimizer)
     for part in (*parts, settings.scheduler, settings.collector, *settings.transforms):
         if not part.is_known:

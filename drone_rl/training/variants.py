@@ -9,8 +9,8 @@ import torch
 from torchrl.envs.utils import exploration_type
 
 from drone_rl.collectors import EpisodeCollector, RolloutCollector, ThreadedCollector
-from drone_rl.config.configuration import as_config, from_config, locate
 from drone_rl.config.learning import A2c, Ppo, Ray, Rollouts, WithCritic
+from drone_rl.config.parts import locate
 from drone_rl.config.registry import implements, modules_of
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies import ActorCritic, ImageNetwork
@@ -83,7 +83,7 @@ def ray_collector(settings: TrainSettings, replay: FailureReplayTask | None = No
     sizes = group_sizes(settings)
     (local,) = make_groups(settings, [1])  # only its actor and network are needed
     local.env.close()
-    sent = (as_config(settings), sorted(modules_of(settings) | {*IMPORTED}), sizes)
+    sent = (settings.config(), sorted(modules_of(settings) | {*IMPORTED}), sizes)
     makers = [functools.partial(_remote_collector, *sent, i, replay) for i in range(len(sizes))]
     collector = RayEpisodeCollector(
         makers,
@@ -111,7 +111,7 @@ def _remote_collector(
     """
     for module in modules:
         importlib.import_module(module)
-    settings = from_config(TrainSettings, config)
+    settings = TrainSettings.read(config)
     assert isinstance(settings.collector, Ray)
     (group,) = make_groups(settings, sizes, replay, [number])
     options = episode_options(settings, max(1, int(settings.collector.num_cpus)))

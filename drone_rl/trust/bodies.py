@@ -8,7 +8,7 @@ from typing import Any, Unpack
 
 import pydantic
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
+from matplotlib.transforms import Bbox
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.commands import BodiesSettings, JudgeSettings
@@ -21,26 +21,17 @@ from drone_rl.trust.results import Figures, Verdict
 from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.models import Seeded, Stored
-from drone_rl.utils.palette import BAD, EMPTY, FAINT, GOOD, INK, ONE_SIDED, css, light
+from drone_rl.utils.palette import BAD, EMPTY, GOOD, ONE_SIDED, css, light
 from drone_rl.utils.progress import Progress, as_progress, silent
 from drone_rl.utils.provenance import Provenance, provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.text import interval, percent, rate
+from drone_rl.utils.text import interval, rate
 
 LOOPED = "software in the loop"
 """Name of the column of these episodes, and their key in the file."""
 GUSTS = 0.25
 """Standard deviation of the wind along each axis, as a fraction of its mean."""
-_COLORS = {
-    "good": css(light(GOOD)),
-    "good, but trivial": css(light(GOOD, 0.15)),
-    "poor": css(light(BAD)),
-    "one-sided": css(light(ONE_SIDED)),
-    "none": css(light(EMPTY)),
-}
-_INK, _FAINT = css(INK), css(FAINT)
-_WIDTH, _HEIGHT = 1.35, 1.1
-"""Inches of a cell."""
+_COLORS = {"good": GOOD, "poor": BAD, "one-sided": ONE_SIDED}
 
 
 class LeftOut(Stored):
@@ -73,7 +64,7 @@ class Bodies(TableResult, Seeded, Provenance):
         column = [LOOPED] if self.in_the_loop else []
         table = [["", *self.bodies, *column]]
         for name, by_body in self.policies.items():
-            cells = [" ".join(_cell(by_body[body])) for body in self.bodies]
+            cells = [_cell(by_body[body]) for body in self.bodies]
             flights = [_looped(self.in_the_loop[name])] if self.in_the_loop else []
             table.append([name, *cells, *flights])
         return table
@@ -176,10 +167,10 @@ def changes_of(body: str, dynamics: DynamicsSettings) -> Mapping[str, Any]:
     return {**flying, "camera_mount": "body"} if body == "camera on the body" else flying
 
 
-def _cell(verdict: Verdict) -> tuple[str, str]:
+def _cell(verdict: Verdict) -> str:
     """Return the kind and the success rate."""
-    success = rate(verdict.greedy.success, label="")
-    return f"{verdict.kind.value}{'' if verdict.certain else '?'}", success
+    unsure = "" if verdict.certain else "?"
+    return f"{verdict.kind.value}{unsure} {rate(verdict.greedy.success, label='')}"
 
 
 def _looped(flights: Figures | LeftOut) -> str:
@@ -192,44 +183,34 @@ def _looped(flights: Figures | LeftOut) -> str:
 
 def chart(result: Bodies) -> Figure:
     """Draw a colored table: verdict, success rate with 95% interval, and largest failure."""
-    policies, looped = result.policies, result.in_the_loop
-    bodies = [*result.bodies, *([LOOPED] if looped else [])]
-    size = (_WIDTH * (len(bodies) + 1), _HEIGHT * len(policies) + 0.9)
-    figure = Figure(figsize=size, layout="constrained")
+    head, *rows = result.rows()
+    colors = [[EMPTY] * len(row[1:]) for row in rows]
+    texts = [[textwrap.fill(text, 18) for text in row[1:]] for row in rows]
+    unsure: list[tuple[int, int]] = []
+    for y, name in enumerate(result.policies):
+        for x, body in enumerate(result.bodies):
+            verdict = result.policies[name][body]
+            colors[y][x] = _COLORS.get(verdict.kind.family, EMPTY)
+            if (row := verdict.failures.largest) is not None:
+                texts[y][x] += "\n" + textwrap.fill(verdict.terms.failing(row.by, row.value), 18)
+            unsure += [] if verdict.certain else [(y + 1, x)]  # below the head
+    figure = Figure(figsize=(1.5 * len(head), 1.3 * len(rows) + 1.1), layout="constrained")
     axes = figure.subplots()
-    axes.set(xlim=(-1, len(bodies)), ylim=(len(policies), -0.55))
+    axes.set_title("Verdict, success rate with 95% CI, and where most failures occur", fontsize=11)
     axes.axis("off")
-    heading = "Verdict, success rate with 95% CI, and where most failures occur"
-    axes.set_title(heading, loc="left", fontsize=11, color=_INK)
-    note = "hatched, ?: not certain"
-    figure.supxlabel(note, fontsize=9, color=_FAINT)
-    for x, body in enumerate(bodies):
-        text = textwrap.fill(body, 16)
-        axes.text(x + 0.5, -0.25, text, ha="center", va="center", fontsize=10, color=_INK)
-    for y, (name, verdicts) in enumerate(policies.items()):
-        axes.text(-0.05, y + 0.5, name, ha="right", va="center", fontsize=11, color=_INK)
-        cells = [_verdict_cell(verdicts[body]) for body in result.bodies]
-        if looped:
-            text = textwrap.fill(_looped(looped[name]), 17)
-            cells.append((_COLORS["none"], "..", [(0.5, text, 8.5, _INK)]))
-        for x, (color, hatch, lines) in enumerate(cells):
-            axes.add_patch(Rectangle((x, y), 1, 1, fc=color, ec="white", lw=2, hatch=hatch))
-            for height, text, points, ink in lines:
-                axes.text(
-                    x + 0.5, y + height, text, ha="center", va="center", fontsize=points, color=ink
-                )
+    figure.supxlabel("hatched, ?: not certain", fontsize=9)
+    table = axes.table(
+        texts,
+        cellColours=[[css(light(color)) for color in row] for row in colors],
+        rowLabels=[row[0] for row in rows],
+        colLabels=[textwrap.fill(body, 16) for body in head[1:]],
+        cellLoc="center",
+        bbox=Bbox.unit(),
+    )
+    table.auto_set_font_size(False)
+    table.set_fontsize(8.5)
+    for place in unsure:
+        table[place].set(hatch="//")
+    for cell in table.get_celld().values():
+        cell.set(edgecolor="white", linewidth=2)
     return figure
-
-
-def _verdict_cell(verdict: Verdict) -> tuple[str, str | None, list[tuple[float, str, float, str]]]:
-    """Color, hatch, and lines of a cell: height, text, points and color of each."""
-    kind, success, row = verdict.kind.value, verdict.greedy.success, verdict.failures.largest
-    failure = "" if row is None else verdict.terms.failing(row.by, row.value)
-    color = _COLORS.get(kind) or _COLORS.get(kind.split()[0], _COLORS["none"])
-    lines = [
-        (0.17, f"{kind}{'' if verdict.certain else ' ?'}", 9.0, _INK),
-        (0.38, percent(success.share or 0.0), 11.0, _INK),
-        (0.57, interval(success), 8.5, _INK),
-        (0.81, textwrap.fill(failure, 21), 7.0, _FAINT),
-    ]
-    return color, None if verdict.certain else "//", lines

@@ -222,9 +222,9 @@ def judge_one(
         changed_dynamics = Changes(DynamicsSettings).read(
             as_changes(dynamics, "dynamics"), "dynamics"
         )
-        drone = DynamicsSettings(**changed_dynamics)
+        drone = DynamicsSettings.read(changed_dynamics, "dynamics")
         drone.check_air()
-        worlds = _baseline(name, TaskSettings(**changed_task), drone, settings, seed)
+        worlds = _baseline(name, TaskSettings.read(changed_task, "task"), drone, settings, seed)
     else:
         measured = find_domain(loaded, shifts, outputs)
         coverage = _compared(loaded, require_domain, measured, settings, seed)

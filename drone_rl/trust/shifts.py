@@ -52,6 +52,10 @@ class Shifts(TableResult, Robustness):
         self.figure().savefig(folder / "shifts.png", dpi=110)
         strips(self).save(folder / "strips.png")
 
+    def rows(self) -> list[list[str]]:
+        """Return the success rates as a table: a header, then a row for each axis."""
+        return self.table()
+
     def figure(self) -> Figure:
         """Return the curves."""
         return chart(self)

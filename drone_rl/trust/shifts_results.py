@@ -18,7 +18,7 @@ from drone_rl.trust.results import Difference, Verdict
 from drone_rl.utils.display import Result
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import Mean, Share
-from drone_rl.utils.models import Seeded, Stored
+from drone_rl.utils.models import Model, Seeded, Stored
 from drone_rl.utils.provenance import Provenance
 from drone_rl.utils.text import listed, percent, render
 
@@ -199,7 +199,7 @@ class NetworkIdentity(Stored):
     @property
     def camera_faults(self) -> list[str]:
         """Camera faults that the policy's transforms simulate."""
-        faults = {fault.registered_name() for fault in Fault.__subclasses__()}
+        faults = {fault.name for fault in Fault.__subclasses__()}
         names = [step["name"] for step in self.description.get("transforms", ())]
         return [name for name in names if name in faults]
 
@@ -353,7 +353,7 @@ class Robustness(Seeded, Provenance):
             if of.positions is not None and self.axes[name].is_tested
         }
 
-    def rows(self) -> list[list[str]]:
+    def table(self) -> list[list[str]]:
         """Return the success rates as a table: a header, then a row for each axis."""
         table = [["success, constant", "1", "2", "3", "4", "5", "area", ""]]
         for name, along in self.axes.items():
@@ -414,7 +414,7 @@ def not_evaluated(shifts: Robustness | None) -> list[str]:
     return [name for group, name in names.items() if group not in tested]
 
 
-class Need(Stored):
+class Need(Model):
     """Required range of an axis; None stands for the value without perturbation."""
 
     low: Annotated[float, pydantic.Field(ge=-1e9, le=1e9)] | None = None

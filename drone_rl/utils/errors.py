@@ -5,6 +5,9 @@ import importlib
 from collections.abc import Iterable
 from typing import Any
 
+_MOST_BITS = 10_000
+"""Of a whole number in a message."""
+
 
 class InputError(ValueError):
     """A user's mistake: an invalid setting, file or device.
@@ -36,3 +39,23 @@ def extra(module: str, name: str, setting: str) -> Any:
             f"{setting} needs {module}, which isn't installed; "
             f"install it with pip install -e '.[{name}]' in the checkout"
         ) from error
+
+
+def shown(value: Any) -> str:
+    """Return a value for a message: short, on one line."""
+    is_array = type(value).__module__ in ("numpy", "torch")
+    value = value.item() if is_array and getattr(value, "shape", None) == () else value
+    if isinstance(value, list | tuple) and len(value) <= 8:
+        return f"[{','.join(map(_short, value))}]"
+    return _short(value)
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, type):
+        return f"(the class {value.__name__})"
+    if value is not None and not isinstance(value, str | int | float):
+        return f"({type(value).__name__})"
+    if isinstance(value, int) and value.bit_length() > _MOST_BITS:  # Python refuses to write it
+        return f"(a number of {value.bit_length()} bits)"
+    text = repr(value[:80] if isinstance(value, str) else value)
+    return text if len(text) <= 80 else f"{text[:77]}..."

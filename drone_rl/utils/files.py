@@ -13,9 +13,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from drone_rl.utils.errors import InputError
+from drone_rl.utils.errors import InputError, shown
 from drone_rl.utils.limits import SMALL_JSON_BYTES
-from drone_rl.utils.schema import shown
 
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP)
 """Errors of file systems without locks."""

@@ -1,5 +1,6 @@
 """Frozen classes of plain data whose values are checked: settings and results."""
 
+import re
 import typing
 from collections.abc import Mapping
 from pathlib import Path
@@ -8,10 +9,9 @@ from typing import Any, Self, cast
 import pydantic
 from pydantic_core import ErrorDetails
 
-from drone_rl.utils.errors import InputError, did_you_mean
+from drone_rl.utils.errors import InputError, did_you_mean, shown
 from drone_rl.utils.files import read_bytes, write_atomically
 from drone_rl.utils.limits import RESULT_BYTES
-from drone_rl.utils.schema import shown
 
 
 class _Checked(type(pydantic.BaseModel)):
@@ -70,7 +70,8 @@ class Model(pydantic.BaseModel, metaclass=_Checked):
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with other values of some fields; see above for errors."""
-        return type(self)(**{**dict(self), **changes})
+        fields = {name: getattr(self, name) for name in type(self).model_fields}
+        return type(self)(**{**fields, **changes})
 
 
 class Stored(Model):
@@ -101,7 +102,7 @@ class Seeded(Stored):
 
 
 def input_error(
-    error: pydantic.ValidationError, cls: type[pydantic.BaseModel], where: str = ""
+    error: pydantic.ValidationError, cls: type[pydantic.BaseModel] | None = None, where: str = ""
 ) -> InputError:
     """Return the first error of pydantic as a user's error, with the place, value and remedy."""
     details = error.errors(include_url=False)[0]
@@ -117,8 +118,17 @@ def input_error(
     if details["type"] == "value_error":  # raised by a validator of this project
         text = str(details.get("ctx", {}).get("error", details["msg"]))
         return InputError(f"{place}.{text}" if place else text)
-    reason = details["msg"].replace("Input should be", "must be")
-    return InputError(f"{place}={shown(details['input'])}: it {reason}")
+    _, _, rest = details["msg"].partition(" should ")
+    reason = (
+        f"must {rest.replace(' after validation', '')}"
+        if rest
+        else details["msg"][:1].lower() + details["msg"][1:]
+    )
+    if details["type"] == "literal_error":
+        reason = re.sub(r"<[\w.]+: ('[^']*')>", r"\1", reason)  # a member of an enum
+        reason += did_you_mean(details["input"], re.findall(r"'([^']+)'", reason))
+    value = f"{place}={shown(details['input'])}" if place else shown(details["input"])
+    return InputError(f"{value}: it {reason}")
 
 
 def _place(details: ErrorDetails, where: str) -> str:

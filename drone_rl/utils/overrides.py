@@ -7,11 +7,13 @@ import re
 import shlex
 from collections.abc import Collection, Iterable
 from pathlib import Path
-from typing import Any
+from typing import Annotated
+
+from annotated_types import Predicate
 
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.readers import read_yaml
-from drone_rl.utils.schema import Kind, Several, Text, shown
+from drone_rl.utils.schema import Annotation, Several, Text, shown
 
 _OF_ONE_FOLDER = re.compile(r"\+{0,2}(resume|trial|demonstrations|paths(\.\w+)?)")
 """Overrides that do not affect how a run continues: its folder (it may have been moved), its sweep,
@@ -38,26 +40,24 @@ _TAKEN_OVER = (
 """Overrides that a resumed run takes from the file: choices by name and plain values."""
 
 
-class _Command:
-    """A training command that is safe to copy into a shell."""
+class _Command(Annotation):
+    hint = Annotated[Text(20_000).hint, Predicate(lambda text: _is_safe_command(text))]
 
-    def read(self, value: Any, where: str) -> str:
-        """See `drone_rl.utils.schema.Kind`."""
-        text = Text(20_000).read(value, where)
-        try:
-            words = shlex.split(text)
-        except ValueError:
-            words = []
-        if words[:2] != ["drone-rl", "train"] or shlex.join(words) != text or "`" in text:
-            raise InputError(
-                f"{where}={shown(value)} is not a training command; give drone-rl train and its "
-                "settings, each quoted for a shell"
-            )
-        return text
+    @property
+    def reason(self) -> str:
+        return "must be a training command: drone-rl train and settings, each quoted for a shell"
 
 
-COMMAND: Kind = _Command()
-"""Kind (see `schema`) of a training command."""
+def _is_safe_command(text: str) -> bool:
+    try:
+        words = shlex.split(text)
+    except ValueError:
+        return False
+    return words[:2] == ["drone-rl", "train"] and shlex.join(words) == text and "`" not in text
+
+
+COMMAND = _Command()
+"""Kind (see `schema`) of a training command that is safe to copy into a shell."""
 
 
 def check_harmless(override: str, where: str) -> str:

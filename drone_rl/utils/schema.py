@@ -1,23 +1,37 @@
-"""Kinds of plain data: types and bounds, checked before anything is built from a file.
+"""Kinds of plain data: types and bounds, as pydantic's metadata in annotations of settings.
 
-Each kind has one method, `read(value, where)`. It returns the value, or raises an `InputError` that
-begins with the name `where`.
+`Annotated[int, Whole(1, 100, "cubes")]` is a setting's type. `Whole(1, 100).read(value, where)`
+checks one value: it returns the value, or raises an `InputError` that begins with the name `where`.
 """
 
 import dataclasses
+import functools
 import math
-import numbers
 import os
-import sys
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Annotated, Any, Literal, Protocol
 
-from drone_rl.utils.errors import InputError, did_you_mean
+from annotated_types import MaxLen, MinLen, Predicate
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    GetCoreSchemaHandler,
+    Strict,
+    Tag,
+    TypeAdapter,
+    ValidationError,
+)
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.errors import shown as shown
+from drone_rl.utils.models import input_error
 
 LONGEST_TEXT = 4000
 """Characters of one text in a file."""
-_MOST_BITS = 10_000
-"""Of a whole number in a message."""
 
 
 class Kind(Protocol):
@@ -28,22 +42,55 @@ class Kind(Protocol):
         ...
 
 
+class Annotation:
+    """A kind that pydantic checks by the annotation `hint`."""
+
+    hint: Any
+    unit: str = ""
+    """Unit, for documentation."""
+    words: str = ""
+    """The allowed values in words."""
+
+    @property
+    def reason(self) -> str:
+        """Why a value is refused; empty for pydantic's own reasons."""
+        return f"must be {self.words}" if self.words else ""
+
+    def read(self, value: Any, where: str) -> Any:
+        """See `Kind`."""
+        try:
+            return self._adapter.validate_python(as_plain(value))
+        except ValidationError as error:
+            raise input_error(error, where=where) from None
+
+    @functools.cached_property
+    def _adapter(self) -> TypeAdapter[Any]:
+        config = ConfigDict(arbitrary_types_allowed=True, allow_inf_nan=False)
+        hint = Annotated[Any, self]
+        return TypeAdapter(hint, config=config)
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        schema = handler.generate_schema(self.hint)
+        if not self.reason:
+            return schema
+        return core_schema.custom_error_schema(schema, "kind", custom_error_message=self.reason)
+
+
 @dataclasses.dataclass(frozen=True)
-class Whole:
+class Whole(Annotation):
     """An integer; neither true nor 3.0 is one."""
 
     low: int
     high: float = math.inf
     unit: str = ""
-    """Unit, for documentation."""
 
-    def read(self, value: Any, where: str) -> int:
-        """See `Kind`."""
-        if not _is_number(value, numbers.Integral):
-            raise InputError(f"{where}={shown(value)} is not a whole number; give {self.words}")
-        if not self.low <= value <= self.high:
-            raise InputError(f"{where}={shown(value)} is out of range; give {self.words}")
-        return int(value)
+    @property
+    def hint(self) -> Any:
+        """See `Annotation`."""
+        high = None if self.high == math.inf else int(self.high)
+        return Annotated[int, Field(strict=True, ge=self.low, le=high)]
 
     @property
     def words(self) -> str:
@@ -54,7 +101,7 @@ class Whole:
 
 
 @dataclasses.dataclass(frozen=True)
-class Real:
+class Real(Annotation):
     """A finite number."""
 
     low: float
@@ -64,20 +111,16 @@ class Real:
     is_below: bool = False
     """Whether `high` is excluded."""
     unit: str = ""
-    """Unit, for documentation; empty for rates and other bare numbers."""
 
-    def read(self, value: Any, where: str) -> float:
-        """See `Kind`."""
-        value = _unboxed(value)
-        if not _is_number(value, numbers.Real) or not self._holds(value):
-            raise InputError(f"{where}={shown(value)} is out of range; give {self.words}")
-        return float(value)
-
-    def _holds(self, value: float) -> bool:
-        if not abs(value) <= sys.float_info.max:
-            return False
-        above = value > self.low if self.is_above else value >= self.low
-        return above and (value < self.high if self.is_below else value <= self.high)
+    @property
+    def hint(self) -> Any:
+        """See `Annotation`."""
+        bounds = {
+            "gt" if self.is_above else "ge": self.low,
+            "lt" if self.is_below else "le": self.high,
+        }
+        bounds = {name: bound for name, bound in bounds.items() if abs(bound) != math.inf}
+        return Annotated[float, Field(strict=True, allow_inf_nan=False, **bounds)]
 
     @property
     def words(self) -> str:
@@ -94,94 +137,91 @@ class Real:
 
 
 @dataclasses.dataclass(frozen=True)
-class Flag:
+class Flag(Annotation):
     """True or false."""
 
-    def read(self, value: Any, where: str) -> bool:
-        """See `Kind`."""
-        value = _unboxed(value)
-        if type(value) is not bool:
-            raise InputError(f"{where}={shown(value)} is neither true nor false; give one of them")
-        return value
+    hint = Annotated[bool, Strict()]
+    words = "true or false"
 
 
 @dataclasses.dataclass(frozen=True)
-class OneOf:
+class OneOf(Annotation):
     """One of some texts."""
 
     names: tuple[str, ...]
     also: tuple[str, ...] = ()
     """Accepted as well, but not offered."""
 
-    def read(self, value: Any, where: str) -> str:
-        """See `Kind`."""
-        if not isinstance(value, str) or value not in (*self.names, *self.also):
-            meant = did_you_mean(value, self.names)
-            raise InputError(
-                f"{where}={shown(value)} is unknown; give {', '.join(self.names)}{meant}"
-            )
-        return value
+    @property
+    def hint(self) -> Any:
+        """See `Annotation`."""
+        return Literal[*self.names, *self.also]
 
 
 @dataclasses.dataclass(frozen=True)
-class Instance:
-    """An object of a class."""
+class Instance(Annotation):
+    """An object of a class; settings are also read from mappings, and parts from names."""
 
     of: type
 
-    def read(self, value: Any, where: str) -> Any:
-        """See `Kind`; a class with `from_name` accepts names."""
-        if isinstance(value, str) and hasattr(self.of, "from_name"):
-            return self.of.from_name(value, where)
-        if not isinstance(value, self.of):
-            name = self.of.__name__
-            remedy = " or a registered name" if hasattr(self.of, "from_name") else ""
-            raise InputError(f"{where}={shown(value)} is no {name}; give one{remedy}")
-        return value
+    @property
+    def hint(self) -> Any:
+        """See `Annotation`."""
+        return self.of
 
 
 @dataclasses.dataclass(frozen=True)
-class Text:
-    """One line of printable characters."""
+class Text(Annotation):
+    """One line of printable characters; a path or a device of torch is its text."""
 
     longest: int = LONGEST_TEXT
 
-    def read(self, value: Any, where: str) -> str:
-        """See `Kind`; a path or a device of torch is its text."""
-        is_device = f"{type(value).__module__}.{type(value).__name__}" == "torch.device"
-        if is_device or isinstance(value, os.PathLike):
-            value = str(value)
-        if not isinstance(value, str) or len(value) > self.longest or not value.isprintable():
-            raise InputError(
-                f"{where}={shown(value)} is no text; give one line of at most {self.longest} "
-                "printable characters"
-            )
-        return value
+    @property
+    def hint(self) -> Any:
+        """See `Annotation`."""
+        return Annotated[str, Strict(), MaxLen(self.longest), Predicate(str.isprintable)]
+
+    @property
+    def reason(self) -> str:
+        """See `Annotation`."""
+        return f"must be one line of at most {self.longest} printable characters"
 
 
 @dataclasses.dataclass(frozen=True)
-class FileName:
+class FileName(Annotation):
     """The name of a file without its suffix; no path and no hidden file."""
 
     longest: int = 150
 
-    def read(self, value: Any, where: str) -> str:
-        """See `Kind`."""
-        text = value if isinstance(value, str) else ""
-        is_name = bool(text) and len(text.encode(errors="replace")) <= self.longest
-        if not is_name or not text.isprintable() or {*text} & {*"/\\"} or text[0] in ".~- ":
-            raise InputError(
-                f"{where}={shown(value)} is no name of a file; give one of at most "
-                f"{self.longest} bytes without / and \\, not beginning with a dot, ~, - or a space"
-            )
-        return text
+    @property
+    def hint(self) -> Any:
+        """See `Annotation`."""
+        return Annotated[Text().hint, Predicate(self._is_name)]
+
+    @property
+    def reason(self) -> str:
+        """See `Annotation`."""
+        return (
+            f"must be a name of at most {self.longest} bytes without / and \\, not beginning with "
+            "a dot, ~, - or a space"
+        )
+
+    def _is_name(self, text: str) -> bool:
+        is_short = 0 < len(text.encode(errors="replace")) <= self.longest
+        return is_short and not {*text} & {*"/\\"} and text[0] not in ".~- "
 
 
 @dataclasses.dataclass(frozen=True)
-class Maybe:
+class Maybe(Annotation):
     """A value of some kind, or None."""
 
-    kind: Kind
+    kind: Any
+
+    @property
+    def hint(self) -> Any:
+        """See `Annotation`."""
+        value: Any = Annotated[Any, self.kind]
+        return value | None
 
     def read(self, value: Any, where: str) -> Any:
         """See `Kind`."""
@@ -189,73 +229,75 @@ class Maybe:
 
 
 @dataclasses.dataclass(frozen=True)
-class Several:
+class Several(Annotation):
     """A list of values of one kind, as a tuple."""
 
-    kind: Kind
+    kind: Any
     least: int
     most: int
 
-    def read(self, value: Any, where: str) -> tuple:
-        """See `Kind`."""
-        if not isinstance(value, list | tuple) or not self.least <= len(value) <= self.most:
-            raise InputError(
-                f"{where}={self._shown(value)} does not fit; give a list of {self._count} values"
-            )
-        return tuple(self.kind.read(item, f"{where}[{i}]") for i, item in enumerate(value))
-
     @property
-    def _count(self) -> str:
-        return f"{self.least}" if self.least == self.most else f"{self.least} to {self.most}"
+    def hint(self) -> Any:
+        """See `Annotation`."""
+        values = tuple[Annotated[Any, self.kind], ...]
+        return Annotated[values, MinLen(self.least), MaxLen(self.most)]
 
-    @staticmethod
-    def _shown(value: Any) -> str:
-        is_short = isinstance(value, list | tuple) and len(value) <= 8
-        return f"[{','.join(map(shown, value))}]" if is_short else shown(value)
+    def read(self, value: Any, where: str) -> tuple[Any, ...]:
+        """See `Kind`."""
+        if isinstance(self.kind, Annotation):
+            return super().read(value, where)
+        items = Several(Instance(object), self.least, self.most).read(value, where)
+        return tuple(self.kind.read(item, f"{where}[{i}]") for i, item in enumerate(items))
 
 
 @dataclasses.dataclass(frozen=True)
-class Span:
+class Span(Annotation):
     """A value of a kind, or a range: the pair of its lowest and highest value."""
 
-    kind: Kind
+    kind: Any
 
-    def read(self, value: Any, where: str) -> Any:
-        """See `Kind`."""
-        if not self._is_range(value):
-            return self.kind.read(value, where)
-        low, high = (self.kind.read(item, f"{where}[{i}]") for i, item in enumerate(value))
-        pairs = zip(low, high, strict=True) if isinstance(low, tuple) else [(low, high)]
-        for least, most in pairs:
-            if least > most:
-                raise InputError(
-                    f"{where} goes from {least:g} to {most:g}, which is less; give the lower first"
-                )
-        return low, high
+    @property
+    def hint(self) -> Any:
+        """See `Annotation`."""
+        value = Annotated[Any, self.kind]
+        ends = Annotated[tuple[value, value], AfterValidator(_rising)]
+        tagged: Any = Annotated[value, Tag("(value)")]
+        return Annotated[tagged | Annotated[ends, Tag("(range)")], Discriminator(self._tag)]
 
-    def _is_range(self, value: Any) -> bool:
-        if not isinstance(value, list | tuple) or len(value) != 2:
-            return False
-        return not isinstance(self.kind, Several) or isinstance(value[0], list | tuple)
+    def _tag(self, value: Any) -> str:
+        is_pair = isinstance(value, list | tuple) and len(value) == 2
+        is_nested = is_pair and isinstance(value[0], list | tuple)
+        return "(range)" if is_pair and is_nested == isinstance(self.kind, Several) else "(value)"
+
+
+def _rising(ends: tuple[Any, Any]) -> tuple[Any, Any]:
+    low, high = (end if isinstance(end, tuple) else (end,) for end in ends)
+    if any(least > most for least, most in zip(low, high, strict=True)):
+        raise PydanticCustomError("order", "must have the lower value first")
+    return ends
 
 
 @dataclasses.dataclass(frozen=True)
-class Listed:
+class Listed(Annotation):
     """One text or a list of them, as a tuple."""
 
     what: str
     """The thing that each names."""
     most: int = 1000
 
-    def read(self, value: Any, where: str) -> tuple[str, ...]:
-        """See `Kind`."""
-        items = [value] if isinstance(value, str) else value
-        is_list = isinstance(items, list | tuple) and 0 < len(items) <= self.most
-        if not is_list or len({*map(str, items)}) < len(items):
-            raise InputError(
-                f"{where}={shown(value)} must name {self.words}, each once, at most {self.most}"
-            )
-        return tuple(Text().read(item, where) for item in items)
+    @property
+    def hint(self) -> Any:
+        """See `Annotation`."""
+        return Annotated[
+            tuple[Text().hint, ...],
+            BeforeValidator(lambda names: (names,) if isinstance(names, str) else names),
+            Predicate(lambda names: 0 < len(names) == len({*names}) <= self.most),
+        ]
+
+    @property
+    def reason(self) -> str:
+        """See `Annotation`."""
+        return f"must name {self.words}, each once, at most {self.most}"
 
     @property
     def words(self) -> str:
@@ -309,29 +351,15 @@ def as_mapping(value: Any, where: str) -> Mapping[str, Any]:
     return value
 
 
-def shown(value: Any) -> str:
-    """Return a value for a message: short, on one line."""
-    value = _unboxed(value)
-    if isinstance(value, type):
-        return f"(the class {value.__name__})"
-    if value is not None and not isinstance(value, str | int | float):
-        return f"({type(value).__name__})"
-    if isinstance(value, int) and value.bit_length() > _MOST_BITS:  # Python refuses to write it
-        return f"(a number of {value.bit_length()} bits)"
-    text = repr(value[:80] if isinstance(value, str) else value)
-    return text if len(text) <= 80 else f"{text[:77]}..."
-
-
-def _unboxed(value: Any) -> Any:
-    """Return the Python value of a number or truth value of NumPy or PyTorch; others unchanged."""
-    is_array = type(value).__module__ in ("numpy", "torch")
-    is_scalar = is_array and getattr(value, "shape", None) == ()
-    return value.item() if is_scalar else value
-
-
-def _is_number(value: Any, kind: type) -> bool:
-    """Return whether a value is a number of Python or NumPy, and no bool."""
-    return isinstance(value, kind) and not isinstance(value, bool)
+def as_plain(value: Any) -> Any:
+    """Return a value with Python's numbers instead of NumPy's or PyTorch's, and texts of paths."""
+    if isinstance(value, list) or type(value) is tuple:
+        return type(value)(map(as_plain, value))
+    module = type(value).__module__
+    if module in ("numpy", "torch") and getattr(value, "shape", None) == ():
+        return value.item()
+    is_device = module == "torch" and type(value).__name__ == "device"
+    return str(value) if is_device or isinstance(value, os.PathLike) else value
 
 
 def _check_plain(value: Any, where: str) -> None:

@@ -1,77 +1,99 @@
-"""Settings: frozen dataclasses whose fields have type, bounds, default and description.
+"""Settings: frozen classes whose fields have type, bounds, default and description.
 
 A setting is defined in one such field, which checks files, Hydra's values and Python's arguments.
 """
 
+import ast
 import contextlib
-import dataclasses
-import functools
-import math
+import inspect
+import itertools
 import re
+import textwrap
 import types
 import typing
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
 
-from drone_rl.utils.errors import InputError, did_you_mean
-from drone_rl.utils.schema import Flag, Instance, Kind, Maybe, Real, Record, Text, as_mapping
+import pydantic
+
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.models import Model
+from drone_rl.utils.schema import as_plain
 
 S = TypeVar("S", bound="Settings")
+_NUMBERS = (int, float, int | None, float | None)
 
 
-@typing.dataclass_transform(kw_only_default=True, frozen_default=True)
-@dataclasses.dataclass(frozen=True)
-class Settings:
-    """Values that are checked before anything is built; each subclass is a frozen dataclass.
+class Settings(Model):
+    """Values that are checked before anything is built.
 
-    A field is annotated with its type and its kind, as in `Annotated[int, Whole(1, 100)]`; for
-    `bool`, `str` and nested settings the type is enough.
+    A field is annotated with its type and, for bounds, a kind of `drone_rl.utils.schema`, as in
+    `Annotated[int, Whole(1, 100)]`. The string below it describes it.
 
     Raises:
-        InputError: A value is of another type or out of bounds, or the values don't go together.
-            The message begins with the field's name.
+        InputError: A name is unknown, a value is of another type or out of bounds, or the values
+            don't go together. The message begins with the field's name.
     """
 
-    def __init_subclass__(cls, **kwargs: Any) -> None:
-        """Make the subclass a frozen dataclass with keyword arguments."""
-        super().__init_subclass__(**kwargs)
-        dataclasses.dataclass(frozen=True, kw_only=True)(cls)
-        _refuse_unknown_names(cls)
-        _refuse_untyped(cls)
+    model_config = pydantic.ConfigDict(
+        defer_build=True,  # most commands use few settings
+        use_attribute_docstrings=False,  # reading the source is slow; see `meanings`
+        coerce_numbers_to_str=True,  # folder=2024 on the command line is a number for Hydra
+        str_max_length=4000,
+        validate_default=True,
+    )
 
-    def __post_init__(self) -> None:
-        """Check every value by its kind."""
-        for name, kind in kinds_of(type(self)).items():
-            object.__setattr__(self, name, kind.read(getattr(self, name), name))
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        """Let numbers without a kind be strict, too: "3" is none, and true is no 1."""
+        super().__pydantic_init_subclass__(**kwargs)
+        for field in cls.model_fields.values():
+            if not field.metadata and field.annotation in _NUMBERS:
+                field.metadata.append(pydantic.Strict())
+
+    @pydantic.field_validator("*", mode="before")
+    @classmethod
+    def _from_libraries(cls, value: Any) -> Any:
+        return as_plain(value)
+
+    @pydantic.model_validator(mode="after")
+    def _check(self) -> Self:
         self.check()
+        return self
 
     def check(self) -> None:
         """Raise an `InputError` if valid values don't go together."""
 
-    def replace(self, **changes: Any) -> Self:
-        """Return a copy with other values; raise an `InputError` for unknown or invalid ones."""
-        check_names(type(self), changes)
-        return dataclasses.replace(self, **changes)
-
-    @classmethod
-    def read(cls, data: Any, where: str) -> Self:
-        """Return settings from a mapping that has every field and no other.
-
-        Raises:
-            InputError: See `Settings`; the message begins with `where`.
-        """
-        values = Record(kinds_of(cls)).read(data, where)
-        with prefixed_errors(where):
-            return cls(**values)
-
     def as_base(self, cls: type[S]) -> S:
         """Return these settings as an instance of a base class, without the fields it lacks."""
-        return cls(**{field.name: getattr(self, field.name) for field in dataclasses.fields(cls)})
+        return cls(**{name: getattr(self, name) for name in cls.model_fields})
 
     def values(self) -> dict[str, Any]:
-        """Return the fields by name as plain data."""
-        return {f.name: plain(getattr(self, f.name)) for f in dataclasses.fields(self)}
+        """Return the fields by name as plain data, which `read` reads."""
+        return {name: plain(value) for name, value in self}
+
+    def config(self) -> dict[str, Any]:
+        """Return `values`, and the name of what is selected by name, as in Hydra's configs."""
+        return self.values()
+
+
+def plain(value: Any) -> Any:
+    """Return a setting's value as plain data: settings as mappings, tuples as lists.
+
+    Several parts of a training, such as transforms, are a mapping from names; see `Parts`.
+    """
+    if isinstance(value, Settings):
+        return value.config()
+    if isinstance(value, Mapping):
+        return {name: plain(item) for name, item in value.items()}
+    if not isinstance(value, tuple):
+        return value
+    if not value or not isinstance(value[0], Settings):
+        return [plain(item) for item in value]
+    names = [part.name for part in value]
+    numbered = [f"{n}_{i}" if n in names[:i] else n for i, n in enumerate(names)]
+    return dict(zip(numbered, map(plain, value), strict=True))
 
 
 def conf_dir() -> Path:
@@ -81,81 +103,49 @@ def conf_dir() -> Path:
     return checkout if (checkout / "train.yaml").is_file() else package / "conf"
 
 
-@functools.cache
-def kinds_of(cls: type[Settings]) -> Mapping[str, Kind]:
-    """Return the kind of each field, in order."""
+def hints_of(cls: type[Settings]) -> Mapping[str, Any]:
+    """Return the annotation of each field, in order."""
     hints = typing.get_type_hints(cls, include_extras=True)
-    return {field.name: _kind(hints[field.name], field.name) for field in dataclasses.fields(cls)}
+    return {name: hints[name] for name in cls.model_fields}
 
 
-@functools.cache
-def types_of(cls: type[Settings]) -> Mapping[str, Any]:
-    """Return the plain type of each field, in order."""
-    hints = typing.get_type_hints(cls)
-    return {field.name: hints[field.name] for field in dataclasses.fields(cls)}
+def inner_types(hint: Any) -> tuple[Any, ...]:
+    """Return the kinds of an annotation, or else its types without None, outermost first."""
+    arguments = typing.get_args(hint)
+    if typing.get_origin(hint) is Annotated:
+        return arguments[1:]
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        return tuple(t for of in arguments if of is not types.NoneType for t in inner_types(of))
+    return (hint,)
 
 
-def check_names(
-    cls: type[Settings],
-    given: Mapping[str, Any],
-    prefix: str = "",
-    others: Sequence[str] = (),
-    synonyms: Mapping[str, Sequence[str]] = types.MappingProxyType({}),
-) -> None:
-    """Raise an `InputError` with the valid names, and others, if a name is not one of the valid.
-
-    `synonyms` are the settings that other projects' names mean, dotted as on the command line.
-    """
-    kinds = kinds_of(cls)
-    for name in given:
-        if name not in kinds:
-            names = [*kinds, *others]
-            meanings = [
-                name,
-                *(other.rpartition(".")[2] for other in synonyms.get(name.lower(), ())),
-            ]
-            hints = (_inside(cls, our) or did_you_mean(our, names) for our in meanings)
-            meant = next(filter(None, hints), "")
-            raise InputError(f"{prefix}{name} is unknown; valid names: {', '.join(names)}{meant}")
+def unit_of(hint: Any) -> str:
+    """Return the unit of an annotation, or kind, or of the values inside it; "" for none."""
+    kind, *_ = inner_types(hint)
+    inner = getattr(kind, "kind", None)
+    return getattr(kind, "unit", "") or ("" if inner is None else unit_of(inner))
 
 
-def _inside(cls: type[Settings], name: str) -> str:
-    """Return a hint at the field whose settings have a name, or ""."""
-    for field in dataclasses.fields(cls):
-        if isinstance(field.default, Settings) and name in kinds_of(type(field.default)):
-            of = type(field.default)
-            return f"; did you mean {field.name}={of.__module__}.{of.__name__}({name}=...)?"
-    return ""
+def meanings(cls: type[Settings]) -> Mapping[str, str]:
+    """Return the docstring of each field of a class, inherited fields included."""
+    texts: dict[str, str] = {}
+    for part in reversed(cls.__mro__[: cls.__mro__.index(Settings)]):
+        with contextlib.suppress(OSError, TypeError):  # made from a signature, without source
+            (body,) = ast.parse(textwrap.dedent(inspect.getsource(part))).body
+            texts |= dict(_docstrings(typing.cast(Any, body).body))
+    return texts
 
 
-def _refuse_untyped(cls: type[Settings]) -> None:
-    """Raise an `InputError` for a class attribute without an annotation, which is no setting."""
-    own = dict(vars(cls))
-    known = {name for c in cls.__mro__[1:-1] for name in (*vars(c), *c.__annotations__)}
-    known -= {field.name for field in dataclasses.fields(cls)}  # whose values would be ignored
-    known |= cls.__annotations__.keys()
-    for name, value in own.items():
-        is_typed = name in known or name.startswith("_")
-        if not is_typed and isinstance(value, int | float | str):
-            raise InputError(
-                f"{cls.__name__}.{name} has no type, so it would have no effect; write "
-                f"{name}: {type(value).__name__} = {value!r}"
-            )
+def _docstrings(body: list[Any]) -> Iterator[tuple[str, str]]:
+    for field, below in itertools.pairwise(body):
+        match field, below:
+            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=text)):
+                yield name, " ".join(str(text).split())
 
 
-def _refuse_unknown_names(cls: type[Settings]) -> None:
-    """Let the constructor of a class raise an `InputError` for names that it does not have."""
-    construct = cls.__init__
-
-    @functools.wraps(construct)
-    def checked(self: Settings, *args: Any, **given: Any) -> None:
-        try:
-            construct(self, *args, **given)
-        except TypeError:
-            check_names(type(self), given)
-            raise
-
-    setattr(cls, "__init__", checked)  # noqa: B010
+def about(cls: type) -> str:
+    """Return the first paragraph of a class's docstring."""
+    return (inspect.getdoc(cls) or "").partition("\n\n")[0].replace("\n", " ")
 
 
 @contextlib.contextmanager
@@ -170,31 +160,3 @@ def prefixed_errors(where: str) -> Iterator[None]:
 def snake_case(cls: type) -> str:
     """Return the name of a class in snake case."""
     return re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
-
-
-def plain(value: Any) -> Any:
-    """Return a setting's value as plain data: settings as mappings, tuples as lists."""
-    if isinstance(value, Settings):
-        return value.values()
-    if isinstance(value, Mapping):
-        return {k: plain(v) for k, v in as_mapping(value, "settings").items()}
-    return [plain(v) for v in value] if isinstance(value, tuple) else value
-
-
-def _kind(hint: Any, where: str) -> Kind:
-    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
-    if origin is Annotated and hasattr(arguments[1], "read") and not isinstance(arguments[1], type):
-        return arguments[1]
-    inner = [argument for argument in arguments if argument is not types.NoneType]
-    if origin in (typing.Union, types.UnionType) and len(inner) == 1:
-        return Maybe(_kind(inner[0], where))
-    if hint in (bool, str):
-        return Flag() if hint is bool else Text()
-    if hint is float:
-        return Real(-math.inf)
-    if origin is None and isinstance(hint, type):
-        return Instance(hint)
-    raise InputError(
-        f"{where} is of type {hint}; annotate it with a kind of drone_rl.utils.schema, as in "
-        "Annotated[float, Real(0.0, 1.0)]"
-    )

@@ -39,9 +39,14 @@ def _environment(package: str) -> "jinja2.Environment":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    filters = (percent, interval, rate, listed, plural, ordinal, setting)
+    filters = (percent, interval, rate, listed, plural, count, setting)
     environment.filters |= {function.__name__: function for function in filters}
     return environment
+
+
+def count(number: int) -> str:
+    """Return a count with commas at thousands."""
+    return f"{number:,}"
 
 
 def setting(value: Any) -> str:
@@ -177,10 +182,6 @@ def fixed_seed(name: str, what: str = "environments") -> Sentence:
     return Sentence(name, "the seed was known before the analysis", is_fixed, text)
 
 
-BODIES = (fixed_seed("bodies.fixed_seed"),)
-"""Evidence: `bodies.json`."""
-LOOPED = (fixed_seed("looped.fixed_seed"),)
-"""Evidence: see `drone_rl.flight.sitl_evaluation.SitlEvaluation.as_dict`."""
 CHANCES = (fixed_seed("chances.fixed_seed", "placements"),)
 """Evidence: `chances.json` of held-out placements; those that a user gives have no seed."""
 CHECK = (fixed_seed("check.fixed_seed", "placements"),)

@@ -1,12 +1,11 @@
 """`drone-rl chain`: exact success probabilities of a policy that samples its actions."""
 
 import dataclasses
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, ClassVar, Unpack
 
 import numpy as np
 import torch
@@ -20,10 +19,11 @@ from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, CubesEnd
 from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.models import Seeded, Stored
 from drone_rl.utils.progress import Progress, as_progress
-from drone_rl.utils.provenance import provenance
+from drone_rl.utils.provenance import Provenance, provenance
 from drone_rl.utils.seeding import RootSeed, Stream, with_seed, world_random_state
-from drone_rl.utils.text import CHANCES, exact_percent, plural, say, seed_line
+from drone_rl.utils.text import exact_percent, plural
 from drone_rl.verification.prover.lattice import explore, shape_of
 from drone_rl.verification.prover.markov_chain import (
     NodeEvaluator,
@@ -35,115 +35,120 @@ from drone_rl.verification.prover.markov_chain import (
 from drone_rl.verification.prover.policy_spec import make_policy_spec
 from drone_rl.verification.requirements import require_cubes
 
-_BOUNDS = {
-    "least": "everywhere at least",
-    "most": "everywhere at most",
-    "mean_least": "on average at least",
-    "mean_most": "on average at most",
-}
 NODES_AT_A_TIME = 2**20  # lattice nodes of placements that are explored together; bounds memory
+_ENDS = ("front_boundary", "side_boundary", "step_limit")
 
 
-@dataclasses.dataclass(frozen=True)
-class Chances(TableResult):
-    """How episodes with sampled actions end: exact probabilities, not estimates."""
+class EndChance(Stored):
+    """One end of an episode."""
 
-    policy: Policy
-    cubes: Tensor  # (P, C, 3) float64
-    """Placements, metres, world frame, nearest cube first."""
-    outcomes: Outcomes
-    """For each placement."""
-    num_images: int
+    reason: str
+    collected: tuple[bool, ...]
+    """Whether each cube is collected by then."""
+    probability: float
+
+
+class Within(Stored):
+    """Bounds on the success probability over a box around a placement."""
+
+    metres: float
+    """Half the width of the box."""
+    least: float
+    most: float
+    mean_least: float
+    mean_most: float
+    """Bounds of the mean over the box."""
+
+
+class PlacementChances(Stored):
+    """How episodes from one placement end: exact probabilities, not estimates."""
+
+    cubes: tuple[tuple[float, float, float], ...]
+    """Positions, metres, world frame, nearest cube first."""
+    success: float
+    """Probability that all cubes are collected."""
+    failure: float
+    """Probability that they are not, precise even if tiny."""
+    mean_cubes: float
+    mean_length: float
+    """Expected number of steps."""
+    undecided: float
+    """Probability of episodes that are not followed to their end."""
+    ends: tuple[EndChance, ...]
+    within: Within | None = None
+    """None unless bounds were asked for."""
+
+    def collected(self, cube: int) -> float:
+        """Return the probability that a cube is collected."""
+        return sum(end.probability for end in self.ends if end.collected[cube])
+
+    def ended(self, reason: str) -> float:
+        """Return the probability of an end, such as "step_limit"."""
+        return sum(end.probability for end in self.ends if end.reason == reason)
+
+
+class Chances(TableResult, Seeded, Provenance):
+    """How episodes with sampled actions end; as in `chances.json`."""
+
+    policy: str
+    """Its name."""
+    path: str
+    task: dict[str, Any]
+    """Settings of the task."""
+    success: float
+    """Mean probability over placements that all cubes are collected."""
+    pictures: int
     """Number of images rendered."""
-    within: float = 0.0
-    """Half-width of the boxes around each placement that the bounds cover, metres."""
-    bounded: tuple[SuccessBounds, ...] = ()
-    """Bounds on the success probability of each placement over its box."""
-    seed: RootSeed | None = None
-    """Root seed of held-out placements; None of given ones."""
-    are_numbers = True
+    placements: tuple[PlacementChances, ...]
+    are_numbers: ClassVar[bool] = True
 
     @property
-    def success(self) -> float:
-        """Mean probability over placements that all cubes are collected."""
-        return float(self.outcomes.success.mean())
-
-    @property
-    def worst(self) -> Tensor:
-        """The placement with the largest failure probability, metres to the left. Shape: (C,)."""
-        return self.cubes[self.outcomes.failure.argmax(), :, 1]
+    def worst(self) -> list[float]:
+        """The placement with the largest failure probability, metres to the left."""
+        return [y for _, y, _ in max(self.placements, key=lambda p: p.failure).cubes]
 
     def rows(self) -> list[list[str]]:
         """Return a table: a header, then mean, minimum and maximum over placements."""
-        outcomes, collected = self.outcomes, self.outcomes.collected.unbind(-1)
-        reasons = (CubesEnd.FRONT_BOUNDARY, CubesEnd.SIDE_BOUNDARY, CubesEnd.STEP_LIMIT)
+        every = self.placements
         rows = [
             ["", "mean", "least", "most"],
-            _row("all cubes", outcomes.success),
-            _row("not all cubes", outcomes.failure),
-            _row("mean cubes", outcomes.cubes, "{:.4f}".format),
-            *(_row(f"cube {i} collected", share) for i, share in enumerate(collected, 1)),
+            _row("all cubes", [p.success for p in every]),
+            _row("not all cubes", [p.failure for p in every]),
+            _row("mean cubes", [p.mean_cubes for p in every], "{:.4f}".format),
             *(
-                _row(f"ended: {end.name.lower().replace('_', ' ')}", outcomes.reasons[:, end])
-                for end in reasons
+                _row(f"cube {i + 1} collected", [p.collected(i) for p in every])
+                for i in range(len(every[0].cubes))
             ),
-            _row("mean length", outcomes.steps, "{:.2f}".format),
-            _row("undecided", outcomes.undecided),
+            *(
+                _row(f"ended: {end.replace('_', ' ')}", [p.ended(end) for p in every])
+                for end in _ENDS
+            ),
+            _row("mean length", [p.mean_length for p in every], "{:.2f}".format),
+            _row("undecided", [p.undecided for p in every]),
         ]
-        for name, words in _BOUNDS.items() if self.bounded else ():
-            bounds = torch.tensor([getattr(b, name) for b in self.bounded], dtype=torch.float64)
-            rows.append(_row(f"within {self.within:g} m, {words}", bounds))
-        return rows if len(self.cubes) > 1 else [["", "chance"], *(row[:2] for row in rows[1:])]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values, as in `chances.json`."""
-        return {
-            "policy": self.policy.name,
-            "path": str(self.policy.path),
-            "task": self.policy.task.values(),
-            **({} if self.seed is None else self.seed.as_dict()),
-            "success": self.success,
-            "pictures": self.num_images,
-            "placements": [self._placement(i) for i in range(len(self.cubes))],
-            **provenance(),
-        }
+        if boxes := [p.within for p in every if p.within is not None]:
+            name = f"within {boxes[0].metres:g} m"
+            rows += [
+                _row(f"{name}, everywhere at least", [box.least for box in boxes]),
+                _row(f"{name}, everywhere at most", [box.most for box in boxes]),
+                _row(f"{name}, on average at least", [box.mean_least for box in boxes]),
+                _row(f"{name}, on average at most", [box.mean_most for box in boxes]),
+            ]
+        return rows if len(every) > 1 else [["", "chance"], *(row[:2] for row in rows[1:])]
 
     def save(self, path: Path) -> None:
         """Write `chances.json`."""
-        path.write_text(json.dumps(self.as_dict(), indent=2))
+        self.write_json(path)
 
     def notes(self) -> list[str]:
         """Return the lines below the table."""
-        worst = ", ".join(f"{y:.6g}" for y in self.worst.tolist())
-        about = (
-            f"{plural(len(self.cubes), 'placement')}; success is least probable at cubes=[{worst}]"
-        )
-        if self.seed is None:
+        worst = ", ".join(f"{y:.6g}" for y in self.worst)
+        count = plural(len(self.placements), "placement")
+        about = f"{count}; success is least probable at cubes=[{worst}]"
+        if self.seed is None:  # given placements have none
             return [about]
-        seed = self.seed.as_dict()
-        return [*filter(None, [about, say(CHANCES, seed), seed_line(seed, "placements")])]
-
-    def _placement(self, i: int) -> dict[str, Any]:
-        outcomes, ends, bounds = self.outcomes, self.outcomes.ends[i], None
-        if self.bounded:
-            bounds = {"metres": self.within, **dataclasses.asdict(self.bounded[i])}
-        return {
-            "within": bounds,
-            "cubes": self.cubes[i].tolist(),
-            "success": float(outcomes.success[i]),
-            "failure": float(outcomes.failure[i]),
-            "mean_cubes": float(outcomes.cubes[i]),
-            "mean_length": float(outcomes.steps[i]),
-            "undecided": float(outcomes.undecided[i]),
-            "ends": [
-                {
-                    "reason": CubesEnd(reason).name.lower(),
-                    "collected": [bool(cubes >> k & 1) for k in range(self.cubes.shape[1])],
-                    "probability": float(ends[reason, cubes]),
-                }
-                for reason, cubes in ends.nonzero().tolist()
-            ],
-        }
+        lines = about, self.seed_warning("placements"), self.seed_line("placements")
+        return [line for line in lines if line]
 
 
 def chances(
@@ -193,14 +198,43 @@ def chances(
             graph = explore(task_settings, part)
             outcomes.append(propagate(graph, evaluator.on(graph)))
     progress("placements", len(placed), len(placed))
+    joined = Outcomes.joined(outcomes)
+    within = [Within(metres=settings.within, **dataclasses.asdict(b)) for b in bounded]
     return Chances(
-        policy,
-        placed,
-        Outcomes.joined(outcomes),
-        evaluator.num_images,
-        settings.within,
-        bounded,
-        seed if cubes is None else None,
+        policy=policy.name,
+        path=str(policy.path),
+        task=policy.task.values(),
+        success=float(joined.success.mean()),
+        pictures=evaluator.num_images,
+        placements=tuple(
+            _placement(placed[i], joined, i, within[i] if within else None)
+            for i in range(len(placed))
+        ),
+        **seed.as_dict() if cubes is None else {},
+        **provenance(),
+    )
+
+
+def _placement(
+    cubes: Tensor, outcomes: Outcomes, i: int, within: Within | None
+) -> PlacementChances:
+    ends = outcomes.ends[i]
+    return PlacementChances(
+        cubes=tuple(map(tuple, cubes.tolist())),
+        success=float(outcomes.success[i]),
+        failure=float(outcomes.failure[i]),
+        mean_cubes=float(outcomes.cubes[i]),
+        mean_length=float(outcomes.steps[i]),
+        undecided=float(outcomes.undecided[i]),
+        ends=tuple(
+            EndChance(
+                reason=CubesEnd(reason).name.lower(),
+                collected=tuple(bool(bits >> k & 1) for k in range(len(cubes))),
+                probability=float(ends[reason, bits]),
+            )
+            for reason, bits in ends.nonzero().tolist()
+        ),
+        within=within,
     )
 
 
@@ -208,7 +242,7 @@ def _bounded(
     policy: Policy, placed: Tensor, settings: ChanceSettings, progress: Progress
 ) -> tuple[SuccessBounds, ...]:
     """Bound the success probability over a box around each placement, within the lateral bound."""
-    network, gap = policy.make_network(), ProveSettings.logit_gap
+    network, gap = policy.make_network(), ProveSettings().logit_gap
     bounds: list[SuccessBounds] = []
     spec = make_policy_spec(policy.description, network, gap, settings.renderer)
     with closing(spec):
@@ -244,5 +278,5 @@ def _given(task: TaskSettings, cubes: Any) -> Tensor:
     )
 
 
-def _row(name: str, values: Tensor, show: Callable[[float], str] = exact_percent) -> list[str]:
-    return [name, *(show(float(figure)) for figure in (values.mean(), values.min(), values.max()))]
+def _row(name: str, values: list[float], show: Callable[[float], str] = exact_percent) -> list[str]:
+    return [name, *map(show, (sum(values) / len(values), min(values), max(values)))]

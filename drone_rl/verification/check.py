@@ -16,12 +16,14 @@ from drone_rl.utils.display import Result, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import CERTIFICATE_REFUSED
 from drone_rl.utils.files import as_path, newest
+from drone_rl.utils.models import Seeded
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.text import CHECK, say, seed_line
+from drone_rl.utils.text import exact_percent
 from drone_rl.verification.checker.certificate import (
     Certificate,
+    certificate_file,
     check_same_policy,
     read_certificate,
 )
@@ -60,7 +62,7 @@ class Check(Result):
             "policy": str(self.policy.path),
             "task": self.policy.task.values(),
             **self.seed.as_dict(),
-            **self.findings.as_dict(),
+            **self.findings.model_dump(mode="json"),
             **provenance(),
         }
 
@@ -70,7 +72,7 @@ class Check(Result):
 
     def lines(self) -> list[str]:
         """Return the result, the statements, and each finding in one line."""
-        stated, seed = self.certificate, self.seed.as_dict()
+        stated, seed = self.certificate, Seeded(**self.seed.as_dict())
         task = self.policy.state["description"]["task"]
         changed = [f"{n}={v}" for n, v in self.policy.task.values().items() if task.get(n) != v]
         return [
@@ -78,11 +80,11 @@ class Check(Result):
             f"{self.policy.name}{' with ' if changed else ''}{', '.join(changed)}, "
             f"{sum(map(len, stated.groups))} boxes, {sum(self.findings.flights.values())} flights, "
             f"{self.findings.contradicted} of them ended otherwise than stated",
-            *(f"stated: {outcome.share:.9g} {outcome}" for outcome in stated.outcomes),
-            f"stated: {stated.undecided_share:.3g} undecided",
+            *(f"stated: {exact_percent(of.share)} {of}" for of in stated.outcomes),
+            f"stated: {exact_percent(stated.undecided.share)} undecided",
             *(f"refused: {line}" for line in self.findings.lines()),
-            *(f"note: {line}" for line in filter(None, [say(CHECK, seed)])),
-            seed_line(seed, "placements"),
+            *(f"note: {line}" for line in [seed.seed_warning("placements")] if line),
+            seed.seed_line("placements"),
         ]
 
     def __str__(self) -> str:
@@ -122,16 +124,16 @@ def check(
     settings, seed = with_seed(from_arguments(CheckSettings, settings, changes, check))
     path = _find(certificate, outputs)
     stated = read_certificate(path)
-    if policy is None and stated.name not in policy_names():
+    if policy is None and stated.policy.name not in policy_names():
         raise InputError(
-            f"the certificate is of policy {stated.name!r}, which is none of "
+            f"the certificate is of policy {stated.policy.name!r}, which is none of "
             f"{', '.join(policy_names())}; give policy= its file"
         )
-    policy = load_policy(stated.name if policy is None else policy, outputs=outputs)
+    policy = load_policy(stated.policy.name if policy is None else policy, outputs=outputs)
     weights = policy.state["policy"]
     required = policy.in_task(**as_changes(task, "task")).task if task else None
     check_same_policy(stated, policy.description, weights, required)
-    policy = dataclasses.replace(policy, description=stated.description)
+    policy = dataclasses.replace(policy, description=stated.policy.description)
     findings = check_certificate(
         stated,
         weights,
@@ -146,8 +148,7 @@ def check(
 
 def _find(certificate: str | Path, outputs: str | Path) -> Path:
     if certificate != "latest":
-        path = as_path(certificate, "certificate")
-        return path / "certificate.json" if path.is_dir() else path
+        return certificate_file(certificate)
     path = newest(as_path(outputs, "outputs").glob("prove/**/certificate.json"))
     if path is None:
         raise InputError(

@@ -13,9 +13,8 @@ from drone_rl.policies.zoo import certificate_path
 from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.trust.results import Proof, Rounding
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import as_path
 from drone_rl.utils.seeding import RootSeed, root_seed
-from drone_rl.verification.checker.certificate import Certificate
+from drone_rl.verification.checker.certificate import Certificate, certificate_file
 from drone_rl.verification.checker.checker import check_certificate, read_validated
 from drone_rl.verification.checker.sampling import ANYWHERE, find
 
@@ -66,15 +65,11 @@ class Claim:
             return Proof(refused=f"{count} ended otherwise than it states")
         if rounding is not None and rounding.excessive:
             return Proof(refused="decisions of the policy depend on rounding")
-        won, lost = (
-            [o for o in stated.outcomes if len(o.boxes) and (o.end == CubesEnd.ALL_CUBES) == wins]
-            for wins in (True, False)
-        )
         return Proof(
-            every=not lost and not len(stated.undecided),
-            share=sum(outcome.share for outcome in won),
-            lost=sum(outcome.share for outcome in lost),
-            undecided=stated.undecided_share,
+            every=stated.is_proved,
+            share=stated.success,
+            lost=stated.lost,
+            undecided=stated.undecided.share,
             finished=stated.finished,
             checked=self.flights,
             wrong_at_most=self.wrong_at_most,
@@ -88,7 +83,7 @@ def find_claim(
     policy: BasePolicy,
     certificate: str | Path | None = None,
     *,
-    flights: int = JudgeSettings.certificate_flights,
+    flights: int = JudgeSettings().certificate_flights,
     seed: RootSeed | None = None,
     device: str = "cpu",
     renderer: str = "raytrace",
@@ -112,16 +107,13 @@ def find_claim(
         return None
     seed = seed or root_seed(None)
     if certificate is not None:
-        path = as_path(certificate, "certificate")
-        path = path / "certificate.json" if path.is_dir() else path
+        path = certificate_file(certificate)
         return _read_and_check(policy, path, flights, seed, device, renderer)
     path = certificate_path(policy.path)
+    if not path.is_file():
+        return None
     try:
-        return (
-            _read_and_check(policy, path, flights, seed, device, renderer)
-            if path.is_file()
-            else None
-        )
+        return _read_and_check(policy, path, flights, seed, device, renderer)
     except InputError as error:
         return Claim(path, None, refused=str(error))
 
@@ -146,7 +138,8 @@ def _ends_as_stated(stated: Certificate, greedy: CompleteEpisodes) -> list[bool]
     outcome = _outcomes_of(stated, greedy)
     ended = zip(outcome, greedy.end_reason.tolist(), greedy.goals.reached.tolist(), strict=True)
     return [
-        (end, tuple(reached)) == (stated.outcomes[i].end, stated.outcomes[i].collected)
+        (CubesEnd(end).name.lower(), tuple(reached))
+        == (stated.outcomes[i].end, stated.outcomes[i].collected)
         for i, end, reached in ended
         if i < len(stated.outcomes)
     ]

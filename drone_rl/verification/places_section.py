@@ -1,7 +1,5 @@
 """Section "places" of explanations: the exact map of the action over one cube's place."""
 
-import dataclasses
-
 import numpy as np
 
 from drone_rl.config import TaskSettings
@@ -51,6 +49,4 @@ def _exact_map(context: Context, settings: PlacesSettings) -> ActionMap:
     images = CubeImages(scenes.worlds, Lattice(task), camera)
     images.check(_COMPARED, np.random.RandomState(legacy_seed(context.seed.value)))
     nearest = max(settings.nearest, task.cube_size)
-    return map_policy(
-        images, scenes.transform, network, dataclasses.replace(settings, nearest=nearest)
-    )
+    return map_policy(images, scenes.transform, network, settings.replace(nearest=nearest))

@@ -2,7 +2,6 @@
 
 import dataclasses
 import io
-import json
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
@@ -17,7 +16,7 @@ from torchrl.envs import EnvBase
 from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ProvableSettings, ProveSettings
-from drone_rl.config.configuration import as_config, check_same_config, from_arguments
+from drone_rl.config.configuration import check_same_config, from_arguments
 from drone_rl.config.options import TrainOptions
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.policy import Policy, load_policy
@@ -39,10 +38,10 @@ from drone_rl.training.train import learn
 from drone_rl.trust.verdict import check_judged, judge_for_selection
 from drone_rl.utils.archives import read_array
 from drone_rl.utils.files import last_of, read_json, write_atomically
+from drone_rl.utils.models import Model
 from drone_rl.utils.progress import Progress, as_progress
-from drone_rl.utils.schema import Instance, Maybe, Plain, Record, Several
+from drone_rl.utils.schema import Instance, Maybe
 from drone_rl.utils.seeding import Stream
-from drone_rl.utils.settings import Settings
 from drone_rl.verification.prove import STATE_NAME, Proof, prove
 from drone_rl.verification.prover.boxes import volumes
 from drone_rl.verification.prover.policy_spec import make_policy_spec, partition_placements
@@ -50,10 +49,9 @@ from drone_rl.verification.requirements import require_cubes
 
 WORLDS = 250  # environments of a search; each search uses other seeds
 HOW_MAY_CHANGE = ("rounds", "limit_s")  # settings of rounds that a resumed run may change
-_JOURNAL = Record({"settings": Plain(), "how": Plain(), "rounds": Several(Plain(), 0, 10_000)})
 
 
-class Round(Settings):
+class Round(Model):
     """The result of one search for failures; the next training starts episodes there."""
 
     frames: int  # collected by training so far
@@ -64,6 +62,14 @@ class Round(Settings):
     undecided: float | None = None  # fraction of all placements that the proof leaves open
     proof_s: float | None = None  # duration of the proof since its last resume, seconds
     boxes: int  # number of boxes of failures to train on
+
+
+class _Saved(Model):
+    """The content of `provable.json`."""
+
+    settings: dict[str, Any]
+    how: ProvableSettings
+    rounds: tuple[Round, ...]
 
 
 @dataclasses.dataclass
@@ -93,15 +99,16 @@ class Journal(Callback):
             InputError: It is damaged, or has other settings.
         """
         path, rounds = folder / "provable.json", []
-        saved = _JOURNAL.read(read_json(path), str(path)) if state and path.exists() else None
+        saved = _Saved.read(read_json(path), str(path)) if state and path.exists() else None
         if settings is None and state is not None:
-            settings = settings_of(saved["settings"] if saved else state["config"])
+            settings = settings_of(saved.settings if saved else state["config"])
         settings = from_arguments(TrainSettings, settings, changes, train_until_proved)
         if saved is not None:
-            how = how or ProvableSettings.read(saved["how"], "how")
-            check_same_config(saved["settings"], as_config(settings), MAY_CHANGE)
-            check_same_config(saved["how"], how.values(), HOW_MAY_CHANGE)
-            rounds = [Round.read(row, "rounds") for row in saved["rounds"]]
+            how = how or saved.how
+            before = TrainSettings.read(saved.settings)
+            check_same_config(before.config(), settings.config(), MAY_CHANGE)
+            check_same_config(saved.how.values(), how.values(), HOW_MAY_CHANGE)
+            rounds = [*saved.rounds]
         how = how or ProvableSettings(rounds=10)
         _check_support(settings)  # refused before anything is written
         return cls(folder, settings, how, rounds)
@@ -167,12 +174,8 @@ class Journal(Callback):
 
     def save(self) -> None:
         """Write the file."""
-        content = {
-            "settings": as_config(self.settings),
-            "how": self.how.values(),
-            "rounds": [search.values() for search in self.rounds],
-        }
-        write_atomically(self.folder / "provable.json", json.dumps(content, indent=2))
+        saved = _Saved(settings=self.settings.config(), how=self.how, rounds=tuple(self.rounds))
+        saved.write_json(self.folder / "provable.json")
 
 
 def train_until_proved(
@@ -232,7 +235,7 @@ def train_until_proved(
         is_same = journal.is_proved and journal.rounds[-1].frames == result["frames"]
         if is_same and not result["reason"].startswith("SIG"):
             result["reason"] = "proved"
-        result["rounds"] = [search.values() for search in journal.rounds]
+        result["rounds"] = [search.model_dump() for search in journal.rounds]
         judge = Judge(check_judged, judge_for_selection)
         training = finish(journal.settings, folder, result, judge)
     return reraise_signal(training, "train_until_proved")
@@ -269,9 +272,9 @@ def _check_support(settings: TrainSettings) -> None:
     """Raise the InputError with which a proof would refuse the trained policy."""
     described = describe(settings)
     require_cubes(described, "proofs")
-    network, gap = described.build_network(torch.Generator()), ProveSettings.logit_gap
+    network, gap = described.build_network(torch.Generator()), ProveSettings().logit_gap
     with closing(make_policy_spec(described, network, gap, settings.renderer)) as spec:
-        partition_placements(spec, ProveSettings.most_combinations)
+        partition_placements(spec, ProveSettings().most_combinations)
 
 
 def _learn(
@@ -315,7 +318,7 @@ def _search(journal: Journal, progress: Progress) -> None:
         failures=len(places),
         losing=None if proof is None else proof.lost,
         undecided=None if proof is None else proof.undecided,
-        proof_s=None if proof is None else proof.certificate["found"]["seconds"],
+        proof_s=None if proof is None else proof.certificate.found.seconds,
         boxes=len(boxes),
     )
     journal.add(search, inflated(boxes, how.margin, journal.task.lateral_bound))
@@ -338,5 +341,5 @@ def _fly(policy: Policy, journal: Journal) -> tuple[NDArray[np.float64], int]:
 
 def _doubtful(proof: Proof) -> NDArray[np.float64]:
     """Return boxes of possible failure; of a stopped proof, only those of certain failure."""
-    is_whole = proof.certificate["finished"]
+    is_whole = proof.certificate.finished
     return np.concatenate([proof.losing(), proof.open()]) if is_whole else proof.losing()

@@ -17,18 +17,16 @@ from drone_rl.config.options import ProveOptions
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import fingerprint
 from drone_rl.utils.display import TableResult
-from drone_rl.utils.files import (
-    as_path,
-    folder_lock,
-    make_folder,
-    write_atomically,
-)
+from drone_rl.utils.files import as_path, folder_lock, make_folder, write_atomically
 from drone_rl.utils.progress import Progress, as_progress
-from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
-from drone_rl.utils.text import plural
+from drone_rl.utils.text import exact_percent, plural, render
 from drone_rl.utils.threads import torch_threads
-from drone_rl.verification.checker.certificate import read_certificate
+from drone_rl.verification.checker.certificate import (
+    Certificate,
+    certificate_file,
+    read_certificate,
+)
 from drone_rl.verification.prover.policy_spec import (
     PolicySpec,
     make_policy_spec,
@@ -36,7 +34,6 @@ from drone_rl.verification.prover.policy_spec import (
 )
 from drone_rl.verification.prover.proof_files import certify, load, save
 from drone_rl.verification.prover.prover import Prover
-from drone_rl.verification.text import describe_proof
 
 STATE_NAME, _CERTIFICATE_NAME = "state.pt", "certificate.json"
 
@@ -45,63 +42,54 @@ STATE_NAME, _CERTIFICATE_NAME = "state.pt", "certificate.json"
 class Proof(TableResult):
     """The exact outcome of every placement of the cubes, as far as it is decided."""
 
-    certificate: dict[str, Any]
-    """Plain data, see `drone_rl.verification.prover.proof_files`."""
+    certificate: Certificate
+    """What is proved."""
     folder: Path | None = None
     """The folder of the certificate."""
 
     @property
     def success(self) -> float:
         """Fraction of all placements from which all cubes are certainly collected."""
-        return self._share_of(is_success=True)
+        return self.certificate.success
 
     @property
     def lost(self) -> float:
         """Fraction of all placements from which they certainly are not."""
-        return self._share_of(is_success=False)
+        return self.certificate.lost
 
     @property
     def undecided(self) -> float:
         """Fraction of all placements without a claim."""
-        return self.certificate["undecided"]["share"]
+        return self.certificate.undecided.share
 
     @property
     def is_proved(self) -> bool:
         """Whether the policy succeeds from every placement."""
-        ends = {o["end"] for o in self.certificate["outcomes"]}
-        return ends == {"all_cubes"} and not self.certificate["undecided"]["boxes"]
+        return self.certificate.is_proved
 
     def losing(self) -> np.ndarray:
         """Return the boxes of certain failure. Shape: (N, num_cubes, 2), metres."""
-        outcomes = self.certificate["outcomes"]
-        return self._boxes([b for o in outcomes if o["end"] != "all_cubes" for b in o["boxes"]])
+        *groups, undecided = self.certificate.groups
+        pairs = zip(self.certificate.outcomes, groups, strict=True)
+        return np.concatenate([undecided[:0], *(b for o, b in pairs if not o.is_success)])
 
     def open(self) -> np.ndarray:
         """Return the undecided boxes. Shape: (N, num_cubes, 2), metres."""
-        return self._boxes(self.certificate["undecided"]["boxes"])
-
-    def _share_of(self, *, is_success: bool) -> float:
-        outcomes = self.certificate["outcomes"]
-        shares = (o["share"] for o in outcomes if (o["end"] == "all_cubes") == is_success)
-        return min(1.0, sum(shares))  # of rounded shares
-
-    def _boxes(self, boxes: list[Any]) -> np.ndarray:
-        num_cubes = self.certificate["policy"]["description"]["task"]["num_cubes"]
-        return np.array(boxes, float).reshape(-1, num_cubes, 2)
+        return self.certificate.groups[-1]
 
     def rows(self) -> list[list[str]]:
         """Return the outcomes as a table: a header, then one row each."""
         rows = [["ends", "collects", "share of placements", "boxes"]]
-        for outcome in self.certificate["outcomes"]:
-            end = "to and fro" if outcome["loops"] else outcome["end"].replace("_", " ")
-            cubes = "".join(str(k + 1) if c else "-" for k, c in enumerate(outcome["collected"]))
-            rows.append([end, cubes, f"{outcome['share']:.9g}", str(len(outcome["boxes"]))])
-        left = self.certificate["undecided"]
-        return [*rows, ["undecided", "", f"{left['share']:.9g}", str(len(left["boxes"]))]]
+        for outcome in self.certificate.outcomes:
+            end = "to and fro" if outcome.loops else outcome.end.replace("_", " ")
+            cubes = "".join(str(k + 1) if c else "-" for k, c in enumerate(outcome.collected))
+            rows.append([end, cubes, exact_percent(outcome.share), str(len(outcome.boxes))])
+        left = self.certificate.undecided
+        return [*rows, ["undecided", "", exact_percent(left.share), str(len(left.boxes))]]
 
     def notes(self) -> list[str]:
         """Return the statement about all placements."""
-        return [describe_proof(self.certificate)]
+        return [render("drone_rl.verification", "proof.j2", proof=self.certificate)]
 
 
 def prove(
@@ -162,9 +150,8 @@ def _prove(
     stopped = _advance(prover, settings, progress, state, proof_id)
     seconds = time.monotonic() - begin
     certificate = certify(policy.name, policy.description, weights, prover, seconds, stopped)
-    certificate |= provenance()
     if folder is not None and state is not None:
-        write_atomically(folder / _CERTIFICATE_NAME, json.dumps(certificate))
+        write_atomically(folder / _CERTIFICATE_NAME, certificate.model_dump_json())
         if prover.is_finished:
             state.unlink(missing_ok=True)
     return Proof(certificate, folder)
@@ -204,7 +191,5 @@ def load_proof(path: str | Path) -> Proof:
     Raises:
         InputError: There is none, or it is damaged or too large.
     """
-    path = as_path(path, "path")
-    path = path / _CERTIFICATE_NAME if path.is_dir() else path
-    read_certificate(path)  # refuses what is none
-    return Proof(json.loads(path.read_bytes()), path.parent)
+    path = certificate_file(path)
+    return Proof(read_certificate(path), path.parent)

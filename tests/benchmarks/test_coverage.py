@@ -13,7 +13,7 @@ from benchmarks.simulated_policies import (
     policies,
 )
 from drone_rl.trust.rule import Rule, VerdictKind
-from drone_rl.utils.intervals import proportion
+from drone_rl.utils.intervals import Share, proportion
 
 
 def test_coverage_is_exact():
@@ -60,7 +60,7 @@ def test_intervals_that_are_too_narrow_are_detected(monkeypatch):
     def narrow(*args):
         quantity = exact(*args)
         middle = quantity.lower if quantity.value is None else quantity.value
-        return quantity._replace(lower=middle - 0.001, upper=middle + 0.001)
+        return quantity.replace(lower=middle - 0.001, upper=middle + 0.001)
 
     policy = policies()["all or nothing, success +0.00"]
     counts = np.random.default_rng(0).multinomial(400, policy.shares, 100)
@@ -80,5 +80,5 @@ def test_intervals_that_are_too_narrow_are_detected(monkeypatch):
     ],
 )
 def test_an_interval_covers_every_possible_rate(success, undecided, is_covered):
-    interval = {"lower95": 0.4, "upper95": 0.6}
+    interval = Share(share=0.5, lower95=0.4, upper95=0.6, successes=1, trials=2)
     assert Truth(success, undecided).is_covered(interval) == is_covered

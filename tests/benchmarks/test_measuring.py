@@ -9,7 +9,6 @@ from benchmarks import pipeline, revisions, scaling, speed, startup, training
 from benchmarks.memory import growth
 from benchmarks.pipeline import make_drone_env, paired, random_walk, rate
 from drone_rl.config import AppearanceSettings
-from drone_rl.config.configuration import from_config
 from drone_rl.utils.settings import conf_dir
 
 
@@ -81,7 +80,7 @@ def test_a_training_that_ends_without_an_update_is_an_error(tmp_path, monkeypatc
 def test_the_measured_blocks_are_those_of_the_configuration():
     settings = yaml.safe_load((conf_dir() / "appearance" / "blocks.yaml").read_text())
     del settings["defaults"]
-    assert from_config(AppearanceSettings, settings) == speed.BLOCKS
+    assert AppearanceSettings.read(settings) == speed.BLOCKS
 
 
 def test_a_training_is_evaluated_for_each_seed(setup, monkeypatch):

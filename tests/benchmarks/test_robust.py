@@ -1,7 +1,6 @@
 """Gains of randomized training, and operating domains on every axis."""
 
 import dataclasses
-import json
 
 import pytest
 
@@ -18,13 +17,10 @@ from benchmarks.robust_comparison import (
     untouched_kinds,
 )
 from drone_rl.config import AppearanceSettings, CameraSettings, TaskSettings
-from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainSettings
 from drone_rl.config.transforms import Blur, Fault, Gray, LateFrames, Noise, Shift, Standardize
 from drone_rl.trust.axes import AXES, GROUPS
 from drone_rl.trust.paired_evaluation import PairedEvaluator
-from drone_rl.trust.shifts import ranges_of
-from drone_rl.utils.settings import snake_case
 from tests.trust.making import shifts_of
 from tests.trust.subjects import Blind, subject
 
@@ -56,7 +52,7 @@ def test_gains_and_costs_by_hand(setup, monkeypatch):
         exposure=(0.5, 2.0), fog_visibility=(40.0, 100.0), ground_color=((0, 0, 0), (1, 1, 1))
     )
     steps = (Gray(), Noise(), Shift(), Standardize())
-    config = as_config(TrainSettings(appearance=appearance, transforms=steps))
+    config = TrainSettings(appearance=appearance, transforms=steps).config()
     monkeypatch.setattr(robust, "train", lambda run, seed, *_: (1.0, {"frames": int(seed[5:])}))
     monkeypatch.setattr(robust, "read_checkpoint", lambda path: {"config": config})
     monkeypatch.setattr(robust, "success_rates", success_rates)
@@ -94,8 +90,9 @@ def test_a_training_is_exposed_to_the_axes_of_its_settings(settings, axes):
 
 def test_every_setting_of_appearance_and_every_fault_belongs_to_an_axis():
     named = {name for names in TOUCHED_BY.values() for name in names}
-    appearance = {f"appearance.{field.name}" for field in dataclasses.fields(AppearanceSettings)}
-    assert appearance | {f"transforms.{snake_case(f)}" for f in (Blur, *Fault.variants())} <= named
+    appearance = {f"appearance.{name}" for name in AppearanceSettings.model_fields}
+    faults = {f"transforms.{fault.name}" for fault in (Blur, *Fault.__subclasses__())}
+    assert appearance | faults <= named
 
 
 def test_impossible_strengths_are_left_out():
@@ -114,29 +111,19 @@ def test_means_by_kind_of_shift():
     assert by_kind(rates, ["light", "fog", "sensor"]) == {"light": 0.75, "fog": 0.25}
 
 
-class FakeShifts:
-    """A result of `drone_rl.shifts` for a policy that is good up to the third strength."""
-
-    def __init__(self, axes):
-        self.numbers = shifts_of(drone_rl.load_policy(domain_axes.POLICY), axes=axes)
-
-    def save(self, folder):
-        (folder / "shifts.json").write_text(json.dumps(self.numbers))
-        (folder / "domain.yaml").write_text(json.dumps(ranges_of(self.numbers)))
-
-
 @pytest.mark.parametrize("is_reversed", [False, True])
 def test_required_ranges_are_enforced_in_their_direction(setup, monkeypatch, is_reversed):
     """Reversed, for example, a largest visibility in fog is required instead of a smallest one."""
     contradictions = type("Recheck", (), {"contradictions": ()})
     axes = ("fog", "blur") if is_reversed else tuple(AXES)
-    measured = FakeShifts(axes)
+    made = shifts_of(drone_rl.load_policy(domain_axes.POLICY), axes=axes)
+    measured = drone_rl.Shifts(**dict(made.replace(image_size=(25, 64))))
     monkeypatch.setattr(domain_axes, "shifts", lambda *args, **options: measured)
     monkeypatch.setattr(domain_axes, "recheck_domain", lambda *args: contradictions)
     if is_reversed:
         monkeypatch.setattr(
             "drone_rl.trust.coverage.lacking",
-            lambda numbers, name, need: None if need["low"] is None else "reversed",
+            lambda numbers, name, need: None if need.low is None else "reversed",
         )
     figures = domain_axes.bench_domain_axes(setup)
     assert figures["domain_axes"] == len(axes)

@@ -24,8 +24,8 @@ KINDS = {
     "not certain": ["all or nothing, nine in ten"],
 }
 PHRASES = {
-    "dithers at the third cube": "third cube: in all 400 episodes; 100% of all end at the step",
-    "sees 4 m sideways": "with cubes 4 to 6 m to its side: in all 221 episodes",
+    "dithers at the third cube": "in 400 of 400 episodes (100%); 100% of all end at the step",
+    "sees 4 m sideways": "with cubes 4 to 6 m to its side: in 221 of 221 episodes",
     "blind on its left": "can't be trusted with cubes on its left",
     "loses one episode in 50": "second cube: in 9 of 400",
     "straight on in a narrow field": "no better than flying straight on",

@@ -36,8 +36,8 @@ def good():
 @pytest.mark.parametrize(
     ("undecided", "status", "words"),
     [
-        (False, 0, "A certificate states for every"),
-        (True, 16, "from 75% of all placem"),
+        (False, 0, "it collects every cube from every placement."),
+        (True, 16, "from 75.0% of all placem"),
     ],
 )
 def test_a_proof_can_be_required(in_process, tmp_path, good, undecided, status, words):
@@ -69,7 +69,7 @@ def test_good_can_be_required(in_process, policy, more, status):
     done = in_process("verdict", f"policy={policy}", "require=good", *more)
     assert done.returncode == status, done.stdout
     if status == 18:
-        assert done.stdout.startswith("good, but trivial: Flying straight on does as well")
+        assert done.stdout.startswith("good, but trivial: This policy is good, but trivial: it")
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_good_can_be_required(in_process, policy, more, status):
     ],
 )
 def test_an_operating_domain_can_be_required(in_process, tmp_path, good, needed, status, words):
-    (tmp_path / "s.json").write_text(json.dumps(shifts_of(good)))
+    shifts_of(good).write_json(tmp_path / "s.json")
     (tmp_path / "needs.yaml").write_text(needed)
     many = [*ONE, "episodes=150", "domain_flights=30", "shifts=s.json", "require_domain=needs.yaml"]
     done = in_process(*many, "hydra.run.dir=v")
@@ -95,7 +95,7 @@ def test_an_operating_domain_can_be_required(in_process, tmp_path, good, needed,
 
 def test_a_verdict_under_another_appearance_says_so(in_process, tmp_path):
     done = in_process(*ONE, "appearance=fog", "hydra.run.dir=v")
-    assert "It was trained with another appearance: here it flew with " in done.stdout
+    assert "It was trained with other settings: here it flew with " in done.stdout
     assert "appearance.fog_visibility=40 instead of null" in done.stdout
     kept = json.loads((tmp_path / "v" / "verdict.json").read_text())
     assert kept["unlike"]["appearance.fog_visibility"] == {"own": None, "flown": 40.0}

@@ -8,7 +8,7 @@ import pytest
 
 from tests.cli.running import error_line, server
 
-pytest.importorskip("uvicorn")
+pytest.importorskip("websockets")
 
 
 def test_it_prints_the_url_and_ends_by_ctrl_c(tmp_path):

@@ -4,6 +4,7 @@ import json
 import shutil
 
 from drone_rl.policies.zoo import policy_names
+from tests.evidence import VERDICT
 
 
 def test_shipped_policies_with_their_verdicts(in_process, tmp_path):
@@ -25,14 +26,13 @@ def test_trained_policies_newest_first(run, in_process, tmp_path):
     for name in ("2026-01-01_00-00-00-000001", "2026-01-01_00-00-00-000002"):
         shutil.copytree(run, runs / name)
     result = json.loads((runs / name / "result.json").read_text())
-    success = {"share": 0.5, "lower95": 0.4, "upper95": 0.6}
-    verdict = {"kind": "poor", "certain": False, "greedy": {"success": success}}
+    verdict = {**VERDICT, "kind": "poor", "certain": False}
     (runs / name / "result.json").write_text(json.dumps({**result, "verdict": verdict}))
     (runs / "broken" / "checkpoints").mkdir(parents=True)
     (runs / "broken" / "checkpoints" / "last.pt").write_text("x")
     lines = in_process("policies").stdout.splitlines()
     where = lines.index(f"outputs/train/runs/{name}")
-    assert "poor (uncertain)" in lines[where + 1] and "50.0% (40.0 to 60.0)" in lines[where + 1]
+    assert "poor (uncertain)" in lines[where + 1] and "60.0% (58.0% to 62.0%)" in lines[where + 1]
     assert any("not judged" in line for line in lines)
     assert any("can't be read" in line for line in lines)
     assert max(map(len, lines)) <= 100

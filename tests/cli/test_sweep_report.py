@@ -19,7 +19,7 @@ def sweep(trained):
     """A sweep of the training and of one that never began."""
     folder = trained.parent
     runs = [Run(i, (f"seed={i}",), folder / str(i)) for i in range(2)]
-    made = Sweep(folder, "drone-rl train -m", {}, runs)
+    made = Sweep(folder=folder, command="drone-rl train -m", settings={}, runs=tuple(runs))
     made.save()
     return made
 

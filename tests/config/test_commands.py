@@ -13,7 +13,7 @@ def test_bodies_by_default():
 @pytest.mark.parametrize(
     ("told", "message"),
     [
-        ({"bodies": ("submarine",)}, "submarine.* is unknown; give .*simple flight"),
+        ({"bodies": ("submarine",)}, "submarine': it must be .*'simple flight'"),
         ({"bodies": ()}, "bodies"),
         ({"policies": ()}, "policies"),
         ({"policies": ("good", "good")}, "each once"),
@@ -40,7 +40,7 @@ def test_modes_of_shifts():
         ({"strengths": ()}, "strengths"),
         ({"modes": ("constant", "constant")}, "modes=.* has one twice; give each once"),
         ({"modes": ("drifting",)}, r"modes=\['drifting'\] leaves out constant"),
-        ({"modes": ("sudden",)}, "sudden.* is unknown; give constant, drifting, onset"),
+        ({"modes": ("sudden",)}, "sudden': it must be 'constant', 'drifting' or 'onset'"),
         ({"episodes": 0}, "episodes=0"),
         ({"good_share": 1.0}, "good_share=1.0"),
         ({"axes": ("sun", "sun")}, "each once"),

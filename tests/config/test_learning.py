@@ -2,7 +2,6 @@
 
 import pytest
 
-from drone_rl.config.configuration import as_config, from_config
 from drone_rl.config.learning import (
     A2c,
     Episodes,
@@ -51,9 +50,9 @@ def test_returns_and_critics_belong_together():
 
 
 def test_combinations_with_other_packages_are_accepted():
-    config = as_config(TrainSettings().replace(objective=Ppo()))
+    config = TrainSettings().replace(objective=Ppo()).config()
     config["collector"] = {"_target_": "mine.Collector", "num_envs": 3}
-    assert from_config(TrainSettings, config).collector.target == "mine.Collector"
+    assert TrainSettings.read(config).collector.target == "mine.Collector"
 
 
 def test_the_loss_gets_its_own_settings():
@@ -66,8 +65,8 @@ def test_the_loss_gets_its_own_settings():
 
 def test_a_setting_of_torchrls_loss_that_is_not_ours_is_passed_on():
     config = {"_target_": Ppo.target, "clip_value": 0.3, "epochs": 5, "shares_trunk": False}
-    told = from_config(TrainSettings, {**as_config(TrainSettings().replace(objective=Ppo()))})
-    mine = from_config(TrainSettings, {**as_config(told), "objective": config}).objective
+    told = TrainSettings.read({**TrainSettings().replace(objective=Ppo()).config()})
+    mine = TrainSettings.read({**told.config(), "objective": config}).objective
     assert mine.arguments() == {"clip_value": 0.3} and type(mine).factory is Ppo.factory
     assert mine.passes == {"epochs": 5, "minibatch_size": Ppo().minibatch_size}
 
@@ -75,9 +74,9 @@ def test_a_setting_of_torchrls_loss_that_is_not_ours_is_passed_on():
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        ({"num_steps": 1}, "num_steps=1 is out of range; give a whole number from 2 to 4096"),
-        ({"minibatch_size": 0}, "minibatch_size=0 is out of range"),
-        ({"critic_coeff": 0.0}, "critic_coeff=0.0 is out of range; give a number above 0"),
+        ({"num_steps": 1}, "num_steps=1: it must be a whole number from 2 to 4096"),
+        ({"minibatch_size": 0}, "minibatch_size=0: it must be"),
+        ({"critic_coeff": 0.0}, "critic_coeff=0.0: it must be a number above 0"),
     ],
 )
 def test_values_out_of_bounds(value, message):

@@ -1,7 +1,5 @@
 """Keyword arguments of functions are the fields of their settings."""
 
-import dataclasses
-
 import pytest
 
 from drone_rl.config import (
@@ -41,11 +39,11 @@ LEFT_OUT = {"BodiesSettings": {"policies"}, "FigureSettings": {"figure"}}
     ],
 )
 def test_keywords_are_the_fields_of_settings(settings, keywords):
-    fields = {field.name for field in dataclasses.fields(settings)}
+    fields = {*settings.model_fields}
     assert keywords.__optional_keys__ == fields - LEFT_OUT.get(settings.__name__, set())
 
 
 def test_keywords_of_tasks_are_the_fields_of_all_built_in_tasks():
     tasks = (TaskSettings, PillarsSettings)
-    fields = {field.name for task in tasks for field in dataclasses.fields(task)}
+    fields = {name for task in tasks for name in task.model_fields}
     assert options.TaskOptions.__optional_keys__ == fields

@@ -5,7 +5,6 @@ from typing import Annotated, Literal
 import pytest
 import torch
 
-from drone_rl.config.configuration import as_config, from_config
 from drone_rl.config.learning import Collector, Objective, Returns
 from drone_rl.config.networks import Network, SmallCnn
 from drone_rl.config.registry import (
@@ -75,8 +74,8 @@ def test_types_that_are_no_settings_are_refused(hint):
 def test_a_network_is_selected_by_name_and_described_by_name_and_values(registered):
     registered(register_network("wide")(Wide))
     training = TrainSettings(network="wide")
-    assert training == from_config(TrainSettings, as_config(training))
-    assert as_config(training)["network"]["_target_"] == "wide"
+    assert training == TrainSettings.read(training.config())
+    assert training.config()["network"]["_target_"] == "wide"
     described = describe(training)
     assert described.as_dict()["network"]["name"] == "wide"
     assert parse(described.as_dict()) == described
@@ -85,8 +84,8 @@ def test_a_network_is_selected_by_name_and_described_by_name_and_values(register
 
 def test_a_transform_is_selected_by_its_key_and_measured_by_a_call(registered):
     registered(register_transform("mirror")(Mirror))
-    training = from_config(
-        TrainSettings, {"transforms": {"gray": {}, "mirror": {}, "standardize": {"mean": 0.5}}}
+    training = TrainSettings.read(
+        {"transforms": {"gray": {}, "mirror": {}, "standardize": {"mean": 0.5}}}
     )
     assert [step.name for step in training.transforms] == ["gray", "mirror", "standardize"]
     assert describe(training).input == Frame((1, 25, 32), True)
@@ -104,7 +103,7 @@ def test_a_return_estimator(registered):
     settings = registered(register_returns("twice")(Twice)).Settings
     assert settings(factor=3, scale=True).make().factor == 3.0
     assert settings(scale=True).make().scale is True
-    assert Returns.from_name("twice", "returns") == settings()
+    assert Returns.read("twice") == settings()
 
 
 def test_a_learner_and_a_collector_get_the_settings_of_the_training(registered):
@@ -122,15 +121,15 @@ def test_a_learner_and_a_collector_get_the_settings_of_the_training(registered):
 
     registered(learner), registered(collector)
     training = TrainSettings(
-        objective=Objective.named("mine", "x")(alpha=0.1),
-        collector=Collector.named("theirs", "x")(num_envs=5),
+        objective=Objective.read({"name": "mine", "alpha": 0.1}),
+        collector=Collector.read({"name": "theirs", "num_envs": 5}),
     )
     assert training.objective.make(training, "made") == (training, "made", 0.1)
     assert training.collector.make(training, None) == (training, None, 3)
 
 
 def test_a_name_that_is_not_registered():
-    with pytest.raises(InputError, match=r"network='x' is not registered.*small_cnn.*plugins="):
+    with pytest.raises(InputError, match=r"network='x': it must be one of .*small_cnn.*plugins="):
         TrainSettings(network="x")
 
 
@@ -205,7 +204,7 @@ def test_a_module_that_is_imported_again_replaces_its_parts(registered):
     first = register_network("wide")(Wide).Settings
     second = registered(register_network("wide")(Wide)).Settings
     assert first is not second
-    assert Network.named("wide", "x") is second
+    assert Network.registry["wide"] is second
 
 
 def test_parameters_without_a_default_or_of_another_type_are_refused():
@@ -240,7 +239,7 @@ def test_the_modules_of_registered_parts(registered):
     registered(register_network("wide")(Wide))
     assert modules_of(TrainSettings(network="wide")) == {__name__}
     registered(register_transform("mirror")(Mirror))
-    mirrored = from_config(TrainSettings, {"transforms": {"gray": {}, "mirror": {}}})
+    mirrored = TrainSettings.read({"transforms": {"gray": {}, "mirror": {}}})
     assert modules_of(mirrored) == {__name__}
 
 

@@ -29,13 +29,13 @@ RGB, GRAY = Frame((25, 64, 3)), Frame((1, 25, 64), True)
     ],
 )
 def test_output_shapes(name, values, picture, after):
-    assert Transform.named(name, "x")(**values).output(picture) == after
+    assert Transform.read({"name": name, **values}).output(picture) == after
 
 
 def test_faults_are_those_by_chance_or_with_memory():
-    faults = {variant.registered_name() for variant in Fault.variants()}
+    faults = {v.name for v in Transform.registry.values() if issubclass(v, Fault)}
     assert faults == {"noise", "dead_rows", "frozen_frames", "late_frames", "shift"}
-    assert all(issubclass(variant.factory, CameraFault) for variant in Fault.variants())
+    assert all(issubclass(variant.factory, CameraFault) for variant in Fault.__subclasses__())
 
 
 @pytest.mark.parametrize(
@@ -52,4 +52,4 @@ def test_faults_are_those_by_chance_or_with_memory():
 )
 def test_images_of_another_kind_are_refused(name, frame, message):
     with pytest.raises(InputError, match=message):
-        Transform.named(name, "x")().output(frame)
+        Transform.read(name).output(frame)

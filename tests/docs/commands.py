@@ -42,7 +42,7 @@ def check_command(name, *words):
             import_plugins(told)
         except InputError:
             return  # of a tutorial, whose own test has the module
-    composition.register_schemas({file: command})
+    composition.store_defaults({file: command})
     GlobalHydra.instance().clear()
     with initialize_config_dir(str(conf_dir()), version_base="1.3"):
         config = compose(file, told, return_hydra_config=True)

@@ -18,7 +18,6 @@ from drone_rl.config import TASKS
 from drone_rl.explanations import report
 from drone_rl.explanations.report import page as report_page
 from drone_rl.sim.tasks.task import MAKERS
-from drone_rl.utils.settings import kinds_of, types_of
 from tests.docs.commands import check_commands
 from tests.explanations.quick import few_sections, quick_figures
 from tools.docs import session
@@ -121,19 +120,22 @@ def workplace(tmp_path, monkeypatch):
     for name in set(sys.modules) - known:
         if str(tmp_path) in str(getattr(sys.modules[name], "__file__", "")):
             del sys.modules[name]
-    kinds_of.cache_clear()  # a tutorial's settings count as variants as long as a cache holds them
-    types_of.cache_clear()
     gc.collect()
     gc.unfreeze()
 
 
 def forget_choices():
-    """Remove the parts of plug-ins from Hydra's groups; built-in parts have files instead."""
+    """Remove the parts of plug-ins from the registries and Hydra's groups."""
     stored = ConfigStore.instance().repo
-    for group in ("task", *composition.PARTS, *composition.SEVERAL):
+    registries = {group: part.registry for group, part in composition.PARTS.items()}
+    registries |= {group: part.registry for group, part in composition.SEVERAL.items()}
+    for group, registry in {"task": TASKS, **registries}.items():
+        for name, part in [*registry.items()]:
+            if not part.__module__.startswith("drone_rl."):
+                del registry[name]
         nodes = stored.get(group, {})
-        for name in [name for name in nodes if name.endswith(".yaml")]:
-            if not name.startswith("base_"):
+        for name in [name for name in nodes if name.removesuffix(".yaml") not in registry]:
+            if group not in composition.SEVERAL:
                 del nodes[name]
 
 

@@ -98,9 +98,9 @@ def test_invalid_arguments_raise():
         CropRows(5, 5)
     with pytest.raises(InputError, match="at most 4"):
         CropRows(0, 5)._apply_transform(torch.zeros(1, 4, 4))
-    with pytest.raises(InputError, match="height=0 is out of range"):
+    with pytest.raises(InputError, match="height=0"):
         Resize(height=0, width=4)
-    with pytest.raises(InputError, match=r"std=0\.0 is out of range"):
+    with pytest.raises(InputError, match=r"std=0\.0"):
         StandardizePixels(std=0.0)
     for transform in (GrayPixels(), RgbPixels()):
         with pytest.raises(InputError, match=r"Pixels got torch.float32 frames of .*; give uint8"):

@@ -1,4 +1,3 @@
-import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -45,7 +44,7 @@ def test_reasons_for_no_exact_map(context):
     assert "stack of frames" in refused(memory=1)
     assert "does not choose among forward, left, right" in refused(actions=FIVE)
     assert "its task is not cube collection" in refused(task=None)
-    tall = dataclasses.replace(scenes.task.settings, vertical_bound=1.0)
+    tall = scenes.task.settings.replace(vertical_bound=1.0)
     function = ExternalNetwork(lambda x: x.flatten(1)[:, :3], (1, 25, 64), MOVES)
     assert "not a torch module" in refused(network=function)
     assert "vertical_bound=1.0" in refused(task=type(scenes.task)(tall))

@@ -14,7 +14,7 @@ def batch(rewards, ends):
     return TensorDict({"next": {"reward": reward, "done": done}}, [len(rewards)])
 
 
-BUILT_IN = (v for v in Returns.variants() if v.__module__ == Returns.__module__)
+BUILT_IN = (v for v in Returns.registry.values() if v.__module__ == Returns.__module__)
 NAMES = [variant.factory.__name__ for variant in BUILT_IN if variant is not Gae]
 
 

@@ -14,7 +14,7 @@ from drone_rl.envs.three_state import ThreeStateEnv
 from drone_rl.objectives import BatchNormalized, RewardToGo, TimeBaseline, TotalReward
 from drone_rl.utils.errors import InputError
 
-BUILT_IN = (v for v in Returns.variants() if v.__module__ == Returns.__module__)
+BUILT_IN = (v for v in Returns.registry.values() if v.__module__ == Returns.__module__)
 NAMES = [variant.factory.__name__ for variant in BUILT_IN if variant is not Gae]
 
 

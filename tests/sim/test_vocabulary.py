@@ -51,9 +51,9 @@ def test_moves_are_the_default_display():
         ({"names": ["a", "a", "b"]}, "give 3 different names, and the index of each once"),
         ({"order": [0, 1, 1]}, "order=.*0, 1, 1.* or a name is invalid"),
         ({"arrows": [[0, 1]]}, "an arrow and a color"),
-        ({"colors": [[0, 0, 256]] * 3}, "out of range"),
-        ({"colors": "red"}, "does not fit"),
-        ({"speeds": [4, 3]}, "does not fit"),
+        ({"colors": [[0, 0, 256]] * 3}, "must be"),
+        ({"colors": "red"}, "must"),
+        ({"speeds": [4, 3]}, "must"),
         ({"more": 1}, "unknown"),
     ],
 )

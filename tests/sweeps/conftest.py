@@ -55,10 +55,15 @@ def _verdict(kind="good", left=1.0, ahead=1.0, right=1.0, *, whole=1.0, certain=
     greedy = {
         "episodes": 200,
         "success": dict(proportion(round(200 * whole), 200)),
-        "shares": {name: {"mean": share} for name, share in shares.items()},
+        "shares": {
+            name: {"mean": share, "lower95": 0.0, "upper95": 1.0, "count": 200}
+            for name, share in shares.items()
+        },
     }
-    verdict = {"kind": kind, "certain": certain, "rule": Rule().text, "error_rate": 0.05}
-    return {**verdict, "greedy": greedy}
+    failures = {"rows": [], "largest": None, "bound": dict(proportion(0, 200))}
+    about = {"exit_code": 0, "error_rate": 0.05, "good_share": 0.9, "baselines": {}}
+    verdict = {"kind": kind, "certain": certain, "rule": Rule().text, "failures": failures}
+    return {**about, **verdict, "greedy": greedy}
 
 
 CURVE = (

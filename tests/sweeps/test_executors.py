@@ -1,6 +1,5 @@
 """Executors of runs, and the process of one run."""
 
-import contextlib
 import json
 import logging
 import signal
@@ -124,19 +123,6 @@ def test_settings_that_submitit_refuses(tmp_path, setting):
         SlurmExecutor(tmp_path, cluster="local", num_jobs=2, resources=setting)
 
 
-def test_jobs_that_slurm_refuses(make_runs, tmp_path):
-    executor = slurm(tmp_path)
-
-    @contextlib.contextmanager
-    def batch():
-        yield
-        raise RuntimeError("sbatch: error: invalid partition\n specified: gpu")
-
-    executor._executor = types.SimpleNamespace(batch=batch, submit=lambda *_: None)
-    with pytest.raises(InputError, match=r"refuses the jobs .*invalid partition specified: gpu"):
-        list(executor.finish(make_runs("seed=0")))
-
-
 def fake_ray(calls):
     task = types.SimpleNamespace(remote=lambda *args: calls.append(args) or len(calls))
     return types.SimpleNamespace(
@@ -200,16 +186,6 @@ def test_a_run_that_another_process_works_on_is_waited_for(make_runs):
     assert not (run.folder / "starts").exists()
 
 
-def test_a_process_that_came_too_late_is_no_failure(make_runs):
-    (run,) = make_runs("fail=true")
-    process = RunProcess(run)
-    assert process.poll() is None
-    result = {"reason": "solved", "running_reward": 2.0}
-    (run.folder / "result.json").write_text(json.dumps(result))  # by an earlier sweep's process
-    assert process.wait() == 0
-    assert read_failure(run) is None
-
-
 @pytest.mark.parametrize(
     ("program", "error"),
     [
@@ -238,28 +214,3 @@ def test_a_run_that_is_stopped_ends_by_sigterm(make_runs):
     started.join()
     assert started.poll() == -signal.SIGTERM
     assert read_result(run.folder) is None
-
-
-def test_a_run_has_one_thread_and_no_input(make_runs, monkeypatch):
-    code = "import os, sys; sys.exit('error: ' + os.environ['OMP_NUM_THREADS'] + sys.stdin.read())"
-    monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-c", code))
-    (run,) = make_runs("seed=0")
-    finish_run(run)
-    assert read_failure(run) == "1"
-
-
-def test_a_later_attempt_replaces_the_failure(make_runs, monkeypatch):
-    (run,) = make_runs("seed=0")
-    for program, error in (
-        ("sys.exit('error: disk full')", "disk full"),
-        ("sys.exit(3)", "ended with status 3"),
-    ):
-        code = f"import sys; {program}"
-        monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-c", code))
-        assert finish_run(run) != 0
-        assert read_failure(run) == error
-    result = "{'reason': 'solved'}"
-    code = f"import json; json.dump({result}, open({str(run.folder / 'result.json')!r}, 'w'))"
-    monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-c", code))
-    assert finish_run(run) == 0
-    assert read_failure(run) is None

@@ -25,7 +25,7 @@ def test_a_manifest_is_read_as_written(tmp_path, make_runs):
     runs = make_runs("a=1", "a=2")
     begin(tmp_path, runs, seed=0)
     sweep = read_sweep(tmp_path)
-    assert sweep.runs == runs
+    assert sweep.runs == tuple(runs)
     assert sweep.command == "drone-rl train -m a=1,2"
     assert sweep.settings == {"seed": 0}
 
@@ -67,10 +67,9 @@ def test_no_sweep_and_a_damaged_one(tmp_path):
     ("change", "message"),
     [
         ({"command": "drone-rl train; rm -rf ~"}, "not a training command"),
-        ({"settings": [1]}, "must be a mapping"),
-        ({"plugins": []}, "'plugins' is unknown"),
+        ({"settings": [1]}, r"settings=\(list\)"),
+        ({"plugins": []}, "plugins is unknown"),
         ({"runs": [{"number": 0, "overrides": [], "folder": "../0"}]}, "not inside the sweep's"),
-        ({"runs": [{"number": -1, "overrides": [], "folder": "0"}]}, "number=-1"),
         (
             {"runs": [{"number": 0, "overrides": ["a._target_=b"], "folder": "0"}]},
             "not a plain setting",

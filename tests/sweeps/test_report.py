@@ -11,11 +11,12 @@ import pytest
 import drone_rl
 from drone_rl.sweeps.manifest import Run, Sweep
 from drone_rl.sweeps.report import (
-    _code,
-    _figure,
+    _median,
+    _share,
     find_sweep,
     judge_run,
     terminal_lines,
+    text_of,
     write_picture,
     write_sweep_report,
 )
@@ -25,8 +26,10 @@ from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import RootSeed
 from tests.training.test_train import TINY
 
+INF = float("inf")
 
-def test_report_has_every_sentence_and_escapes_what_it_shows(sweep):
+
+def test_report_escapes_what_it_shows(sweep):
     page = write_sweep_report(sweep)[0].read_text()
     assert "<b>NaN</b>" not in page
     assert "&lt;b&gt;NaN" in page
@@ -39,8 +42,7 @@ def test_report_has_every_sentence_and_escapes_what_it_shows(sweep):
     summary = json.loads((sweep.folder / "summary.json").read_text())
     assert (summary["finished"], summary["failed"], summary["best"]["run"]) == (3, 1, 0)
     assert (sweep.folder / "summary.csv").read_text().count("\n") == 5
-    for text in summary["sentences"].values():
-        assert str(_code(text)) in page or text in page
+    assert summary["groups"][0]["settings"] == {"optimizer.lr": "1e-3"}
 
 
 def test_a_sweep_with_nothing_finished_has_a_report_and_no_picture(sweep, tmp_path):
@@ -67,22 +69,21 @@ def test_panels_that_are_not_plotted_are_counted(begin_sweep):
 
 
 def test_cells():
-    assert _figure(median_of_runs([1.0, 2.0])) == "1.5"
-    assert _figure(median_of_runs([123456.0])) == "123,456"
-    assert _figure(median_of_runs([float("inf")], [500.0])) == ">500"
+    assert _median(median_of_runs([1.0, 2.0])) == "1.5"
+    assert _median(median_of_runs([123456.0])) == "123,456"
+    assert _median(median_of_runs([float("inf")], [500.0])) == ">500"
     six = [1.0, 2, 3, 4, 5, float("inf")]
-    assert _figure(median_of_runs(six, [1.0, 2, 3, 4, 5, 9])) == "3.5 [1, more]"
-    assert _figure(median_of_runs([1.0, 2, 3, 4, 5, 6])) == "3.5 [1, 6]"
-    assert _figure(median_of_runs([])) == _figure(None) == _figure(share_of_runs(0, 0, 0)) == ""
-    assert _figure(share_of_runs(2, 0, 2)) == "2/2 [0.16, 1.00]"
-    assert _figure(share_of_runs(0, 3, 3)) == "not known"  # nothing was judged
-    assert _figure(share_of_runs(1, 2, 3)) == "1/1, 2 not known [0.01, 1.00]"
-    assert _figure({**share_of_runs(2, 0, 2), "certain": 1}) == "2/2, 1 certain [0.16, 1.00]"
+    assert _median(median_of_runs(six, [1.0, 2, 3, 4, 5, 9])) == "3.5 [1, more]"
+    assert _median(median_of_runs([])) == _share(share_of_runs(0, 0, 0)) == ""
+    assert _share(share_of_runs(0, 3, 3)) == "not known"  # nothing was judged
+    assert _share(share_of_runs(1, 2, 3)) == "1/1, 2 not known [0.01, 1.00]"
+    assert _share(share_of_runs(2, 0, 2, certain=1)) == "2/2, 1 certain [0.16, 1.00]"
 
 
 def begun(folder):
     folder.mkdir(parents=True)
-    Sweep(folder, "drone-rl train -m seed=0", {}, [Run(0, ("seed=0",), folder / "0")]).save()
+    runs = (Run(0, ("seed=0",), folder / "0"),)
+    Sweep(folder=folder, command="drone-rl train -m seed=0", settings={}, runs=runs).save()
     return folder
 
 
@@ -99,25 +100,72 @@ def test_no_sweep(tmp_path):
         find_sweep("latest", tmp_path)
 
 
-def test_the_sentences_in_order():
-    figures = {
-        "sentences": {
-            "runs.all": "3 runs.",
-            "best.run": "Run 2.",
-            "x.y": "no",
-            "verdicts.a": "All.",
-        },
-        "groups": [{"lr": "0.1", "runs": 3, "sentences": {"a": "one", "b": "two"}}],
-        "runs": [{"run": 1, "state": "failed", "error": "no memory"}, {"run": 2, "error": None}],
-        "best": {"command": "drone-rl train seed=2"},
-    }
-    lines = terminal_lines(figures).splitlines()
-    assert lines[:2] == ["3 runs.", "All."]
-    assert lines[2].split(maxsplit=1) == ["lr=0.1", "one; two"]
-    assert lines[3:] == [
-        *("run 1 failed: no memory", "best run: Run 2."),
-        "to repeat it: drone-rl train seed=2",
-    ]
+def test_terminal_lines(sweep):
+    lines = terminal_lines(write_sweep_report(sweep)[1]).splitlines()
+    assert lines[0].startswith("4 runs: 3 finished, 1 failed, 0 damaged, 0 unfinished. Failed")
+    low, high = (line.split(maxsplit=1) for line in lines[2:4])
+    assert low == ["optimizer.lr=1e-3", "solved 2 of 2; verdicts: good 2"]
+    assert high[1] == "solved 0 of 2; verdicts: one-sided 1 (0 certain), failed 1"
+    assert lines[4] == "run 3 failed: <b>NaN</b>"
+    assert lines[5].startswith(
+        "best run: Run 0: good, which reaches 100% of its goals; selected by"
+    )
+    assert lines[6] == "to repeat it: drone-rl train optimizer.lr=1e-3 seed=0 logger=csv"
+
+
+@pytest.fixture
+def six(begin_sweep, make_verdict):
+    """Six good runs of one setting."""
+    runs = {f"seed={i}": {"verdict": make_verdict()} for i in range(6)}
+    return write_sweep_report(begin_sweep(runs))[1]
+
+
+@pytest.mark.parametrize(
+    ("part", "text", "change"),
+    [
+        ("runs", "count as not solved", {"failed": 1}),
+        ("runs", "can't be read", {"damaged": 2}),
+        ("runs", "are left out of every", {"unfinished": 1}),
+        ("runs", "1 of 1 settings have fewer than 6", {"groups": {"ended": 5}}),
+        ("runs", "1 of 1 settings have fewer than 6", {"groups": {"damaged": 1}}),
+        ("runs", "at least half", {"groups": {"frames_to_solve": median_of_runs([INF], [9.0])}}),
+        ("verdicts", "2 of 6 verdicts are not certain", {"certain": 4}),
+        ("verdicts", "older rule", {"judged_by_older_rule": 2}),
+        ("verdicts", "finished and not judged", {"never_judged": 1}),
+        ("best", "No run has been judged", {"best": None}),
+        ("curves", "Thin lines", {"groups": {"ended": 3}}),
+        ("sides", "without a dot", {"sides_not_offered": 1}),
+        ("costs", "Open triangles", {"failed": 1}),
+    ],
+)
+def test_what_makes_a_sentence(six, part, text, change):
+    assert text not in text_of(six, part) and text in text_of(changed(six, **change), part)
+
+
+@pytest.mark.parametrize(
+    ("part", "text", "change"),
+    [
+        ("verdicts", "Verdicts are on the last policies", {"judged": 0}),
+        ("verdicts", "All are certain", {"certain": 5}),
+        ("best", "reaches 100% of its goals", {"best": None}),
+        ("best", "optimistic", {"judged": 1}),
+        ("curves", "Thick line", {"groups": {"ended": 5}}),
+        ("shares", "bars", {"judged": 0}),
+        ("sides", "Each dot", {"sides_not_offered": 6}),
+        ("entropies", "Each dot", {"runs": ()}),
+        ("costs", "Each dot", {"groups": {"solved": share_of_runs(0, 0, 6)}}),
+        ("settings", "Clopper-Pearson", {"unfinished": 6}),
+    ],
+)
+def test_what_takes_a_sentence_away(six, part, text, change):
+    assert text in text_of(six, part) and text not in text_of(changed(six, **change), part)
+
+
+def changed(summary, **change):
+    """Return a summary with other values, of its groups too."""
+    groups = change.pop("groups", {})
+    every = tuple(group.replace(**groups) for group in summary.groups)
+    return summary.replace(groups=every, **change)
 
 
 def test_a_report_and_the_plugins_of_hydra_need_no_torch():

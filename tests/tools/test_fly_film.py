@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 pytest.importorskip("selenium.webdriver")
-pytest.importorskip("uvicorn")
+pytest.importorskip("websockets")
 if not shutil.which("chromedriver"):
     pytest.skip("no chromium with chromedriver on this machine", allow_module_level=True)
 

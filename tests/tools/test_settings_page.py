@@ -8,12 +8,8 @@ from drone_rl.cli.hydra.composition import GROUPS, PARTS, SEVERAL
 from drone_rl.cli.main import COMMANDS, find_command
 from drone_rl.config import DynamicsSettings
 from drone_rl.utils.schema import OneOf, Real, Several, Whole
-from drone_rl.utils.settings import Settings, kinds_of
-from tools.readme.settings import (
-    list_commands,
-    make_table,
-    meanings,
-)
+from drone_rl.utils.settings import Settings, meanings
+from tools.readme.settings import list_commands, make_table
 
 
 class Sea(Settings):
@@ -66,14 +62,14 @@ def commands():
 @pytest.mark.parametrize(
     "cls",
     [
-        *GROUPS.values(),
+        *(cls for cls, _ in GROUPS.values()),
         *commands(),
-        *(v for part in {**PARTS, **SEVERAL}.values() for v in part.variants()),
+        *(v for part in {**PARTS, **SEVERAL}.values() for v in part.registry.values()),
     ],
     ids=lambda cls: f"{cls.__module__}.{cls.__name__}",
 )
 def test_every_setting_has_a_meaning_and_seconds_a_suffix(cls):
-    assert all(meanings(cls).get(name) for name in kinds_of(cls))
+    assert all(meanings(cls).get(name) for name in cls.model_fields)
     for line in make_table(cls).splitlines()[2:]:
         name, may_be, unit = [cell.strip("| `") for cell in line.split(" | ")][:3]
         assert may_be

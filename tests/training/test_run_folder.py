@@ -6,7 +6,6 @@ import pytest
 
 import drone_rl
 from drone_rl.config import TASKS, DynamicsSettings
-from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainSettings
 from drone_rl.sim.tasks.task import MAKERS, as_settings
 from drone_rl.training.run_folder import (
@@ -22,14 +21,14 @@ from tests.second_task import Posts
 
 def test_checkpoint_settings_are_restored_and_validated():
     settings = TrainSettings(seed=3)
-    assert settings_of(as_config(settings)) == settings
-    foreign = {**as_config(settings), "network": {"_target_": "os.system"}}
+    assert settings_of(settings.config()) == settings
+    foreign = {**settings.config(), "network": {"_target_": "os.system"}}
     with pytest.raises(InputError, match=r"the checkpoint uses os\.system"):
         settings_of(foreign)
 
 
 def test_changed_settings_prevent_resuming(tmp_path):
-    state = {"config": as_config(TrainSettings(seed=1))}
+    state = {"config": TrainSettings(seed=1).config()}
     with pytest.raises(InputError, match="seed=0: the run was started with seed=1"):
         RunFolder(tmp_path).prepare(TrainSettings(), state)
 

@@ -88,7 +88,7 @@ def test_resuming_with_other_settings_raises(trained):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"seed": -1}, "seed=-1 is out of range; give a whole number of 0 or more"),
+        ({"seed": -1}, "seed=-1: it must be a whole number of 0 or more"),
         ({"task": {"num_cubes": 1}}, r"task=\(dict\) is no BaseTaskSettings"),
         ({"returns": 3}, "returns=3 is no Returns"),
         ({"transforms": (3,)}, r"transforms\[0\]=3 is no Transform"),

@@ -6,7 +6,6 @@ import sys
 import pytest
 
 from drone_rl.config import TaskSettings
-from drone_rl.config.configuration import as_config
 from drone_rl.config.learning import Ray
 from drone_rl.config.networks import Network
 from drone_rl.config.registry import modules_of
@@ -40,10 +39,10 @@ def test_a_worker_imports_the_modules_that_register_its_parts(tmp_path, monkeypa
     monkeypatch.syspath_prepend(tmp_path)
     plugin = importlib.import_module("ray_plugin")
     settings = TrainSettings(task=TASK, network="ray_cells", collector=Ray(num_envs=2))
-    sent = (as_config(settings), sorted(modules_of(settings)))
+    sent = (settings.config(), sorted(modules_of(settings)))
     del sys.modules["ray_plugin"], plugin.Cells.Settings.target  # as in a new process
     with pytest.raises(InputError, match="is not registered"):
-        Network.named("ray_cells", "network")
+        Network.read("ray_cells", "network")
     collector, network, _ = _remote_collector(*sent, [2], 0, None)
     collector.shutdown()
     assert type(network).__name__ == "Cells"

@@ -2,11 +2,9 @@ import itertools
 import math
 
 import pytest
-import torch
 
 import drone_rl
-from drone_rl.config import BaseTaskSettings, PillarsSettings
-from drone_rl.sim.rendering.appearance import Appearance
+from drone_rl.config import PillarsSettings
 from drone_rl.trust.axes import AXES, FACTORS, GROUPS, INVERSE, LINEAR, Axis, check_axes, find_axes
 from drone_rl.trust.perturbations import Condition
 from drone_rl.utils.errors import InputError
@@ -63,26 +61,6 @@ def test_task_without_a_size():
     assert "object_size" not in [a.name for a in find_axes(None, other)]
 
 
-def test_task_without_steps():
-    class Plain(BaseTaskSettings):
-        name = "plain"
-
-    plain = subject(task=Plain())
-    with pytest.raises(InputError, match="axes=step_length is not for task=plain; leave it out"):
-        find_axes(["step_length"], plain)
-    assert {"object_size", "step_length"}.isdisjoint(a.name for a in find_axes(None, plain))
-
-
-@pytest.mark.parametrize(
-    ("name", "offset"), [("camera_height", [0.0, 0.0, 0.5]), ("camera_sideways", [0.0, 0.5, 0.0])]
-)
-def test_camera_offsets(name, offset):
-    (mount,) = AXES[name].make(0.5, subject()).mounts
-    camera = mount.change(Appearance(), torch.ones(1, 1, dtype=torch.float64)).camera
-    assert camera.offset.tolist() == [offset]
-    assert camera.turn.tolist() == [[1.0, 0.0, 0.0, 0.0]]
-
-
 def axis(scale=LINEAR, neutral=0.0, **kwargs):
     strengths = (1.0, 2.0, 3.0, 4.0, 5.0)
     return Axis("a", "b", "m", neutral, strengths, lambda s, _: Condition(), scale=scale, **kwargs)
@@ -123,8 +101,3 @@ def test_strength_of_a_value(name):
     for strength in one.strengths:
         assert one.strength(one.value(strength, of), of) == pytest.approx(strength)
     assert one.strength(math.inf, of) == math.inf
-
-
-def test_signs_of_the_ends():
-    assert axis(INVERSE, math.inf).signs == {"low": 1, "high": -1}
-    assert axis().signs == axis(FACTORS, 1.0).signs == {"low": -1, "high": 1}

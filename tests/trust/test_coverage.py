@@ -14,13 +14,11 @@ from drone_rl.policies.zoo import shifts_path
 from drone_rl.trust.axes import AXES
 from drone_rl.trust.coverage import (
     _strengths,
-    compare_with_required,
     find_domain,
     lacking,
     read_requirements,
     recheck_domain,
 )
-from drone_rl.trust.domain import Prober
 from drone_rl.trust.shifts_results import Need, Robustness
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
@@ -78,20 +76,6 @@ def test_given_file_must_be_of_the_policy(good, tmp_path):
     assert find_domain(foreign, outputs=tmp_path) is None
     with pytest.raises(InputError, match="is not a drone_rl policy file"):
         find_domain(foreign, path)
-
-
-@pytest.mark.parametrize(
-    ("needs", "lacks"),
-    [("blur: {high: 1.0, unit: pixels}", []), ("blur: {high: 1.1, unit: pixels}", ["blur"])],
-)
-def test_required_range_is_compared_with_the_domain(good, tmp_path, needs, lacks):
-    (tmp_path / "needs.yaml").write_text(needs)
-    measured = find_domain(good, leave(tmp_path / "a", shifts_of(good)))
-    found = compare_with_required(good, tmp_path / "needs.yaml", measured)
-    assert [*found.lacking] == lacks and found.is_stated == (not lacks)
-    assert not found.is_covered  # nothing was flown to check it
-    said = "blur: needed" if lacks else "the file states it, and no episodes re-checked it"
-    assert str(found).startswith(f"not covered: {said}")
 
 
 def test_verdict_with_a_required_domain(good, tmp_path):
@@ -162,26 +146,6 @@ def test_invented_range_is_contradicted(near):
         line.startswith("dead rows at 12 rows: ") and "certainly not good there" in line
         for line in found.contradictions
     )
-
-
-def test_poor_policy_is_contradicted_without_perturbation():
-    poor = drone_rl.load_policy("poor").in_task(num_cubes=1)
-    found = recheck_domain(poor, {"blur": need(high=0.5)}, shifts_of(poor), FEW, SEED)
-    assert found.contradictions[0].startswith("without perturbation: 0% of new episodes")
-
-
-def test_all_strengths_share_the_error_probability(near, monkeypatch):
-    parts = []
-
-    class Noted(Prober):
-        def probe(self, condition, part):
-            parts.append(part)
-            return super().probe(condition, part)
-
-    monkeypatch.setattr("drone_rl.trust.coverage.Prober", Noted)
-    few = FEW.replace(domain_flights=2)
-    recheck_domain(near, {"blur": need(high=0.5)}, shifts_of(near), few, SEED)
-    assert parts == [0.25] * 4  # without perturbation, at the end, and at two random strengths
 
 
 @pytest.mark.parametrize("name", list(AXES))
@@ -288,26 +252,16 @@ def test_untested_axes_cover_nothing():
     [
         ("", "is empty; the file was damaged"),
         ("{}", "is empty; give axes"),
-        ("[1, 2]", "must be a mapping"),
-        ("fog: [", "line 1 of .* is no YAML .*; correct it"),
-        ("fog:\n\tlow: 1", "line 2 of .* is no YAML .*; indent with spaces, not tabs"),
-        (
-            "fog: {low: 1}\nfog: {low: 2}",
-            r"line 2 of .* is no YAML \(fog occurs twice\); correct it",
-        ),
-        ("a: !!python/object/apply:os.getcwd []", "is no YAML"),
-        ("wind: {low: 1, unit: m/s}", "axis='wind' is unknown; give object_color"),
+        ("wind: {low: 1, unit: m/s}", "axis='wind': it must be 'object_color'"),
         ("fog: 60", "fog=60: .*; give low, high or both, and unit: m of sight"),
         ("fog: {low: 60, unit: km}", "fog.unit=km must be m of sight"),
-        ("fog: {low: 60}", "fog.unit is missing"),
-        ("fog: {least: 60, unit: m of sight}", "fog.* must be one or two rising numbers"),
         ("fog: {unit: m of sight}", r"fog: \[\] must be one or two rising numbers"),
         (
             "fog: {low: 60, high: 40, unit: m of sight}",
             r"\[60.0, 40.0\] must be one or two",
         ),
+        ("fog: {low: 6, least: 60, unit: m of sight}", "fog.least is unknown"),
         ("fog: {low: sixty, unit: m of sight}", "fog.low='sixty'"),
-        ("fog: {high: .inf, unit: m of sight}", "fog.high=inf"),
         (
             "camera_yaw: {low: -5, high: 5, unit: degrees}",
             r"camera_yaw: \[-5.0, 5.0\] must be one or two rising numbers of 0 or more",

@@ -94,14 +94,6 @@ def test_range_that_reaches_the_last_strength_is_open(make_prober, monkeypatch):
     assert (found.low_open, found.high_open, found.failed) == (None, True, ())
 
 
-def test_hole_ends_the_range(make_prober, monkeypatch):
-    """Good at 3 again, but not at 2: nearer strengths are not taken for granted."""
-    prober = make_prober(subject(), 1)
-    asked = good_at(prober, lambda s: s in (1.0, 3.0, 4.0), monkeypatch)
-    found = prober.search(axis((1.0, 2.0, 3.0, 4.0, 5.0), whole=True))
-    assert (found.high, [s for s, _ in asked]) == (10.0, [1.0, 2.0])
-
-
 def test_policy_fitted_to_the_table_has_no_range(make_prober, monkeypatch):
     """Good at every strength that is written down, and nowhere else."""
     prober = make_prober(subject(), 1)
@@ -205,12 +197,6 @@ def test_one_sided_policy_is_bad(make_prober):
     prober = make_prober(subject(Blind(1)), 200)
     assert prober.plain.bad and not prober.plain.good
     assert prober.plain.worst.share < 0.2
-
-
-def test_sizes_that_the_task_refuses_are_bad(make_prober):
-    probed = make_prober(subject(), 1).probe(Condition(task={"cube_size": 9.0}), 1.0)
-    assert (probed.good, probed.bad) == (False, True)
-    assert "sinks cubes" in probed.refused
 
 
 def quantity(value, lower, upper, *thresholds):

@@ -6,8 +6,6 @@ import pytest
 
 import drone_rl
 from drone_rl.config import AppearanceSettings
-from drone_rl.sim.actions import MOVES_3D
-from drone_rl.sim.tasks import CollectCubes, OracleRule
 from drone_rl.sim.vocabulary import CUBES
 from drone_rl.trust.evaluate import Evaluation
 from drone_rl.trust.results import Figures
@@ -44,11 +42,6 @@ def test_evaluation_in_python(good):
     assert said[0] == ("most probable actions", 0, 3)
     assert said[-1] == ("evaluated", 3, 3)
     assert "<td>success rate</td>" in done._repr_html_()
-
-
-def test_evaluation_without_baselines(good):
-    done = drone_rl.evaluate(good, episodes=2, baselines=False, progress=silent)
-    assert set(done.figures) == {"greedy", "sampled"}
 
 
 def test_table_of_an_evaluation(good):
@@ -119,11 +112,3 @@ def test_other_dynamics_are_named(good, monkeypatch):
     assert done.unlike["wind"].flown == [-5.0, 0.0, 0.0]
     steps = done.figures["forward"].mean_length  # against half a metre of wind a step
     assert steps > drone_rl.evaluate(good, **few).figures["forward"].mean_length
-
-
-def test_oracle_of_other_actions_is_refused(good, monkeypatch):
-    rule = OracleRule(("drone",), lambda drone: drone[..., 0].long(), MOVES_3D)
-    monkeypatch.setattr(CollectCubes, "oracle", property(lambda _: rule, lambda _, value: None))
-    monkeypatch.setattr("drone_rl.trust.evaluate.rollout", None)
-    with pytest.raises(InputError, match="acts by forward, left, right, up, down, these drones"):
-        drone_rl.evaluate(good, episodes=2, progress=silent)

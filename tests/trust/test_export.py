@@ -1,6 +1,5 @@
 """Where an exported policy says that it comes from."""
 
-import dataclasses
 import json
 
 import pytest
@@ -18,7 +17,6 @@ from drone_rl.verification.claim import find_claim
 from tests.evidence import SAVED_SHIFTS, VERDICT, changed
 from tests.sweeps.conftest import _verdict
 from tests.trust.making import shifts_of
-from tests.verification.checker.making import of_every_place
 
 METRICS = "frames,seconds,train/running_reward\n100,1.0,1.5\n"
 FIGURES = {"frames": 100, "episodes": 9, "seconds": 1.0, "running_reward": 1.5, "largest_reward": 3}
@@ -30,7 +28,8 @@ def checkpoint(tmp_path):
     runs = [
         Run(i, (f"seed={i}", "sweep=seeds", "trial=4"), tmp_path / f"run_{i}") for i in range(3)
     ]
-    Sweep(tmp_path, "drone-rl train sweep=seeds", {}, runs).save()
+    sweep = Sweep(folder=tmp_path, command="drone-rl train sweep=seeds", settings={}, runs=runs)
+    sweep.save()
     folder = runs[1].folder
     (folder / ".hydra").mkdir(parents=True)
     (folder / ".hydra" / "overrides.yaml").write_text("[seed=1]")
@@ -48,12 +47,6 @@ def test_origin_of_a_run_of_a_sweep(checkpoint):
     command, chosen = choice_in_sweep(checkpoint)
     assert command == "drone-rl train seed=1 sweep=seeds hydra.mode=RUN"
     assert chosen == {"runs": 3, "episodes": 200}
-
-
-def test_origin_of_a_run_without_a_current_verdict(checkpoint):
-    assert choice_in_sweep(checkpoint)[1] == {"runs": 3, "episodes": None}
-    judged(checkpoint, rule="of yore")
-    assert choice_in_sweep(checkpoint)[1] == {"runs": 3, "episodes": None}
 
 
 def test_origin_of_a_single_run(checkpoint):
@@ -88,34 +81,12 @@ def test_card_quotes_and_copies_a_certificate(tmp_path):
     assert find_claim(again, flights=20).flights == 20
 
 
-def test_card_refuses_a_certificate_that_rollouts_contradict(tmp_path):
-    policy, made = drone_rl.load_policy("poor").in_task(**ONE), tmp_path / "made.json"
-    made.write_text(json.dumps(of_every_place(policy)))
-    target = tmp_path / "mine.safetensors"
-    with pytest.raises(InputError, match="ended otherwise than stated"):
-        export(policy, target, FEW, certificate=made, find_claim=find_claim)
-    assert not target.exists()
-
-
-def test_card_refuses_a_certificate_of_another_policy(tmp_path):
-    poor, good = (drone_rl.load_policy(name).in_task(**ONE) for name in ("poor", "good"))
-    policy, target = poor, tmp_path / "mine.safetensors"
-    beside = tmp_path / "mine.certificate.json"
-    beside.write_text(json.dumps(of_every_place(good)))
-    with pytest.raises(InputError, match="network with hash"):
-        export(policy, target, FEW, certificate=beside, find_claim=find_claim)
-    export(policy, target, FEW)
-    export(drone_rl.load_policy(target), tmp_path / "again.safetensors", FEW)
-    assert "ertificate" not in (tmp_path / "again.md").read_text()
-    assert not (tmp_path / "again.certificate.json").exists()
-
-
 @pytest.mark.parametrize(("name", "is_good"), [("good", True), ("right_and_forward", False)])
 def test_card_quotes_and_copies_a_robustness_evaluation(tmp_path, name, is_good):
     """Those of one whom the card's verdict surely finds to be something else are not believed."""
     policy, made = drone_rl.load_policy(name).in_task(**ONE), tmp_path / "made.json"
     shifts_of(policy).write_json(made)
-    settings = dataclasses.replace(FEW, episodes=4 if is_good else 300, num_envs=300)
+    settings = FEW.replace(episodes=4 if is_good else 300, num_envs=300)
     export(policy, tmp_path / "mine.safetensors", settings, shifts=made)
     card = (tmp_path / "mine.md").read_text()
     assert ("with blur of up to 1 pixels and up to 4 dead rows" in card) == is_good
@@ -127,12 +98,6 @@ def test_card_quotes_and_copies_a_robustness_evaluation(tmp_path, name, is_good)
         again = drone_rl.load_policy(tmp_path / "mine.safetensors")
         assert find_domain(again).path == str(beside)
         assert "Read from mine.shifts.json, dated" in card  # and no path of this machine
-
-
-def test_origin_of_a_run_from_python_is_unknown(checkpoint):
-    (checkpoint.parents[2] / "sweep.json").unlink()
-    (checkpoint.parents[1] / ".hydra" / "overrides.yaml").unlink()
-    assert recorded_origin(checkpoint, {}) == (None, None)
 
 
 def test_origin_in_a_checkpoint_is_ignored(checkpoint):

@@ -3,7 +3,6 @@
 import json
 import re
 
-import numpy as np
 import pytest
 
 import drone_rl
@@ -75,31 +74,12 @@ def test_verdict_with_a_certificate(good, tmp_path):
         drone_rl.judge("oracle", **how)
 
 
-def test_contradicted_certificate_proves_nothing(tmp_path):
-    poor = drone_rl.load_policy("poor").in_task(num_cubes=1)
-    path = tmp_path / "certificate.json"
-    path.write_text(json.dumps(of_every_place(poor)))
-    few = {"episodes": 8, "sampled": False, "progress": silent}
-    done = drone_rl.judge(poor, certificate=path, certificate_flights=0, **few)
-    assert not done.verdict.is_proved
-    assert "8 of 8 greedy flights of this verdict ended otherwise than it states." in str(done)
-    assert "A certificate states" not in str(done)
-    with pytest.raises(InputError, match=r"does not hold: .* ended otherwise than stated"):
-        drone_rl.judge(poor, certificate=path, certificate_flights=100, **few)
-
-
-def test_verdict_on_a_baseline_in_another_task():
-    done = drone_rl.judge("left", task={"num_cubes": 1}, episodes=200, progress=silent)
-    assert done.verdict.kind == "poor"
-    assert done.num_cubes == 1
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"episodes": 0}, "episodes=0 is out of range"),
+        ({"episodes": 0}, "episodes=0"),
         ({"episodes": "many"}, "episodes='many'"),
-        ({"good_share": 1.0}, "good_share=1.0 is out of range; give a number above 0 and below 1"),
+        ({"good_share": 1.0}, "good_share=1.0: it must be a number above 0 and below 1"),
         ({"task": {"num_cubes": 0}}, "task.num_cubes=0"),
         ({"wind": 1}, r"^wind is a setting of dynamics; give dynamics=\{'wind': 1\}$"),
     ],
@@ -126,14 +106,6 @@ def test_changes_are_refused_before_any_episode(good):
         drone_rl.judge([good, "pillars_good"], task={"num_cubes": 2}, progress=refused)
     with pytest.raises(InputError, match=r"^policy=oracle sees no images"):
         drone_rl.judge([good, "oracle"], appearance="fog", progress=refused)
-
-
-def test_task_settings_of_a_baseline():
-    task = drone_rl.TaskSettings(num_cubes=1)
-    done = drone_rl.judge("oracle", task=task, episodes=2, progress=silent)
-    assert done.num_cubes == 1
-    with pytest.raises(InputError, match=r"^policy=\(ndarray\) is no policy"):
-        drone_rl.judge(np.zeros(3), progress=refused)
 
 
 def test_table_of_judgements():

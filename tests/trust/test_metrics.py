@@ -3,11 +3,9 @@ import torch
 
 from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.sim.tasks import CollectCubes, Goals
-from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.trust.metrics import summarise
 from drone_rl.trust.results import GoalShare
 from drone_rl.utils.intervals import mean_bounds, proportion
-from tests.second_task import End, Posts
 
 
 @pytest.fixture
@@ -25,19 +23,6 @@ def episodes():
     )
 
 
-def test_episodes_from_the_last_step():
-    info = {
-        "passed": torch.tensor([[True, True], [True, False]]),
-        "sides": torch.tensor([[0, 1], [1, -1]]),
-        "end_reason": torch.tensor([[End.THROUGH], [End.TOUCHED]]),
-    }
-    flown = CompleteEpisodes.ended(Posts(), info, torch.tensor([8, 9]))
-    assert flown.success.tolist() == [1.0, 0.0]
-    assert flown.goals.stratum.tolist() == [[0, 1], [1, -1]]
-    assert flown.end_reason.tolist() == [End.THROUGH, End.TOUCHED]
-    assert flown.length.tolist() == [8, 9]
-
-
 def test_summary_by_hand(episodes):
     summary = summarise(episodes)
     assert summary.success == proportion(1, 3)
@@ -53,12 +38,6 @@ def test_summary_by_hand(episodes):
     none = {"side_boundary": 0, "lost_control": 0}
     assert ends == {"all_cubes": 1, "front_boundary": 1, "step_limit": 1, **none}
     assert (summary.mean_length, summary.max_length) == (30.0, 60)
-
-
-def test_rate_of_one_stratum(episodes):
-    episodes.goals.stratum[1, 1] = 2  # which was not reached, while its first one was
-    assert episodes.stratum_share(0).tolist() == [1.0, 1.0]
-    assert episodes.stratum_share(2).tolist() == [0.0, 0.0]
 
 
 def test_stratum_without_goals_has_no_rate(episodes):
@@ -86,28 +65,3 @@ def test_intervals_count_episodes_not_goals():
     one, three = (summarise(e).shares["left"] for e in alike)
     assert (one.lower95, one.upper95) == (three.lower95, three.upper95)
     assert one.lower95 < proportion(90, 100).lower95
-
-
-def test_selecting_episodes(episodes):
-    assert len(episodes.first(2)) == 2
-    assert episodes.stratum_share(Side.LEFT).tolist() == [1.0, 0.5]
-    assert episodes.success.tolist() == [1.0, 0.0, 0.0]
-    assert episodes.first(1).success.tolist() == [1.0]
-
-
-def test_summary_of_another_task():
-    goals = Goals(
-        reached=torch.tensor([[True, True], [False, False]]),
-        stratum=torch.tensor([[0, 1], [1, -1]]),
-        world=torch.zeros(2, 1),
-    )
-    flown = CompleteEpisodes(
-        Posts(), goals, torch.tensor([End.THROUGH, End.TOUCHED]), torch.ones(2).long()
-    )
-    summary = summarise(flown)
-    assert {n: e.successes for n, e in summary.ends.items()} == {
-        "through": 1, "touched": 1, "time": 0,
-    }  # fmt: skip
-    assert {n: s.mean for n, s in summary.shares.items()} == {
-        "all": 0.5, "left": 1.0, "right": 0.5,
-    }  # fmt: skip

@@ -2,8 +2,7 @@ import pytest
 import torch
 
 from drone_rl.collectors.complete_episodes import CompleteEpisodes
-from drone_rl.config import TaskSettings
-from drone_rl.sim.tasks import CollectCubes, Goals
+from drone_rl.sim.tasks import Goals
 from drone_rl.sim.tasks.collect_cubes import CubesEnd, Side
 from drone_rl.trust.metrics import failure_table
 from drone_rl.utils.intervals import proportion
@@ -51,31 +50,10 @@ def test_failure_intervals_are_simultaneous(episodes):
     assert second.share == 0.5
 
 
-def test_failures_by_height(make_episodes):
-    task = TaskSettings(num_cubes=1, vertical_bound=1.2, altitude=5.0)
-    episodes = make_episodes([[AHEAD]] * 4, [[0], [1], [1], [1]], task=CollectCubes(task))
-    episodes.goals.height = torch.tensor([[1.0], [0.41], [0.39], [-0.5]]).double()
-    table = failure_table(episodes)
-    assert row(table, "height", "higher") == (2, 1)
-    assert row(table, "height", "level") == (1, 0)
-    assert row(table, "height", "lower") == (1, 0)
-    level = failure_table(make_episodes([[AHEAD]], [[0]]))
-    assert not [r for r in level.rows if r.by == "height"]
-
-
 def test_failure_table_without_failures(make_episodes):
     table = failure_table(make_episodes([[LEFT, RIGHT]] * 400, [[1, 1]] * 400))
     assert table.largest is None
     assert table.bound.upper95 == pytest.approx(1 - 0.025 ** (1 / 400))
-
-
-def test_largest_failure_has_the_largest_product(make_episodes):
-    """All failures are at first cubes, and all of these ahead: every second one."""
-    sides = [[AHEAD if i < 50 else LEFT, RIGHT] for i in range(100)]
-    hits = [[i >= 25, i >= 25] for i in range(100)]
-    largest = failure_table(make_episodes(sides, hits)).largest
-    assert (largest.by, largest.value) == ("side", "ahead")
-    assert (largest.failed, largest.episodes) == (25, 50)
 
 
 def test_expected_end_is_not_the_largest_failure(make_episodes):

@@ -1,21 +1,16 @@
-import dataclasses
 import json
 import math
 
 import pytest
-import torch
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck
 
 import drone_rl
-from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.policies.baselines import constant_policy, oracle_policy
 from drone_rl.policies.policy import Policy
 from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.collect_cubes import Side
-from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.trust.results import Rounding
 from drone_rl.trust.rule import Rule, VerdictKind
 from drone_rl.trust.verdict import apply_rule, judge_for_selection, judge_policy, measure, observe
@@ -26,7 +21,6 @@ from drone_rl.utils.seeding import Stream
 from tests.fake_flight import floating
 from tests.second_task import Posts
 from tests.training.test_train import TINY
-from tests.trust.test_rule import mirrored as mirrored_kind
 
 LEFT, AHEAD, RIGHT = Side
 SHARED = HealthCheck.function_scoped_fixture
@@ -145,8 +139,8 @@ def test_task_that_a_baseline_solves_is_trivial(
     episodes = make_episodes(sides, [[1, 1]] * 400)
     verdict = apply_rule(episodes, make_baselines(episodes))
     assert (verdict.kind, verdict.certain, verdict.exit_code) == (kind, certain, status)
-    trivial = "Flying straight on is good by this rule, too: it collects every cube in 100% of"
-    assert verdict.sentence.startswith(trivial) == (solved == 400)
+    trivial = 'task is trivial: the baseline "always forward" collects every cube in 100% of'
+    assert (trivial in verdict.sentence) == (solved == 400)
 
 
 def test_baselines_have_the_dynamics_of_the_environment(monkeypatch):
@@ -195,30 +189,6 @@ def test_verdict_repeats():
     assert math.isclose(first.skill["forward"].mean, 1 - first.baselines["forward"].mean_goals)
 
 
-def mirrored(episodes):
-    """The same episodes in a world where left is right."""
-    swap = torch.tensor([Side.RIGHT, Side.AHEAD, Side.LEFT])
-    goals = episodes.goals
-    side = torch.where(goals.stratum < 0, -1, swap[goals.stratum])
-    turned = {"stratum": side, "lateral": -goals.lateral, "world": -goals.world}
-    return dataclasses.replace(episodes, goals=dataclasses.replace(goals, **turned))
-
-
-@given(st.lists(st.tuples(st.sampled_from(LAYOUTS), st.booleans(), st.booleans()), min_size=1))
-@settings(
-    max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
-def test_mirrored_episodes_get_the_mirrored_kind(make_episodes, make_baselines, drawn):
-    sides, hits = [row[0] for row in drawn] * 30, [row[1:] for row in drawn] * 30
-    ours = make_episodes(sides, hits)
-    baselines = make_baselines(ours)
-    theirs = {name: mirrored(flown) for name, flown in baselines.items()}
-    theirs["left"], theirs["right"] = theirs["right"], theirs["left"]
-    verdict, reflected = apply_rule(ours, baselines), apply_rule(mirrored(ours), theirs)
-    assert reflected.kind is mirrored_kind(verdict.kind)
-    assert reflected.certain == verdict.certain
-
-
 def test_verdict_on_another_task():
     env = DroneEnv(20, Posts(), pixels=False)
     straight = judge_policy(env, constant_policy(Move.FORWARD), 200, sampled=False)
@@ -232,24 +202,6 @@ def test_verdict_on_another_task():
     leaving = judge_policy(env, constant_policy(Move.LEFT), 200, sampled=False)
     assert (leaving.kind, leaving.certain) == (VerdictKind.POOR, True)
     assert leaving.failures.largest.value in ("left", "right")
-
-
-def test_greedy_and_sampled_episodes_share_initial_states(monkeypatch):
-    flown = []
-
-    def run(actor, env, episodes, **how):
-        flown.append((how.get("greedy", True), episodes, env.state_dict()))
-        return rollout(actor, env, episodes, **how)
-
-    monkeypatch.setattr("drone_rl.trust.verdict.rollout", run)
-    task = TaskSettings(num_cubes=1)
-    env = DroneEnv(2, task, pixels=False)
-    before = env.state_dict()
-    judge_policy(env, oracle_policy(task), 3)
-    assert flown == [(True, 3, before), (False, 3, before)]
-    flown.clear()
-    judge_policy(env, oracle_policy(task), 3, sampled=False)
-    assert [greedy for greedy, *_ in flown] == [True]
 
 
 def test_task_without_an_oracle_is_refused(monkeypatch):
@@ -299,11 +251,6 @@ def test_many_fragile_frames_or_episodes_or_other_actions_make_it_uncertain(judg
 def test_more_episodes_do_not_help_where_rounding_decides(judged):
     verdict = judged(lambda i, side: True, number=8, rounding=rounding(320, number=8))
     assert not verdict.certain and verdict.enough is None
-
-
-def test_unusable_vocabulary_is_refused():
-    with pytest.raises(InputError, match=r"^tested="):
-        TaskVocabulary(tested="two posts\nin a row")
 
 
 @pytest.fixture

@@ -37,9 +37,7 @@ def test_percentages_are_never_rounded_to_none_or_all():
     assert [percent(share) for share in shares] == [
         "0%", "<0.1%", "1.2%", "97.5%", ">99.9%", "100%"
     ]  # fmt: skip
-    assert [percent(share, 0) for share in shares] == [
-        "0%", "<1%", "1%", "97%", ">99%", "100%"
-    ]  # fmt: skip
+    assert percent(-0.2) == "-20.0%" and percent(0.0031, 2) == "0.31%"
 
 
 @pytest.mark.parametrize(

@@ -76,11 +76,3 @@ def test_the_policy_must_be_known(path, truth):
     with pytest.raises(InputError, match="policy 'mine', which is none of"):
         drone_rl.check(path)
     assert drone_rl.check(path, "poor", flights=5, progress=silent).accepted
-
-
-def test_another_task_or_policy_is_refused(path):
-    assert drone_rl.check(path, task={"num_cubes": 1}, flights=5, progress=silent).accepted
-    with pytest.raises(InputError, match="another task: num_cubes=1, not 2"):
-        drone_rl.check(path, task={"num_cubes": 2}, progress=silent)
-    with pytest.raises(InputError, match="the certificate is for a network with hash"):
-        drone_rl.check(path, "good", progress=silent)

@@ -8,9 +8,9 @@ import pytest
 import torch
 
 import drone_rl
+from benchmarks.gamed_certificates import certificate_of
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ProvableSettings
-from drone_rl.config.configuration import as_config
 from drone_rl.config.learning import Episodes
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.envs import DroneEnv
@@ -21,6 +21,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import world_random_state
 from drone_rl.verification import provable
+from drone_rl.verification.checker.certificate import Certificate
 from drone_rl.verification.provable import Journal, Round, find_failures
 from drone_rl.verification.prove import Proof
 from tests.fake_flight import FLIGHT
@@ -39,8 +40,15 @@ LOSING = [[[[2.0, 3.0]], [[5.0, 6.0]]], [[[1.0, 1.5]]], []]
 """Boxes that the first, the second and the third proof find."""
 
 
-def outcome(end, share, boxes):
-    return {"end": end, "share": share, "boxes": boxes}
+def proof_of(policy, losing, undecided=(), finished=True):
+    """Return a proof that loses from these boxes of one cube, and leaves others undecided."""
+    lost, left = (sum(high - low for ((low, high),) in boxes) / 12 for boxes in (losing, undecided))
+    about = {"loops": False, "steps": {}}
+    won = {"end": "all_cubes", "collected": [True], "share": 1 - lost - left, "boxes": []}
+    failed = {"end": "front_boundary", "collected": [False], "share": lost, "boxes": losing}
+    outcomes = [about | part for part in (won, failed) if part["share"]]
+    data = certificate_of(policy, outcomes, undecided, left, finished)
+    return Proof(Certificate.read(data))
 
 
 class Prover:
@@ -50,21 +58,11 @@ class Prover:
         self.weights = []
 
     def __call__(self, policy, *, folder, limit_s, renderer, progress):
-        boxes = LOSING[int(folder.name)]
-        lost = sum(upper - lower for ((lower, upper),) in boxes) / 12
-        outcomes = [outcome("all_cubes", 1 - lost, [[[-6.0, 6.0]]])]
-        outcomes += [outcome("front_boundary", lost, boxes)] if boxes else []
-        certificate = {
-            "policy": {"description": policy.description.as_dict()},
-            "outcomes": outcomes,
-            "undecided": {"share": 0.0, "boxes": []},
-            "finished": True,
-            "found": {"seconds": 0.5},
-        }
+        proof = proof_of(policy, LOSING[int(folder.name)])
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "certificate.json").write_text(json.dumps(certificate))
+        proof.certificate.write_json(folder / "certificate.json")
         self.weights.append(policy.state["policy"])
-        return Proof(certificate, folder)
+        return proof
 
 
 @pytest.fixture(autouse=True)
@@ -179,13 +177,6 @@ def test_episodes_are_searched_first(tmp_path, monkeypatch, prover):
     assert len(prover.weights) == 1
 
 
-def test_limit_of_episodes(tmp_path):
-    limits = TINY.trainer.replace(total_episodes=1, target_share=None)
-    settings = TINY.replace(trainer=limits)
-    done = drone_rl.train_until_proved(settings, HOW, folder=tmp_path, progress=silent)
-    assert done.reason == "episodes" and len(done.result["rounds"]) == 1
-
-
 def test_later_searches_are_forgotten(whole, tmp_path, prover):
     """As if last.pt had been replaced by a checkpoint from before the last search."""
     folder = tmp_path / "run"
@@ -201,7 +192,7 @@ def test_later_searches_are_forgotten(whole, tmp_path, prover):
 SETTINGS = TrainSettings(trainer=TrainerSettings(total_frames=1000))
 
 
-STATE = {"config": as_config(SETTINGS)}
+STATE = {"config": SETTINGS.config()}
 
 
 LIMITS = ProvableSettings(rounds=2)
@@ -276,20 +267,17 @@ def test_training_before_the_first_search_is_ordinary(tmp_path, prover, usual):
 
 
 def test_undecided_boxes_are_replayed_only_of_finished_proofs():
-    undecided = {"share": 0.5, "boxes": [[[0.0, 6.0]]]}
-    lost = outcome("front_boundary", 0.1, [[[-2.0, -1.0]]])
-    about = {"policy": {"description": {"task": {"num_cubes": 1}}}}
-    proof = Proof({**about, "outcomes": [lost], "undecided": undecided, "finished": False})
-    assert provable._doubtful(proof).tolist() == [[[-2.0, -1.0]]]
-    whole = Proof({**proof.certificate, "finished": True})
-    assert provable._doubtful(whole).tolist() == [[[-2.0, -1.0]], [[0.0, 6.0]]]
+    policy = drone_rl.load_policy("good").in_task(num_cubes=1)
+    lost, left = [[[-2.0, -1.0]]], [[[0.0, 6.0]]]
+    assert provable._doubtful(proof_of(policy, lost, left, finished=False)).tolist() == lost
+    assert provable._doubtful(proof_of(policy, lost, left)).tolist() == lost + left
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"rounds": [{"frames": -1}]}, "rounds.trained_s is missing"),
-        ({"more": 3}, "more.* is unknown"),
+        ({"rounds": [{"frames": -1}]}, r"rounds\[0\]\.trained_s is missing"),
+        ({"more": 3}, "more is unknown"),
     ],
 )
 def test_a_malformed_journal_is_refused(tmp_path, change, message):

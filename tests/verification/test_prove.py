@@ -3,10 +3,12 @@
 import pytest
 
 import drone_rl
+from benchmarks.gamed_certificates import certificate_of
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
+from drone_rl.utils.text import render
+from drone_rl.verification.checker.certificate import Certificate
 from drone_rl.verification.prove import Proof
-from drone_rl.verification.text import describe_proof, describe_round
 
 ONE = {"num_cubes": 1}
 
@@ -29,32 +31,26 @@ def test_a_proved_policy(tmp_path):
 
 def test_text(proof):
     text = str(proof)
-    assert "front boundary" in text and "0.6375" in text and "Proved: with" in text
+    assert "front boundary" in text and "63.75%" in text and "Proved: with" in text
     assert "<table" in proof._repr_html_()
 
 
 def test_load_proof(proof):
-    assert drone_rl.load_proof(proof.folder).certificate == proof.certificate
+    again = drone_rl.load_proof(proof.folder).certificate
+    assert again.model_dump_json() == proof.certificate.model_dump_json()
     assert not (proof.folder / "state.pt").exists()
-
-
-def test_fractions_are_at_most_one():
-    shares = (0.07, 0.8725, 0.0575)
-    assert sum(shares) > 1
-    for end, found in (("all_cubes", "success"), ("front_boundary", "lost")):
-        outcomes = [{"end": end, "share": share} for share in shares]
-        assert getattr(Proof({"outcomes": outcomes}), found) == 1.0
 
 
 def test_a_stopped_proof_resumes(proof, tmp_path):
     stopped = prove(folder=tmp_path, limit_s=0.0)
-    assert not stopped.certificate["finished"]
+    assert not stopped.certificate.finished
     assert stopped.undecided == pytest.approx(1.0)
     assert "stopped by limit_s" in str(stopped)
     assert (tmp_path / "state.pt").exists()
     done = prove(folder=tmp_path)
-    same = ("outcomes", "undecided", "finished")
-    assert [done.certificate[k] for k in same] == [proof.certificate[k] for k in same]
+    same = {"outcomes", "undecided", "finished"}
+    one, two = (p.certificate.model_dump(include=same) for p in (done, proof))
+    assert one == two
 
 
 def test_a_state_of_another_policy_is_refused(tmp_path):
@@ -64,16 +60,21 @@ def test_a_state_of_another_policy_is_refused(tmp_path):
 
 
 def certificate(won=1.0, undecided=0.0, finished=True, cubes=3):
-    outcomes = [{"end": "all_cubes", "share": won}] if won else []
-    if won + undecided < 1:
-        outcomes.append({"end": "front_boundary", "share": 1 - won - undecided})
-    return {
-        "policy": {"description": {"task": {"num_cubes": cubes}}},
-        "outcomes": outcomes,
-        "undecided": {"share": undecided, "boxes": [[[0, 1]]] if undecided else []},
-        "finished": finished,
-        "found": {"stopped_by": "limit_s"},
-    }
+    policy = drone_rl.load_policy("good").in_task(num_cubes=cubes)
+    parts = {"all_cubes": won, "front_boundary": max(0.0, 1 - won - undecided)}
+    about = {"collected": [True] * cubes, "loops": False, "steps": {}, "boxes": []}
+    outcomes = [{**about, "end": end, "share": share} for end, share in parts.items() if share]
+    left = [[[0.0, 1.0]] * cubes] if undecided else []
+    data = certificate_of(policy, outcomes, left, undecided, finished)
+    data["found"]["stopped_by"] = "limit_s"
+    return Certificate.read(data)
+
+
+def test_fractions_are_at_most_one():
+    assert certificate(won=1.0, undecided=1e-17).success < 1.0
+    whole = certificate()
+    shares = [whole.outcomes[0].replace(share=share) for share in (0.07, 0.8725, 0.0575)]
+    assert sum(of.share for of in shares) > 1 == whole.replace(outcomes=tuple(shares)).success
 
 
 @pytest.mark.parametrize(
@@ -81,7 +82,7 @@ def certificate(won=1.0, undecided=0.0, finished=True, cubes=3):
 )
 def test_load_proof_refuses_other_files(tmp_path, content):
     (tmp_path / "certificate.json").write_text(content)
-    with pytest.raises(InputError, match="can't be used"):
+    with pytest.raises(InputError, match=r"certificate\.json"):
         drone_rl.load_proof(tmp_path)
 
 
@@ -109,21 +110,32 @@ def test_tasks_that_take_days_are_refused():
     ("proved", "text"),
     [
         ({}, "it collects all 3 cubes from every placement."),
-        ({"won": 0.75}, "from 75% of all placements; from 25% it does not."),
-        ({"won": 1 - 1e-12, "undecided": 1e-12}, "from more than 99.9999999% of all placements"),
-        ({"won": 0.0}, "; from 100% it does not."),
-        ({"won": 1e-12}, "from more than 99.9999999% it does not."),
-        ({"won": 0.5, "undecided": 0.5}, "50% are undecided"),
-        ({"won": 0.0, "undecided": 1.0, "finished": False}, "100% are undecided so far"),
+        (
+            {"won": 0.75, "cubes": 1},
+            "the cube from 75.00% of all placements; from 25.00% it does not.",
+        ),
+        ({"won": 1 - 1e-12, "undecided": 1e-12}, "from >99.99% of all placements"),
+        ({"won": 0.0}, "from 0% of all placements; from 100% it does not."),
+        ({"won": 0.5, "undecided": 0.5}, "and 50.00% are undecided."),
+        (
+            {"won": 0.0, "undecided": 1.0, "finished": False},
+            "and 100% are undecided so far (stopped by limit_s).",
+        ),
     ],
 )
-def test_describe_proof(proved, text):
-    assert text in describe_proof(certificate(**proved))
-    assert ("every placement" in text) == (not proved)
+def test_statement(proved, text):
+    (statement,) = Proof(certificate(**proved)).notes()
+    assert text in statement and statement.startswith("Proved: with its most probable actions it")
+    assert ("every placement" in statement) == (not proved)
 
 
-def test_describe_round():
+def test_line_of_a_round():
     search = {"frames": 20_000, "failures": 3, "flights": 4000, "losing": None}
-    assert describe_round(search) == "at frame 20,000: 3 of 4,000 episodes failed"
-    proof = {"losing": 0.25, "undecided": 1e-7, "proof_s": 61.6}
-    assert "fails from 25% of all placements, 1e-05% undecided" in describe_round(search | proof)
+
+    def line(**proof):
+        return render("drone_rl.verification", "round.j2", **search | proof)
+
+    assert line() == "at frame 20,000: 3 of 4,000 episodes failed"
+    assert line(losing=0.25, undecided=1e-7, proof_s=61.6).endswith(
+        "failed; proof in 62 s: fails from 25.00% of all placements, <0.01% undecided"
+    )

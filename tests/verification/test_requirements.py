@@ -27,7 +27,6 @@ from drone_rl.verification.requirements import require_cubes
     ("change", "message"),
     [
         ({"task": PillarsSettings()}, "only task=collect_cubes, got task=pillars"),
-        ({"appearance": AppearanceSettings(ground_texture=("grid", "bricks"))}, "without ranges"),
         (
             {"dynamics": DynamicsSettings(mode="simple_flight")},
             "only dynamics=computer_vision, got",

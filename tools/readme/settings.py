@@ -1,11 +1,6 @@
 """Tables of all settings in Markdown: allowed values, unit, default and meaning."""
 
-import ast
-import dataclasses
-import functools
-import inspect
-import textwrap
-from collections.abc import Iterator, Mapping
+import typing
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +9,22 @@ import yaml
 from drone_rl.cli.hydra.composition import GROUPS, PARTS, SEVERAL
 from drone_rl.cli.main import COMMANDS, find_command
 from drone_rl.config import TASKS, BaseTaskSettings
-from drone_rl.config.configuration import Changes, Variant
-from drone_rl.utils.schema import Flag, Instance, Kind, Maybe, OneOf, Several, Span
-from drone_rl.utils.settings import Settings, kinds_of, plain
+from drone_rl.config.configuration import Changes
+from drone_rl.config.parts import Part
+from drone_rl.utils.schema import Maybe, OneOf, Several, Span
+from drone_rl.utils.settings import (
+    Settings,
+    about,
+    hints_of,
+    inner_types,
+    meanings,
+    plain,
+    unit_of,
+)
 
 BAR = "&#124;"
 """A bar within a cell."""
 _TASK = "task"
-_OR = {Maybe: "; or null", Span: ", or a range [LOW,HIGH] of such values"}
 _HEAD = "| setting | values | unit | default | meaning |\n| --- | --- | --- | --- | --- |"
 
 
@@ -34,7 +37,7 @@ def list_groups() -> str:
             *(f"**`{n}`** {about(cls)}\n\n{make_table(cls, 'task.')}" for n, cls in TASKS.items()),
             *(
                 f"### {group}\n\n{about(cls)}\n\n{make_table(cls, f'{group}.')}"
-                for group, cls in GROUPS.items()
+                for group, (cls, _) in GROUPS.items()
             ),
         ]
     )
@@ -54,12 +57,17 @@ def list_commands() -> str:
 
 
 def list_choices(conf: Path) -> str:
-    """Return a table of the groups of conf/ and their choices, the names of their files."""
+    """Return a table of the groups and their choices: files of conf/, and registered names."""
     folders = {path.parent for path in conf.glob("**/*.yaml")} - {conf, conf / "hydra"}
+    registered: dict[str, list[str]] = {group: [choice] for group, (_, choice) in GROUPS.items()}
+    registered |= {group: [*part.registry] for group, part in PARTS.items()} | {_TASK: [*TASKS]}
+    names = {
+        str(folder.relative_to(conf)): [p.stem for p in folder.glob("*.yaml")] for folder in folders
+    }
     rows = ["| group | choices |", "| --- | --- |"]
-    for folder in sorted(folders, key=str):
-        names = ", ".join(f"`{path.stem}`" for path in sorted(folder.glob("*.yaml")))
-        rows.append(f"| `{folder.relative_to(conf)}` | {names} |")
+    for group in sorted({*names, *registered}):
+        choices = sorted([*names.get(group, ()), *registered.get(group, ())])
+        rows.append(f"| `{group}` | {', '.join(f'`{name}`' for name in choices)} |")
     return "\n".join(rows)
 
 
@@ -82,22 +90,11 @@ def make_table(cls: type[Settings], prefix: str = "") -> str:
     """
     defaults, words = cls(), meanings(cls)
     rows = [
-        f"| `{prefix}{name}` | {_may_be(kind)} | {_unit(kind)} | "
+        f"| `{prefix}{name}` | {_may_be(hint)} | {unit_of(hint)} | "
         f"{_shown(getattr(defaults, name))} | {words[name].replace('|', BAR)} |"
-        for name, kind in kinds_of(cls).items()
+        for name, hint in hints_of(cls).items()
     ]
     return "\n".join([_HEAD, *rows])
-
-
-@functools.cache
-def meanings(cls: type) -> Mapping[str, str]:
-    """Return the docstring of each field of a class, inherited fields included."""
-    found: dict[str, str] = {}
-    for part in reversed(cls.__mro__):
-        if dataclasses.is_dataclass(part):
-            (body,) = ast.parse(textwrap.dedent(inspect.getsource(part))).body
-            found |= dict(_documented(body))
-    return found
 
 
 def first_comment(path: Path) -> str:
@@ -107,68 +104,51 @@ def first_comment(path: Path) -> str:
     return " ".join(line.removeprefix("#").strip() for line in lines[:count])
 
 
-def _part(group: str, part: type[Variant]) -> str:
+def _part(group: str, part: type[Part]) -> str:
     lines = [f"### {group}", about(part)]
-    for variant in part.variants():
-        name = variant.registered_name()
+    for name, variant in part.registry.items():
         lines.append(f"**`{name}`** {about(variant)}")
-        if kinds_of(variant):
+        if variant.model_fields:
             inside = f"{name}." if group in SEVERAL else ""
             lines.append(make_table(variant, f"{group}.{inside}"))
     return "\n\n".join(lines)
 
 
-def _documented(body: Any) -> Iterator[tuple[str, str]]:
-    """The fields of a class's source, each with the text below it."""
-    for field, below in zip(body.body, body.body[1:], strict=False):
-        is_text = isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
-        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and is_text:
-            yield field.target.id, " ".join(below.value.value.split())
-
-
-def about(cls: type) -> str:
-    """Return the first paragraph of a class's docstring."""
-    return (inspect.getdoc(cls) or "").partition("\n\n")[0].replace("\n", " ")
-
-
-def _may_be(kind: Kind) -> str:
-    """The allowed values of a kind, in words."""
+def _may_be(hint: Any) -> str:
+    """The allowed values of an annotation, or of a kind, in words."""
+    (kind, *_) = inner_types(hint)
+    if isinstance(kind, Maybe) or type(None) in typing.get_args(hint):
+        return f"{_may_be(kind.kind if isinstance(kind, Maybe) else kind)}; or null"
+    of = getattr(kind, "of", kind)
+    if isinstance(kind, Changes):
+        return f"changes to the policy's {_link(kind.of or BaseTaskSettings)}"
+    if isinstance(of, type) and issubclass(of, Settings):
+        return _link(of)
     match kind:
-        case Maybe() | Span():
-            return f"{_may_be(kind.kind)}{_OR[type(kind)]}"
-        case Several(kind=Instance(of=cls)) | Instance(of=cls):
-            return _link(cls)
-        case Several():
-            count = kind.most if kind.least == kind.most else f"{kind.least} to {kind.most}"
+        case Span():
+            return f"{_may_be(kind.kind)}, or a range [LOW,HIGH] of such values"
+        case Several(least=least, most=most):
+            count = most if least == most else f"{least} to {most}"
             return f"{count} values, each {_may_be(kind.kind)}"
-        case Changes():
-            return f"changes to the policy's {_link(kind.of or BaseTaskSettings)}"
         case OneOf():
             return " or ".join(f"`{name}`" for name in kind.names)
-        case Flag():
-            return "true or false"
-    return getattr(kind, "words", "a text")
+    return "true or false" if kind is bool else getattr(kind, "words", "") or "a text"
 
 
 def _link(cls: type) -> str:
     """A link to the settings of a group."""
     groups = {
         BaseTaskSettings: _TASK,
-        **{c: g for g, c in GROUPS.items()},
+        **{c: g for g, (c, _) in GROUPS.items()},
         **{c: g for g, c in {**PARTS, **SEVERAL}.items()},
     }
     return f"[{groups[cls]}](#{groups[cls]})"
 
 
-def _unit(kind: Kind) -> str:
-    inner = getattr(kind, "kind", kind)
-    return getattr(getattr(inner, "kind", inner), "unit", "")
-
-
 def _shown(value: Any) -> str:
     """A default as typed on the command line; for parts their names."""
     several = value if isinstance(value, tuple) else (value,)
-    if several and all(isinstance(one, Variant) for one in several):
+    if several and all(isinstance(one, Part) for one in several):
         return ", ".join(f"`{one.name}`" for one in several)
     if isinstance(value, Settings):
         return ""

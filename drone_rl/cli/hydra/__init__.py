@@ -1,1 +1,1 @@
-"""How the command line uses Hydra: schemas, composition, launchers, sweepers, mistakes and help."""
+"""How the command line uses Hydra: defaults, composition, launchers, sweepers and messages."""

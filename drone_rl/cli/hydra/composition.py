@@ -1,14 +1,10 @@
 """Compose a command's settings from a command line with Hydra, and run the command."""
 
 import contextlib
-import dataclasses
-import functools
 import importlib.util
 import os
 import re
 import sys
-import types
-import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,7 +16,7 @@ from hydra.core.utils import run_job
 from hydra.errors import HydraException
 from hydra.experimental.callback import Callback
 from hydra.types import HydraContext, RunMode
-from omegaconf import MISSING, DictConfig, OmegaConf
+from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
@@ -33,15 +29,14 @@ from drone_rl.config import (
     TASKS,
     ActionSettings,
     AppearanceSettings,
-    BaseTaskSettings,
     CameraSettings,
     DynamicsSettings,
-    TaskSettings,
 )
 from drone_rl.config.commands import PathsSettings, ProvableSettings
-from drone_rl.config.configuration import Changes, Variant, from_config
+from drone_rl.config.configuration import Changes
 from drone_rl.config.learning import Collector, Objective, Optimizer, Returns, Scheduler
 from drone_rl.config.networks import Network
+from drone_rl.config.parts import Part
 from drone_rl.config.training import CloningSettings, Logger, TrainerSettings
 from drone_rl.config.transforms import Transform
 from drone_rl.sweeps.manifest import is_sweep
@@ -49,26 +44,20 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import OUTPUT_CLOSED, USER_ERROR
 from drone_rl.utils.plugins import IMPORTED, failure, line_of
 from drone_rl.utils.progress import Heartbeat
-from drone_rl.utils.schema import Kind
-from drone_rl.utils.settings import Settings, conf_dir, kinds_of, plain, types_of
+from drone_rl.utils.settings import S, Settings, conf_dir, hints_of, inner_types, plain
 
-GROUPS: dict[str, type[Settings]] = {
-    "appearance": AppearanceSettings,
-    "dynamics": DynamicsSettings,
-    "actions": ActionSettings,
-    "camera": CameraSettings,
-    "trainer": TrainerSettings,
-    "cloning": CloningSettings,
-    "provable": ProvableSettings,
-    "paths": PathsSettings,
+GROUPS: dict[str, tuple[type[Settings], str]] = {
+    "appearance": (AppearanceSettings, "minimal"),
+    "dynamics": (DynamicsSettings, "computer_vision"),
+    "actions": (ActionSettings, "moves"),
+    "camera": (CameraSettings, "small"),
+    "trainer": (TrainerSettings, "default"),
+    "cloning": (CloningSettings, "default"),
+    "provable": (ProvableSettings, "default"),
+    "paths": (PathsSettings, "default"),
 }
-"""Groups whose files start from the schema `base_<group>`."""
-_CHANGED = (DynamicsSettings,)
-"""Settings that commands also accept in part, as in `dynamics.mass=2`.
-
-Hydra merges a file of the group into such a part, so the file's schema extends that of the part.
-"""
-PARTS: dict[str, type[Variant]] = {
+"""Groups of settings, with the name of the choice that has their defaults."""
+PARTS: dict[str, type[Part]] = {
     "network": Network,
     "returns": Returns,
     "objective": Objective,
@@ -76,8 +65,8 @@ PARTS: dict[str, type[Variant]] = {
     "scheduler": Scheduler,
     "collector": Collector,
 }
-"""Groups whose files start from the schema of a variant, `base_<its name>`."""
-SEVERAL: dict[str, type[Variant]] = {"transforms": Transform, "logger": Logger}
+"""Groups whose choices are the variants of a part."""
+SEVERAL: dict[str, type[Part]] = {"transforms": Transform, "logger": Logger}
 """Groups whose files name several variants, each by `schema@<name>: <the variant's name>`."""
 
 _TEXTS = re.compile(
@@ -87,47 +76,45 @@ _TEXTS = re.compile(
 """Settings whose values are names and paths."""
 _EXPONENT = re.compile(r"(?<=[=,\[(\s])(\d+(?:\.\d+)?[eE]\+?\d+)(?=[,\])]|$)")
 _LARGEST_WHOLE = 10**15
-_PLUGINS = (("plugins", list[str], dataclasses.field(default_factory=list)),)
-"""Modules that register parts; `import_plugins` imports them before Hydra composes."""
 
 
-def register_schemas(commands: Mapping[str, type[Settings]]) -> None:
-    """Register the schemas of commands, by the names of their files, before Hydra composes.
+def store_defaults(commands: Mapping[str, type[CommandSettings]]) -> None:
+    """Give Hydra the defaults of commands, by their names with "_", and of all groups.
 
-    Parts and tasks of plugins, which have no file in conf/, become choices of their groups.
+    Files of conf/ hold presets that differ from them. Parts and tasks of plugins are choices, too.
     """
-    store = ConfigStore.instance()
-    for task in TASKS.values():
-        _store("task", "task" if task is TaskSettings else task.name, task)
-    for group, settings in GROUPS.items():
-        _store(group, group, settings)
-    for group, part in PARTS.items():
-        for variant in part.variants():
-            _store(group, variant.registered_name(), variant)
-    for group, part in SEVERAL.items():
-        for variant in part.variants():
-            name = variant.registered_name()
-            store.store(group=f"{group}/schema", name=name, node=schema_of(variant))
-    for command, settings in commands.items():
-        store.store(name=f"base_{command}", node=schema_of(settings, _PLUGINS))
+    store = ConfigStore.instance().store
+    for group, (settings, choice) in GROUPS.items():
+        store(group=group, name=choice, node=settings().config())
+    for name, task in TASKS.items():
+        store(group="task", name=name, node=task().config())
+    for group, part in {**PARTS, **SEVERAL}.items():
+        for name, variant in part.registry.items():
+            needs: Mapping[str, Part] = getattr(variant, "needs", {}) if part is Objective else {}
+            chosen = [{f"override /{g}@_global_.{g}": need.name} for g, need in needs.items()]
+            within = f"{group}/schema" if group in SEVERAL else group
+            store(group=within, name=name, node={"defaults": chosen, **variant().config()})
+    for name, command in commands.items():
+        groups, values = _defaults_of(command)
+        has_file = (conf_dir() / f"{name}.yaml").is_file()  # which lists the groups
+        listed = [{group: choice} for group, choice in groups.items()]
+        defaults = [] if has_file else ["_self_", *listed, {"hydra": "default"}]
+        store(name="base_" * has_file + name, node={"defaults": defaults, **values})
 
 
-def _store(group: str, name: str, settings: type[Settings]) -> None:
-    """Register the schema of a group's file; settings of a plugin are a choice themselves."""
-    store = ConfigStore.instance()
-    store.store(group=group, name=f"base_{name}", node=schema_of(settings))
-    if not settings.__module__.startswith("drone_rl."):
-        store.store(group=group, name=name, node=_choice_of(settings))
-
-
-def _choice_of(cls: type[Settings]) -> type:
-    """A schema with the default of each field."""
-    values = cls().values()
-    fields = [
-        (name, _simple(hint), dataclasses.field(default_factory=lambda n=name: plain(values[n])))
-        for name, hint in types_of(cls).items()
-    ]
-    return dataclasses.make_dataclass(f"{cls.__name__}Choice", [*_named(cls), *fields])
+def _defaults_of(command: type[CommandSettings]) -> tuple[dict[str, str | None], dict[str, Any]]:
+    """Return the choice of each group of a command, and its other values."""
+    groups: dict[str, str | None] = {}
+    values: dict[str, Any] = {"plugins": []}
+    for name, value in command():
+        (kind, *_) = inner_types(hints_of(command)[name])
+        if name in GROUPS:
+            groups[name] = GROUPS[name][1] if isinstance(value, Settings) else None
+        if isinstance(kind, Changes):
+            values[name] = dict.fromkeys(kind.names)
+        elif groups.get(name) is None and name not in ("task", *PARTS, *SEVERAL):
+            values[name] = plain(value)
+    return groups, values
 
 
 def import_plugins(overrides: Sequence[str]) -> None:
@@ -169,52 +156,6 @@ def _check_module(name: str) -> None:
         )
 
 
-def schema_of(cls: type[Settings], further: Sequence[tuple[str, Any, Any]] = ()) -> type:
-    """Return a dataclass with the same fields but no defaults, which are in conf/.
-
-    `further` are name, type and default of further fields.
-    """
-    types = types_of(cls)
-    fields = [(name, *_field(kind, types[name])) for name, kind in kinds_of(cls).items()]
-    bases = (_optional(tuple(types.items())),) if cls in _CHANGED else ()
-    name = f"{cls.__name__}Schema"
-    return dataclasses.make_dataclass(name, [*_named(cls), *fields, *further], bases=bases)
-
-
-@functools.cache
-def _optional(types: tuple[tuple[str, Any], ...]) -> type:
-    """A dataclass with these fields, each of which may be absent."""
-    return dataclasses.make_dataclass("Changes", [(n, _simple(h) | None, None) for n, h in types])
-
-
-def _named(cls: type[Settings]) -> list[tuple[str, Any, Any]]:
-    """The field with the name of a variant or task."""
-    if issubclass(cls, Variant):
-        return [("_target_", str, cls.target)]
-    if issubclass(cls, BaseTaskSettings) and cls is not TaskSettings:
-        return [("name", str, cls.name)]
-    return []
-
-
-def _field(kind: Kind, hint: Any) -> tuple[Any, Any]:
-    """The type of a field in OmegaConf, and its value until a file sets one."""
-    if isinstance(kind, Changes):
-        schema = _optional(tuple(kind.types.items()))
-        return schema, dataclasses.field(default_factory=schema)
-    return _simple(hint), MISSING
-
-
-def _simple(hint: Any) -> Any:
-    """The type itself if it consists of int, float, str and bool, else Any."""
-    arguments = typing.get_args(hint)
-    if typing.get_origin(hint) is tuple:
-        return hint if set(arguments) <= {int, float, str, ...} else Any
-    if typing.get_origin(hint) in (typing.Union, types.UnionType):
-        inner = [argument for argument in arguments if argument is not types.NoneType]
-        return hint if len(inner) == 1 and _simple(inner[0]) is not Any else Any
-    return hint if hint in (int, float, str, bool) else Any
-
-
 def whole_numbers(override: str) -> str:
     """Write whole numbers such as 1e5 without an exponent, as whole-number settings need them."""
 
@@ -237,11 +178,11 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
     words = [re.sub(r"^(\+{0,2}plugins)=([\w.]+)$", r"\1=[\2]", word) for word in words]
     words.sort(key=lambda word: word not in OPTIONS)  # Hydra needs options before settings
     import_plugins(words)
-    register_schemas({name: command})
-    check_words(name, conf_dir(), words)
+    store_defaults({name: command})
+    check_words(name, words)
     if is_help:
         with _explained(name, words):
-            show_help(name, conf_dir(), words, command, topics)
+            show_help(name, words, command, topics)
         return 0
     statuses: list[int] = []
     job = _job(name, command, statuses, words)
@@ -261,7 +202,7 @@ def _run_once(name: str, job: Callable[[DictConfig], object], words: Sequence[st
 
     Return False, without a run, if the user's own files contain callbacks or select a sweep.
     """
-    config = composed(name, conf_dir(), words)
+    config = composed(name, words)
     if config.hydra.callbacks or config.hydra.mode not in (None, RunMode.RUN):
         return False
     unused: Any = Callback()  # a base class without actions
@@ -279,14 +220,14 @@ def _explained(name: str, words: Sequence[str]) -> Iterator[None]:
     except (HydraException, OmegaConfBaseException, YAMLError) as error:
         if input_error(error) is not None:
             raise
-        raise explain(error, name, conf_dir(), words) from error
+        raise explain(error, name, words) from error
 
 
-def read_settings(cls: type[Settings], config: DictConfig) -> Any:
+def read_settings(cls: type[S], config: DictConfig) -> S:
     """Resolve composed settings and check them as those of a command."""
     values: Any = OmegaConf.to_container(config, resolve=True)
     values.pop("plugins", None)
-    return from_config(cls, values)
+    return cls.read(values)
 
 
 def _job(

@@ -1,9 +1,10 @@
 """`drone-rl COMMAND --help`: print settings and examples."""
 
+import inspect
 import re
 import shlex
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,46 +12,54 @@ import yaml
 from omegaconf import OmegaConf
 
 from drone_rl.cli.commands import TABLE
-from drone_rl.cli.hydra.mistakes import composed, flattened, similar
+from drone_rl.cli.hydra.mistakes import choices, composed, flattened, similar
+from drone_rl.config import TASKS
+from drone_rl.config.configuration import Changes
+from drone_rl.config.parts import Named, Parts
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.settings import Settings, kinds_of
+from drone_rl.utils.settings import (
+    Settings,
+    about,
+    hints_of,
+    inner_types,
+    meanings,
+    unit_of,
+)
 
-_SETTING = re.compile(r"(?P<indent> *)(?P<name>[A-Za-z_]\w*):(?= |$)")
 _NOT_SHOWN = ("hydra", "paths")
 """Groups without choices for users."""
 _WIDTH = 100
 _LONGEST_VALUE = 60
+_PLUGINS = "Modules that register parts of your own: networks, transforms and so on."
 _RUN_FOLDER = "Folder of this command's files; a new one under outputs/ by default."
 
 
 def show_help(
     command: str,
-    conf: Path,
     overrides: Sequence[str],
     settings: type[Settings],
     topics: Sequence[str] = (),
 ) -> None:
     """Print the most used settings of a command, or those that `topics` names, and examples.
 
-    `command` is the name of its file in `conf`; `settings` is its class. "all" is all settings.
+    `command` is its name with "_", `settings` its class. The topic "all" is all settings.
 
     Raises:
         InputError: There is no setting and no group of settings of a name.
     """
     typed = [o for o in overrides if "=" in o or o.startswith("~")]
-    config = composed(command, conf, typed)
+    config = composed(command, typed)
     values: Any = OmegaConf.to_container(config, resolve=False)
     del values["hydra"]
     selected = {g: c for g, c in config.hydra.runtime.choices.items() if "@" not in g}
-    files = {g: sorted(path.stem for path in (conf / g).glob("*.yaml")) for g in selected}
-    groups = {g: names for g, names in files.items() if names and g not in _NOT_SHOWN}
+    names = {g: [n for n in choices(g) if n != "basic"] for g in selected}
+    groups = {g: names[g] for g in names if names[g] and g not in _NOT_SHOWN}
     keys = [*(group for group in groups if group not in values), *flattened(values)]
-    meanings = comments(command, conf, {g: c for g, c in selected.items() if "/" not in g})
-    meanings |= {g: f"One of: {', '.join(names)}." for g, names in groups.items()}
-    meanings["hydra.run.dir"] = _RUN_FOLDER
+    described = {key: (text, unit) for key, text, unit in _described(settings, values)}
+    described |= {g: (f"One of: {', '.join(names)}.", "") for g, names in groups.items()}
+    described |= {"hydra.run.dir": (_RUN_FOLDER, ""), "plugins": (_PLUGINS, "")}
     name = command.replace("_", "-")
-    print(f"drone-rl {name} [setting=value ...]\n")
-    print((conf / f"{command}.yaml").read_text().split("\ndefaults:")[0], end="\n\n")
+    print(f"drone-rl {name} [setting=value ...]\n\n{inspect.getdoc(settings)}\n")
     if not topics:
         print(f"Most used settings, with their values (drone-rl {name} --help all lists all):")
         keys = TABLE[name]["settings"]
@@ -60,11 +69,10 @@ def show_help(
             keys = [key for topic in topics for key in _about(topic, keys, f"drone-rl {name}")]
     for key in keys:
         value = selected[key] if key in groups else _inside(values, key)
-        meaning = " ".join(meanings.get(key, "").split())
+        meaning, unit = described.get(key, ("", ""))
         if not isinstance(value, dict) or not value:
             text = "FOLDER" if key == "hydra.run.dir" else _value(value)
             text = text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}..."
-            unit = _unit(settings, key.split("."))
             print(f"  {key}={text}" + (f"  ({unit})" if unit else ""))
         elif meaning:
             print(f"  {key}")
@@ -114,55 +122,39 @@ def _value(value: Any) -> str:
     return yaml.safe_dump(value, default_flow_style=True, width=1000).splitlines()[0]
 
 
-def _unit(settings: Any, path: Sequence[str]) -> str:
-    """Return the unit of a setting, empty if it has none."""
-    kind: Any = kinds_of(settings).get(path[0])
-    if path[1:]:
-        inside = getattr(kind, "of", None)
-        is_settings = isinstance(inside, type) and issubclass(inside, Settings)
-        return _unit(inside, path[1:]) if is_settings else ""
-    return getattr(getattr(kind, "kind", kind), "unit", "")
+def _described(
+    cls: type[Settings], values: Mapping[str, Any], prefix: str = ""
+) -> Iterator[tuple[str, str, str]]:
+    """Yield the dotted name, description and unit of each setting of a class and its groups.
 
-
-def comments(command: str, conf: Path, selected: dict[str, str | None]) -> dict[str, str]:
-    """Return the comment of each setting of a command by its dotted name.
-
-    `command` is the name of its file in `conf`, `selected` the file of each group.
+    `values` are composed ones, which name the variants of parts.
     """
-    texts = {"plugins": "Modules that register parts of your own: networks, transforms and so on."}
-    dynamics = read_comments(conf / "dynamics" / "computer_vision.yaml")
-    texts |= {f"dynamics.{key}": text for key, text in dynamics.items()}
-    tasks = conf / "task"
-    for path in [*sorted(tasks.glob("*.yaml")), tasks / "collect_cubes.yaml"]:  # the last one wins
-        texts |= {f"task.{key}": text for key, text in read_comments(path).items()}
-    for group, name in selected.items():
-        for path in _with_parents(conf / group / f"{name}.yaml"):
-            texts |= {f"{group}.{key}": text for key, text in read_comments(path).items()}
-    return texts | read_comments(conf / f"{command}.yaml")
+    texts = meanings(cls)
+    for name, hint in hints_of(cls).items():
+        key, inside = prefix + name, values.get(name)
+        yield key, texts.get(name, ""), unit_of(hint)
+        for of, part, below in _inner(
+            inner_types(hint)[0], inside if isinstance(inside, Mapping) else {}
+        ):
+            yield f"{key}{part}", about(of) if part else texts.get(name, ""), ""
+            yield from _described(of, below, f"{key}{part}.")
 
 
-def read_comments(path: Path) -> dict[str, str]:
-    """Return the comment above each setting of one file by its dotted name."""
-    texts, above, where = {}, [], []
-    for line in path.read_text().splitlines():
-        setting = _SETTING.match(line)
-        if line.lstrip().startswith("#"):
-            above.append(line.strip().lstrip("#").strip())
-        elif setting and setting["name"] != "defaults":
-            where = [*where[: len(setting["indent"]) // 2], setting["name"]]
-            if above:
-                texts[".".join(where)] = "\n".join(above)
-            above = []
-        else:
-            above = []
-    return texts
-
-
-def _with_parents(path: Path) -> Iterator[Path]:
-    """Yield the files in a file's defaults list, recursively, then the file itself."""
-    if not path.is_file():
-        return
-    for entry in (yaml.safe_load(path.read_text()) or {}).get("defaults", ()):
-        if isinstance(entry, str) and entry != "_self_":
-            yield from _with_parents(path.with_name(f"{entry}.yaml"))
-    yield path
+def _inner(kind: Any, values: Mapping[str, Any]) -> Iterator[tuple[Any, str, Any]]:
+    """Yield the classes of the settings inside one, each with its key and values."""
+    if isinstance(kind, Changes):
+        for of in (kind.of,) if kind.of else reversed(TASKS.values()):  # the default one wins
+            yield of, "", {}
+    elif isinstance(kind, Parts):
+        for name, below in values.items():
+            if name in kind.of.registry:
+                yield kind.of.registry[name], f".{name}", below
+    elif isinstance(kind, type) and issubclass(kind, Named):
+        name = values.get("name", kind.default_name)
+        yield from (
+            (of, "", values)
+            for choice, of in kind.registry.items()
+            if choice == name or getattr(of, "target", None) == values.get("_target_", "")
+        )
+    elif isinstance(kind, type) and issubclass(kind, Settings):
+        yield kind, "", values

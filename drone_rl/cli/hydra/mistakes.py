@@ -5,10 +5,8 @@ import difflib
 import re
 import shlex
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
-import yaml
 from hydra import compose, initialize_config_dir
 from hydra.core.config_store import ConfigStore
 from hydra.core.global_hydra import GlobalHydra
@@ -19,10 +17,9 @@ from omegaconf.errors import OmegaConfBaseException
 from drone_rl.config.configuration import read_other_names
 from drone_rl.sweeps.manifest import is_sweep
 from drone_rl.utils.errors import InputError, did_you_mean
+from drone_rl.utils.settings import conf_dir
 
 OTHER_NAMES = read_other_names()
-SCHEMA = "base_"
-"""Prefix of schemas' names, see `drone_rl.cli.hydra.composition`."""
 OPTIONS = {"-m", "--multirun", "-h", "--help"}
 """Options of Hydra that are documented; all others are refused."""
 _OVERRIDE = re.compile(r"\+{0,2}[A-Za-z][\w./@-]*=.*|~[A-Za-z][\w./@-]*(=.*)?", re.DOTALL)
@@ -34,20 +31,19 @@ _OWN_FOLDERS = "hydra.searchpath"
 """Setting that adds folders of the user, whose files are not known here."""
 
 
-def composed(command: str, conf: Path, overrides: Sequence[str]) -> DictConfig:
-    """Compose the settings of a command; its name is that of a file in `conf`."""
+def composed(command: str, overrides: Sequence[str]) -> DictConfig:
+    """Compose the settings of a command; its name is with "_" for "-"."""
     GlobalHydra.instance().clear()
-    with initialize_config_dir(str(conf), job_name=command, version_base="1.3"):
+    with initialize_config_dir(str(conf_dir()), job_name=command, version_base="1.3"):
         return compose(command, [*overrides], return_hydra_config=True)
 
 
-def choices(conf: Path, group: str) -> list[str]:
+def choices(group: str) -> list[str]:
     """Return the choices of a group: names of its files, and what plugins register."""
-    names = [path.name for path in (conf / group).glob("*.yaml")]
+    names = [path.name for path in (conf_dir() / group).glob("*.yaml")]
     with contextlib.suppress(OSError):  # nothing is stored in the group
         names += ConfigStore.instance().list(group)
-    names = {n.removesuffix(".yaml") for n in names if n.endswith(".yaml")}
-    return sorted(name for name in names if not name.startswith(SCHEMA))
+    return sorted({name.removesuffix(".yaml") for name in names if name.endswith(".yaml")})
 
 
 def flattened(values: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
@@ -59,83 +55,79 @@ def flattened(values: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
                 yield from flattened(value, f"{prefix}{name}.")
 
 
-def check_words(name: str, conf: Path, words: Sequence[str]) -> None:
+def check_words(name: str, words: Sequence[str]) -> None:
     """Raise an `InputError` for the first word that Hydra ignores or would misunderstand.
 
-    These are options, unknown choices of a group (schemas are choices for Hydra), empty names of
+    These are options, unknown choices of a group, empty names of
     folders, and what only sweeps use. All other mistakes are left to Hydra.
     """
     for word in words:
-        if word not in OPTIONS and (problem := _problem(word, name, conf, words)):
+        if word not in OPTIONS and (problem := _problem(word, name, words)):
             raise InputError(f"{word}: {problem}")
 
 
-def _problem(word: str, name: str, conf: Path, words: Sequence[str]) -> str | None:
+def _problem(word: str, name: str, words: Sequence[str]) -> str | None:
     key, _, value = word.partition("=")
     if not _OVERRIDE.fullmatch(word):
-        keys, has_dashes = _names(name, conf, words), word.startswith("-")
-        hint = "" if key in keys else _meant(key.lstrip("-"), conf, keys)
+        keys, has_dashes = _names(name, words), word.startswith("-")
+        hint = "" if key in keys else _meant(key.lstrip("-"), keys)
         return f"settings are typed name=value{', without dashes' if has_dashes else ''}{hint}"
     if _EMPTY_FOLDER.fullmatch(word):
         return "it has no value; give a folder"
     if key in _FOR_SWEEPS and not is_sweep(words):
         return "it has no effect on a single run; add -m"
     group = key.lstrip("+").partition("@")[0]
-    if not _is_group(conf, group) or "(" in value or _has_own_folders(words):
+    if not _is_group(group) or "(" in value or _has_own_folders(words):
         return None
-    options = choices(conf, group)
+    options = choices(group)
     unknown = {*re.findall(r"[\w.-]+", value)} - {*options}
     alternative = ", or your own with plugins=[MODULE]" if group in _EXTENSIBLE else ""
     meant = did_you_mean(min(unknown), options) if unknown else ""
     return f"{group} is one of {', '.join(options)}{alternative}{meant}" if unknown else None
 
 
-def explain(error: Exception, name: str, conf: Path, words: Sequence[str]) -> InputError:
+def explain(error: Exception, name: str, words: Sequence[str]) -> InputError:
     """Return the error for a user whose settings Hydra or OmegaConf rejected."""
-    keys = [] if _has_own_folders(words) else _names(name, conf, words)
+    keys = [] if _has_own_folders(words) else _names(name, words)
     command = f"drone-rl {name.replace('_', '-')}"
     for word in words:
         key = word.lstrip("~").partition("=")[0]
         if keys and key not in keys and not word.startswith(("-", "+")):
-            remedy = _meant(key, conf, keys) or f"; {command} --help all lists the settings"
+            remedy = _meant(key, keys) or f"; {command} --help all lists the settings"
             return InputError(f"{word}: {command} has no setting {key}{remedy}")
-    cause = str(error.__cause__ or "").split("\n")[:1]  # further lines repeat the name
-    reason = " ".join(" ".join([str(error), *cause]).split())
-    word, _, fault = reason.removeprefix("Error merging override ").partition(" ")
-    if word not in words:
-        return InputError(reason)
-    key = word.lstrip("+~").partition("=")[0]
-    return InputError(f"{word}: {fault.rstrip('.')}; {command} --help {key} shows what it takes")
+    return InputError(" ".join(f"{error} {error.__cause__ or ''}".split()))
 
 
 def _has_own_folders(words: Sequence[str]) -> bool:
     return any(word.startswith(_OWN_FOLDERS) for word in words)
 
 
-def _is_group(conf: Path, name: str) -> bool:
-    return bool(name) and not name.startswith((".", "/")) and (conf / name).is_dir()
+def _is_group(name: str) -> bool:
+    return bool(name) and not name.startswith((".", "/")) and bool(choices(name))
 
 
-def _names(name: str, conf: Path, words: Sequence[str]) -> list[str]:
+def _names(name: str, words: Sequence[str]) -> list[str]:
     """Return the settings and groups that a command has with the groups' choices in its words."""
-    selected = [w for w in words if "," not in w and _is_group(conf, w.partition("=")[0])]
+    selected = [w for w in words if "," not in w and _is_group(w.partition("=")[0])]
     try:
-        config = composed(name, conf, selected)
+        config = composed(name, selected)
     except (HydraException, OmegaConfBaseException):
-        config = composed(name, conf, ())
+        config = composed(name, ())
     values: Any = OmegaConf.to_container(config, resolve=False)
     groups = [group for group in config.hydra.runtime.choices if "@" not in group]
     values["hydra"] = values.pop("hydra")  # a user means other settings first
     return [*flattened(values), *groups]
 
 
-def _meant(name: str, conf: Path, keys: Collection[str]) -> str:
+def _meant(name: str, keys: Collection[str]) -> str:
     """Return a hint at the setting that is like a name, or the choice of a group that has it."""
     group = name.partition(".")[0]
-    is_choice = group in keys and name not in keys
-    for path in sorted((conf / group).glob("*.yaml")) if is_choice else ():
-        if name in flattened({group: yaml.safe_load(path.read_text()) or {}}):
-            return f"; {group}={path.stem} has it"
+    is_choice = group in keys and name not in keys and group != "hydra"
+    for choice in choices(group) if is_choice else ():
+        with contextlib.suppress(OSError):  # a file
+            values: Any = ConfigStore.instance().load(f"{group}/{choice}.yaml").node
+            if name in flattened({group: values}):
+                return f"; {group}={choice} has it"
     return next((f"; did you mean {meant}?" for meant in similar(name, keys)), "")
 
 

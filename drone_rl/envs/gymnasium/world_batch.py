@@ -12,22 +12,18 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.config import (
-    ActionSettings,
     BaseTaskSettings,
     CameraSettings,
-    DynamicsSettings,
     TaskSettings,
-    settings_of,
 )
 from drone_rl.config.commands import GymnasiumSettings
-from drone_rl.config.configuration import Changes
 from drone_rl.sim.actions import Actions, Entry
 from drone_rl.sim.composer_task import CONTROL_TIMESTEP_S
 from drone_rl.sim.entities import CHASE
 from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError, did_you_mean
-from drone_rl.utils.settings import Settings, kinds_of
+from drone_rl.utils.settings import Settings
 
 _MOST = float(np.finfo(np.float32).max)
 """Bound of spaces without a limit: Gymnasium's checker requires finite bounds."""
@@ -90,12 +86,7 @@ METADATA: dict[str, Any] = {
     "render_fps": round(1 / CONTROL_TIMESTEP_S),
 }
 """Metadata of every environment; the frame rate is that of the default control step."""
-_PARTS: dict[str, type[Settings]] = {
-    "camera": CameraSettings,
-    "dynamics": DynamicsSettings,
-    "actions": ActionSettings,
-}
-"""Options that accept a mapping with some of their settings."""
+
 FILM_HEIGHT, FILM_WIDTH = 360, 640
 """Size in pixels of the images of `render`, which show the drone from behind."""
 END = "end_reason"
@@ -118,11 +109,8 @@ class WorldBatch:
         Raises:
             InputError: An option or setting is unknown or out of range.
         """
-        names = kinds_of(GymnasiumSettings)
+        names = GymnasiumSettings.model_fields
         options = {name: value for name, value in arguments.items() if name in names}
-        for name, kind in _PARTS.items():
-            if isinstance(options.get(name), Mapping):
-                options[name] = kind(**Changes(kind).read(options[name], name))
         options = GymnasiumSettings(**options)
         options.dynamics.check_air()
         changes = {name: value for name, value in arguments.items() if name not in names}
@@ -196,11 +184,13 @@ class WorldBatch:
 
 
 def _chosen_task(task: Chosen, changes: Mapping[str, Any]) -> BaseTaskSettings | Task[Any]:
-    chosen: Any = settings_of(task, "task")() if isinstance(task, str) else task or TaskSettings()
-    kinds = kinds_of(type(chosen)) if isinstance(chosen, Settings) else {}
+    chosen: Any = (
+        BaseTaskSettings.read(task, "task") if isinstance(task, str) else task or TaskSettings()
+    )
+    kinds = type(chosen).model_fields if isinstance(chosen, Settings) else {}
     for name in changes:
         if name not in kinds:
-            there = (*kinds_of(GymnasiumSettings), *kinds)
+            there = (*GymnasiumSettings.model_fields, *kinds)
             meant = did_you_mean(name, there)
             raise KeywordError(
                 f"unexpected keyword argument {name!r}; valid names: {', '.join(there)}{meant}"

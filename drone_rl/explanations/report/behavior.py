@@ -29,7 +29,7 @@ def describe_shifts(saved: SavedShifts, explanation: Explanation) -> dict[str, A
     shifts = explanation.robustness
     return {
         "text": saved.text(explanation.verdict) if explanation.verdict else "",
-        "rows": shifts.rows() if shifts else [],
+        "rows": shifts.table() if shifts else [],
         "names": NAMES,
     }
 

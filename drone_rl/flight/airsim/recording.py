@@ -5,7 +5,7 @@ import datetime
 import io
 import logging
 import re
-import zlib
+import urllib.parse
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -57,9 +57,8 @@ class Recording:
         """Return whether rows of this simulated time are due; if so, the next are due later."""
         if time < self._next - 1e-9:
             return False
-        self._next = max(
-            self._next + self.choice.record_interval, time
-        )  # late rows are not made up for
+        later = self._next + self.choice.record_interval
+        self._next = max(later, time)  # late rows are not made up for
         return True
 
     def write(
@@ -96,9 +95,7 @@ class Recording:
         images: list[RecordedImage],
         render: Callable[[str, RecordedImage], Tensor],
     ) -> None:
-        letters = to_letters(name)
-        if letters != name:  # other names may have the same letters
-            letters += f"_{zlib.crc32(name.encode('utf-8', 'replace')):08x}"
+        letters = urllib.parse.quote(name, "", errors="replace")
         files = []
         for image in images:
             ending = "pfm" if image.as_float else "png" if image.compress else "ppm"
@@ -122,8 +119,3 @@ def _save(image: Tensor, path: Path) -> None:
         path.write_bytes(b"Pf\n%d %d\n-1.0\n" % (width, height) + image.numpy().tobytes())
     else:
         Image.fromarray(image.numpy()).save(path, compress_level=1)
-
-
-def to_letters(name: str) -> str:
-    """Replace all but ASCII letters and digits by "_"; return at most 64 of them."""
-    return "".join(c if c.isascii() and c.isalnum() else "_" for c in name)[:64]

@@ -165,14 +165,11 @@ class Simulation:
         if name in self.vehicles:
             return self.vehicles[name]
         meant = did_you_mean(name, self.vehicles)
-        if is_sim_api:
-            raise InputError(
-                f"Vehicle Sim-API for '{name}' is not available. This could either because this "
-                f"is not a simulation or this vehicle does not exist{meant}"
-            )
+        api = "Vehicle Sim-API" if is_sim_api else "Vehicle API"
+        why = "this is not a simulation" if is_sim_api else "this is simulation-only API"
         raise InputError(
-            f"Vehicle API for '{name}' is not available. This could either because this is "
-            f"simulation-only API or this vehicle does not exist{meant}"
+            f"{api} for '{name}' is not available. This could either because {why} or this vehicle "
+            f"does not exist{meant}"
         )
 
     def set_wind(self, wind: tuple[float, float, float]) -> None:

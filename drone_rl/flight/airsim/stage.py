@@ -380,13 +380,6 @@ class Stage:
         """Return the pixels of a rendered image: (H, W) float32, or (H, W, 3) uint8."""
         return pixels(kind, shot.values, as_float=as_float, focal=shot.focal, ids=self._ids)[0]
 
-    def infrared(self, shot: Shot, *, as_float: bool) -> Tensor:
-        """Return a segmentation image with the ids in gray; shapes as of `image`."""
-        ids = self._ids[shot.values[0].long().cpu()]
-        if as_float:
-            return ids.float() / 255.0
-        return ids.to(torch.uint8)[..., None].expand(-1, -1, 3).contiguous()
-
     def box(self, shot: Shot, name: str) -> tuple[int, int, int, int] | None:
         """Return left, top, right and bottom of an object in a segmentation image, in pixels."""
         geoms = torch.tensor(self._geoms(name), dtype=torch.int64)

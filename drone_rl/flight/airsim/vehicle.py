@@ -19,7 +19,6 @@ from drone_rl.flight.airsim.collisions import (
     collision_info,
 )
 from drone_rl.flight.airsim.messages import Map, Pose, nanoseconds, to_world
-from drone_rl.flight.airsim.sensors import SENSORS
 from drone_rl.flight.airsim.settings_file import POSING, VehicleChoice
 from drone_rl.flight.commands.command import Command, FlightFuture, PilotError
 from drone_rl.flight.commands.pilot import Pilot
@@ -369,10 +368,6 @@ class Vehicle(Pilot):
             time_stamp=self._stamp(collision.time) if collision else 0,
             number=self._object_id(collision.name) if collision else -1,
         )
-
-    def sensor(self, kind: str) -> Map:
-        """Return ImuData, BarometerData, MagnetometerData or GpsData."""
-        return SENSORS[kind](self.sensors, self.epoch)
 
     def set_kinematics(self, pose: Pose, velocity: Sequence[float], rates: Sequence[float]) -> None:
         """Set pose, velocity, and rates about the axes of the FRD body; see `set_airsim_pose`."""

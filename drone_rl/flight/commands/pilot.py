@@ -19,7 +19,7 @@ from drone_rl.flight.commands.command import (
     TimedCommand,
     goals_of,
 )
-from drone_rl.flight.commands.computer_vision import SceneDrone
+from drone_rl.flight.commands.drone import Drone
 from drone_rl.flight.commands.path_following import (
     AUTOMATIC,
     TAKEOFF_SPEED,
@@ -79,7 +79,7 @@ class PathOptions(TypedDict, total=False):
     wait: bool
 
 
-class Pilot(SceneDrone):
+class Pilot(Drone):
     """Flies one drone by the commands of AirSim (Tables 2 and 3), over simulated time.
 
     World frame: x forward, y left, z up, metres. Angles are in degrees and have AirSim's signs:

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.flight.commands.computer_vision import KEYS, STEP, TURN
+from drone_rl.flight.commands.drone import KEYS, STEP, TURN
 from drone_rl.flight.commands.path_following import YawMode
 from drone_rl.flight.commands.pilot import Pilot
 from drone_rl.flight.commands.state import LandedState

@@ -1,4 +1,4 @@
-"""The server of the page: Starlette at 127.0.0.1, one thread for the simulation.
+"""The server of the page: websockets at 127.0.0.1, one thread for the simulation.
 
 Only a browser that knows the random token in the URL gets an answer, and only under this machine's
 own name: other pages in the same browser can't fly the drone.
@@ -7,6 +7,7 @@ own name: other pages in the same browser can't fly the drone.
 import asyncio
 import contextlib
 import hmac
+import http
 import json
 import logging
 import queue
@@ -50,43 +51,6 @@ _HEADERS = {
 }
 
 
-class Guard:
-    """An ASGI application that answers 403 unless host, origin and token are right."""
-
-    def __init__(self, app: Any, token: str, port: int) -> None:
-        """Take the application behind it."""
-        self._app, self._start = app, f"/{token}/".encode()
-        self._hosts = [f"{name}:{port}".encode() for name in (ADDRESS, "localhost")]
-
-    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
-        """Pass a request on, or refuse it."""
-        if self._is_allowed(scope):
-            await self._app(scope, receive, send)
-        elif scope["type"] == "websocket":
-            await receive()
-            await send({"type": "websocket.close", "code": 1008})  # before accept: status 403
-        elif scope["type"] == "http":
-            plain = [(b"content-type", b"text/plain"), (b"cache-control", b"no-store")]
-            await send({"type": "http.response.start", "status": 403, "headers": plain})
-            text = b"403: open the URL that drone-rl fly printed\n"
-            await send({"type": "http.response.body", "body": text})
-
-    def _is_allowed(self, scope: Any) -> bool:
-        if scope["type"] not in ("http", "websocket"):
-            return False
-        headers: dict[bytes, list[bytes]] = {}
-        for name, value in scope["headers"]:
-            headers.setdefault(name.lower(), []).append(value)
-        path = scope["path"].encode()[: len(self._start)]
-        has_token = hmac.compare_digest(path, self._start)
-        host, origin = headers.get(b"host", []), headers.get(b"origin", [])
-        is_here = len(host) == 1 and host[0] in self._hosts
-        origins = [b"http://" + name for name in self._hosts]
-        is_own = len(origin) == 1 and origin[0] in origins
-        has_origin = is_own or (scope["type"] == "http" and not origin)
-        return has_token and is_here and has_origin
-
-
 class _Page:
     """One open page: it gets the newest frame when it has displayed the earlier ones."""
 
@@ -117,11 +81,11 @@ class _Page:
             self._changed.clear()
             if self._problem is not None:
                 text, self._problem = json.dumps({"error": self._problem}), None
-                await socket.send_text(text)
+                await socket.send(text)
             elif self._frame is not None and self._in_flight < _IN_FLIGHT:
                 frame, self._frame = self._frame, None
                 self._in_flight += 1
-                await socket.send_bytes(frame)
+                await socket.send(frame)
             else:
                 await self._changed.wait()
 
@@ -161,47 +125,32 @@ class FlyPage:
         self, make: Callable[[], Shown], *, port: int = 0, frames_per_second: int = 40
     ) -> None:
         """Start the server and a thread that lets what `make` returns pass; see `fly`."""
-        uvicorn = extra("uvicorn", "fly", _ASKED_BY)
-        extra("websockets", "fly", _ASKED_BY)
-        self._asked_port, self._period = port, 1.0 / frames_per_second
-        self._socket = _listen(port)
-        self._token = secrets.token_urlsafe(24)
+        self._websockets = extra("websockets.asyncio.server", "fly", _ASKED_BY)
+        self._period, self._socket = 1.0 / frames_per_second, _listen(port)
         port = self._socket.getsockname()[1]
-        self.url = f"http://{ADDRESS}:{port}/{self._token}/"
+        self._hosts = [f"{name}:{port}" for name in (ADDRESS, "localhost")]
+        self._start = f"/{secrets.token_urlsafe(24)}/"
+        self.url = f"http://{ADDRESS}:{port}{self._start}"
         """Address of the page, with its token."""
         self._pages: set[_Page] = set()
         self._messages: queue.SimpleQueue[tuple[Any, _Page]] = queue.SimpleQueue()
         self._holder: _Page | None = None
         """The page whose keys or sticks were the last to change."""
         self._failure: Exception | None = None
-        self._is_stopping = threading.Event()
-        self._loop: asyncio.AbstractEventLoop | None = None
+        self._is_stopping, self._is_listening = threading.Event(), threading.Event()
         try:
             self._flight = make()
         except BaseException:
             self._socket.close()
             raise
+        self._loop, self._end = asyncio.new_event_loop(), asyncio.Event()
         self._hello = json.dumps(self._flight.hello())
-        config = uvicorn.Config(
-            Guard(self._make_app(), self._token, port),
-            ws="websockets-sansio",
-            ws_max_size=MAX_MESSAGE,
-            ws_max_queue=16,
-            ws_per_message_deflate=False,  # images are compressed already
-            lifespan="off",
-            log_config=None,
-            log_level="warning",
-            access_log=False,
-            server_header=False,
-            timeout_graceful_shutdown=1,
-        )
-        self._server = uvicorn.Server(config)
         self._threads = [
             threading.Thread(target=of, daemon=True) for of in (self._serve, self._simulate)
         ]
         for thread in self._threads:
             thread.start()
-        self._wait_until_started()
+        self._is_listening.wait(_PATIENCE_S)
 
     def __enter__(self) -> Self:
         return self
@@ -218,77 +167,101 @@ class FlyPage:
     def close(self) -> None:
         """Write recorded steps and stop server and simulation."""
         self._is_stopping.set()
-        self._server.should_exit = True
+        self._call_soon(self._end.set)
         for thread in self._threads:
             thread.join(_PATIENCE_S)
-
-    def _wait_until_started(self) -> None:
-        until = time.monotonic() + _PATIENCE_S
-        while not self._server.started:
-            if time.monotonic() > until or not self._threads[0].is_alive():
-                self.close()
-                raise InputError(f"port={self._asked_port}: the server did not start; try port=0")
-            time.sleep(0.01)
 
     # The server's thread
 
     def _serve(self) -> None:
-        try:
-            self._server.run(sockets=[self._socket])
-        finally:
-            self._is_stopping.set()
+        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
+            try:
+                runner.run(self._listen())
+            finally:
+                self._is_stopping.set()
+                self._is_listening.set()
 
-    def _make_app(self) -> Any:
-        applications = extra("starlette.applications", "fly", _ASKED_BY)
-        routing = extra("starlette.routing", "fly", _ASKED_BY)
-        files = [routing.Route(f"/{{token}}/{name}", self._file) for name in _FILES]
-        return applications.Starlette(
-            routes=[*files, routing.WebSocketRoute("/{token}/socket", self._talk)]
-        )
+    async def _listen(self) -> None:
+        logger = logging.getLogger("drone_rl.websockets")
+        logger.setLevel(logging.CRITICAL)  # browsers open connections that they do not use
+        async with self._websockets.serve(
+            self._talk,
+            sock=self._socket,
+            process_request=self._answer,
+            compression=None,  # images are compressed already
+            max_size=MAX_MESSAGE,
+            close_timeout=1.0,
+            server_header=None,
+            logger=logger,
+        ):
+            self._is_listening.set()
+            await self._end.wait()
 
-    async def _file(self, request: Any) -> Any:
-        responses = extra("starlette.responses", "fly", _ASKED_BY)
-        name = request.url.path.rpartition("/")[2]
+    def _answer(self, connection: Any, request: Any) -> Any:
+        """Return a file, or a refusal; None lets the socket open."""
+        if not self._is_allowed(request):
+            text = "403: open the URL that drone-rl fly printed\n"
+            return connection.respond(http.HTTPStatus.FORBIDDEN, text)
+        name = request.path.removeprefix(self._start)
+        if name == "socket":
+            return None
+        if name not in _FILES:
+            return connection.respond(http.HTTPStatus.NOT_FOUND, "404: no such file\n")
         path = Path(__file__).with_name(name or "index.html")
-        return responses.Response(path.read_bytes(), media_type=_FILES[name], headers=_HEADERS)
+        response = connection.respond(http.HTTPStatus.OK, path.read_text("utf-8"))
+        del response.headers["Content-Type"]
+        response.headers.update({**_HEADERS, "Content-Type": f"{_FILES[name]}; charset=utf-8"})
+        return response
+
+    def _is_allowed(self, request: Any) -> bool:
+        """Return whether host, origin and token are right."""
+        start, origins = self._start.encode(), request.headers.get_all("Origin")
+        has_token = hmac.compare_digest(request.path.encode()[: len(start)], start)
+        is_here = request.headers.get_all("Host") in ([host] for host in self._hosts)
+        is_own = origins in ([f"http://{host}"] for host in self._hosts)
+        return (
+            has_token and is_here and (is_own or (not origins and "Upgrade" not in request.headers))
+        )
 
     async def _talk(self, socket: Any) -> None:
         """Serve one page until it is closed."""
-        page, self._loop = _Page(), asyncio.get_running_loop()
+        exceptions = extra("websockets.exceptions", "fly", _ASKED_BY)
+        page = _Page()
         self._pages.add(page)
-        tasks: list[asyncio.Task[None]] = []
+        sending = None
         try:
-            await socket.accept()
-            await socket.send_text(self._hello)
-            tasks = [
-                asyncio.create_task(of) for of in (page.send(socket), self._receive(socket, page))
-            ]
-            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            await socket.send(self._hello)
+            sending = asyncio.create_task(page.send(socket))
+            async for text in socket:
+                self._receive(text, page)
+        except exceptions.ConnectionClosed:
+            pass
         finally:
             self._pages.discard(page)
             self._messages.put((_CLOSED, page))
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
+            if sending is not None:
+                sending.cancel()
+                await asyncio.gather(sending, return_exceptions=True)
 
-    async def _receive(self, socket: Any, page: _Page) -> None:
-        while True:
-            message = await socket.receive()
-            if message["type"] == "websocket.disconnect":
-                return
-            try:
-                content = json.loads(message.get("text") or "")
-            except (ValueError, RecursionError):
-                content = None
-            if isinstance(content, dict) and content.get("type") == "ack":
-                page.acknowledge()
-            else:
-                self._messages.put((content, page))
+    def _receive(self, text: str | bytes, page: _Page) -> None:
+        try:
+            content = json.loads(text if isinstance(text, str) else "")
+        except (ValueError, RecursionError):
+            content = None
+        if isinstance(content, dict) and content.get("type") == "ack":
+            page.acknowledge()
+        else:
+            self._messages.put((content, page))
 
     def _publish(self, frame: bytes) -> None:
         """Offer a frame to all pages."""
         for page in self._pages:
             page.offer(frame)
+
+    def _call_soon(self, function: Callable[..., None], *values: Any) -> None:
+        """Call a function in the server's thread; do nothing if that has ended."""
+        with contextlib.suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(function, *values)
 
     # The simulation's thread
 
@@ -300,7 +273,7 @@ class FlyPage:
             _log.error("the simulation failed: %s", error)
         finally:
             self._flight.close()
-            self._server.should_exit = True
+            self._call_soon(self._end.set)
 
     def _run(self) -> None:
         period, before = self._period, time.monotonic()
@@ -311,7 +284,7 @@ class FlyPage:
             if self._pages:
                 self._flight.advance(now - before)
                 if frame := self._flight.frame():
-                    _call_soon(self._loop, self._publish, frame)
+                    self._call_soon(self._publish, frame)
             before, due = now, max(due + period, time.monotonic() - period)
             self._is_stopping.wait(max(0.0, due - time.monotonic()))
 
@@ -327,16 +300,7 @@ class FlyPage:
                 if message["type"] in ("hold", "sticks"):
                     self._holder = page
             except InputError as error:
-                _call_soon(self._loop, page.tell, str(error))
-
-
-def _call_soon(
-    loop: asyncio.AbstractEventLoop | None, function: Callable[..., None], *values: Any
-) -> None:
-    """Call a function in a loop's thread; do nothing if there is no loop, or it is closed."""
-    if loop is not None:
-        with contextlib.suppress(RuntimeError):  # closed: the server ended first
-            loop.call_soon_threadsafe(function, *values)
+                self._call_soon(page.tell, str(error))
 
 
 def _listen(port: int) -> socket.socket:

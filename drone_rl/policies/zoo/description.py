@@ -22,10 +22,9 @@ from drone_rl.config import (
     BaseTaskSettings,
     CameraSettings,
     DynamicsSettings,
-    read_task,
 )
-from drone_rl.config.configuration import Variant
 from drone_rl.config.networks import Lstm, Network
+from drone_rl.config.parts import Part, Parts
 from drone_rl.config.registry import own_place
 from drone_rl.config.training import MOST_TRANSFORMS, TrainSettings
 from drone_rl.config.transforms import Fault, Frame, Stack, Transform
@@ -37,7 +36,7 @@ from drone_rl.sim.dynamics import Dynamics, make_dynamics
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.plugins import described, errors_of
-from drone_rl.utils.schema import Several, as_mapping, shown
+from drone_rl.utils.schema import Plain, Several, as_mapping, shown
 from drone_rl.utils.seeding import Stream, as_global_stream, plain_generator
 from drone_rl.utils.settings import Settings
 
@@ -308,27 +307,20 @@ def parse(data: Any) -> PolicyDescription:
     special: dict[str, Any] = {
         name: of.read(data[name], name) for name, (of, _) in _OPTIONAL.items() if name in data
     }
-    transforms = Several(_Registered(Transform), 0, MOST_TRANSFORMS)
+    parts = (
+        data["network"],
+        *Several(Plain(), 0, MOST_TRANSFORMS).read(data["transforms"], "transforms"),
+    )
+    if any("_target_" in as_mapping(part, "a part") for part in parts):
+        raise InputError("the policy's description has _target_; files name registered parts alone")
     return PolicyDescription(
-        read_task(data["task"], "task"),
+        BaseTaskSettings.read(data["task"], "task"),
         CameraSettings.read(data["camera"], "camera"),
-        transforms.read(data["transforms"], "transforms"),
-        _Registered(Network).read(data["network"], "network"),
+        Parts(Transform, MOST_TRANSFORMS).read(data["transforms"], "transforms"),
+        Network.read(data["network"], "network"),
         **special,
     )
 
 
-@dataclasses.dataclass(frozen=True)
-class _Registered:
-    """The kind of a mapping with the name of a registered part and its settings."""
-
-    part: type[Variant]
-
-    def read(self, value: Any, where: str) -> Any:
-        """See `drone_rl.utils.schema.Kind`."""
-        values = dict(as_mapping(value, where))
-        return self.part.named(values.pop("name", None), f"{where}.name").read(values, where)
-
-
-def _as_dict(part: Variant) -> dict[str, Any]:
+def _as_dict(part: Part) -> dict[str, Any]:
     return {"name": part.name, **part.values()}

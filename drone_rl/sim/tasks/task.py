@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from drone_rl.config import TASKS, BaseTaskSettings, CameraSettings, TaskSettings, settings_of
+from drone_rl.config import TASKS, BaseTaskSettings, CameraSettings, TaskSettings
 from drone_rl.sim.actions import Actions, Entry
 from drone_rl.sim.dynamics import BodyState, ComputerVision, Dynamics, Obstacles
 from drone_rl.sim.quiet_dm_control import mjcf
@@ -381,7 +381,7 @@ def as_task(task: BaseTaskSettings | Task[Any] | str | None) -> Task[Any]:
     """Return a task by settings or name, cube collection by default; raises `InputError`."""
     task = TaskSettings() if task is None else task
     if isinstance(task, str):
-        task = settings_of(task, "task")()
+        task = BaseTaskSettings.read(task, "task")
     if isinstance(task, Task):
         return task
     if not isinstance(task, BaseTaskSettings):

@@ -1,209 +1,231 @@
-"""Read certificates: untrusted data of bounded size, parsed strictly."""
+"""Certificates: files of bounded size, whose content is checked before use."""
 
-import dataclasses
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from pydantic import Field, PlainSerializer, PlainValidator, model_validator
 
 from drone_rl.config import BaseTaskSettings, TaskSettings
 from drone_rl.policies.zoo import PolicyDescription, fingerprint, parse
-from drone_rl.sim.tasks.collect_cubes import CubesEnd
-from drone_rl.utils import schema
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import parse_json, read_bytes
+from drone_rl.utils.files import as_path
 from drone_rl.utils.limits import CERTIFICATE_BYTES
+from drone_rl.utils.models import Model
+from drone_rl.utils.provenance import Provenance
 from drone_rl.verification.requirements import require_cubes
 
-FORMAT = "drone_rl certificate"
-FORMAT_VERSION = 1
 MAX_CORNERS = 2**20  # corners of all boxes together
 MAX_CUBES = 8
-MAX_OUTCOMES = 2**11
 MAX_STEPS = 20_000  # step counts of all outcomes together
 MIN_BORDER = 2.0**-100  # metres. Smallest nonzero |border|; bounds the bits of exact sums.
 MAX_BORDER = 2.0**20  # metres. Largest |border|
-_NO_ENDS = (CubesEnd.RUNNING, CubesEnd.LOST_CONTROL)  # no control is lost in computer-vision mode
-_ENDS = tuple(end.name.lower() for end in CubesEnd if end not in _NO_ENDS)
 
 
-@dataclasses.dataclass(frozen=True)
-class Outcome:
-    """One outcome of episodes, and the placements that lead to it."""
+def _as_array(value: Any) -> NDArray[np.float64]:
+    try:
+        return np.array(value)
+    except ValueError:  # of lists of different lengths
+        return np.array("")
 
-    end: CubesEnd  # why the episodes end
-    collected: tuple[bool, ...]  # whether each cube is collected by then
-    loops: bool  # whether the drone oscillates until the step limit
-    share: float  # fraction of the volume of all placements
-    steps: Mapping[int, float]  # fraction by number of steps; they may sum to less than `share`
-    boxes: NDArray[np.float64]
+
+def _as_description(value: Any) -> PolicyDescription:
+    return value if isinstance(value, PolicyDescription) else parse(value)
+
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+"""Fraction of the volume of all placements."""
+
+
+class Region(Model):
+    """Placements of the cubes."""
+
+    share: Share
+    """Their fraction of the volume of all placements."""
+    boxes: Annotated[
+        NDArray[np.float64],
+        PlainValidator(_as_array),
+        PlainSerializer(np.ndarray.tolist, return_type=list),
+    ]
     """Metres to the left of each cube, lowest and highest. Shape: (boxes, cubes, 2)."""
 
+    @model_validator(mode="after")
+    def _check_boxes(self) -> Self:
+        boxes = self.boxes
+        if boxes.size == 0:
+            return self
+        if boxes.dtype.kind not in "if" or boxes.ndim != 3 or boxes.shape[2] != 2:
+            raise InputError("boxes must be a list of boxes, each of a pair of numbers per cube")
+        size = abs(boxes)
+        if not ((size == 0) | (size >= MIN_BORDER) & (size <= MAX_BORDER)).all():
+            raise InputError(
+                f"boxes must have borders from {MIN_BORDER:.1g} to {MAX_BORDER:.1g} m, or of 0"
+            )
+        if not (boxes[..., 0] < boxes[..., 1]).all():
+            raise InputError("boxes must have lower borders below their upper borders")
+        return self
+
+
+class Outcome(Region):
+    """One outcome of episodes, and the placements that lead to it."""
+
+    end: Literal["all_cubes", "front_boundary", "side_boundary", "step_limit"]
+    """Why the episodes end."""
+    collected: tuple[bool, ...]
+    """Whether each cube is collected by then."""
+    loops: bool
+    """Whether the drone oscillates until the step limit."""
+    steps: dict[Annotated[int, Field(gt=0)], Annotated[float, Field(gt=0.0, le=1.0)]]
+    """Fraction by number of steps; they may sum to less than `share`."""
+
     def __str__(self) -> str:
-        which = ", ".join(str(i + 1) for i, collected in enumerate(self.collected) if collected)
-        loops = ", to and fro" if self.loops else ""
-        return f"{self.end.name.lower()}{loops}, cubes collected: {which or 'none'}"
+        return ending_text(self.end, self.collected, self.loops)
+
+    @property
+    def is_success(self) -> bool:
+        """Whether all cubes are collected."""
+        return self.end == "all_cubes"
 
 
-@dataclasses.dataclass(frozen=True)
-class Certificate:
-    """Statements about a policy in a task."""
+class Subject(Model):
+    """The policy of a certificate."""
 
-    name: str  # the policy's name, for display
-    weights: str  # see `fingerprint`
-    description: PolicyDescription  # of the policy, with the task of the certificate
+    name: Annotated[str, Field(max_length=200)]
+    """Its name, for display."""
+    weights: Annotated[str, Field(max_length=64)]
+    """Hash of its weights, see `fingerprint`."""
+    description: Annotated[
+        PolicyDescription,
+        PlainValidator(_as_description),
+        PlainSerializer(PolicyDescription.as_dict, return_type=dict),
+    ]
+    """Its description, with the task of the certificate."""
+
+
+class Stated(Model):
+    """What a certificate holds for."""
+
+    logit_gap: float
+    """An action is certain if its logit leads by more than this."""
+    largest_band: float
+    """Width of the widest band of uncertain images around a border, metres."""
+    renderer: str
+
+
+class Effort(Model):
+    """What a proof took."""
+
+    least_gap: float | None
+    """Smallest gap of the two highest logits among the images that were evaluated singly."""
+    pictures: int
+    """Number of evaluated images."""
+    states: int
+    """Visited states of the drone."""
+    most_boxes: int
+    """Most boxes in one of them."""
+    seconds: float
+    """Duration since the proof was started or resumed."""
+    stopped_by: str | None = None
+    """The setting that stopped the proof early."""
+
+
+class Certificate(Provenance, extra="forbid"):
+    """Statements about a policy in a task.
+
+    It can be checked without the prover: the boxes of all outcomes and the undecided ones partition
+    the placements, and every episode from a box must end as stated.
+    """
+
+    format: Literal["drone_rl certificate"] = "drone_rl certificate"
+    format_version: Literal[1] = 1
+    policy: Subject
     outcomes: tuple[Outcome, ...]
-    undecided_share: float
-    undecided: NDArray[np.float64]  # boxes without a statement. Shape: (boxes, cubes, 2)
-    finished: bool  # whether the proof was completed
+    undecided: Region
+    """Placements without a statement."""
+    finished: bool
+    """Whether the proof was completed."""
+    stated: Stated
+    found: Effort
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        task = self.task
+        if task.vertical_bound != 0 or task.lateral_bound == 0:
+            raise InputError(
+                f"its task has vertical_bound={task.vertical_bound} and lateral_bound="
+                f"{task.lateral_bound}; certificates require vertical_bound=0 and lateral_bound "
+                "above 0"
+            )
+        cubes = task.num_cubes
+        if cubes > MAX_CUBES:
+            raise InputError(f"num_cubes={cubes} is out of range; give at most {MAX_CUBES}")
+        shapes = {r.boxes.shape[1] for r in (*self.outcomes, self.undecided) if r.boxes.size}
+        if not shapes | {len(outcome.collected) for outcome in self.outcomes} <= {cubes}:
+            raise InputError(f"outcomes must have {cubes} cubes, as its task")
+        if (steps := sum(len(outcome.steps) for outcome in self.outcomes)) > MAX_STEPS:
+            raise InputError(f"it has {steps} step counts; give at most {MAX_STEPS}")
+        if (count := sum(map(len, self.groups))) > (most := MAX_CORNERS >> cubes):
+            raise InputError(f"it has {count} boxes; give at most {most} for {cubes} cubes")
+        return self
 
     @functools.cached_property
     def task(self) -> TaskSettings:
         """The task of the certificate."""
-        return require_cubes(self.description, "certificates")
+        return require_cubes(self.policy.description, "certificates")
 
     @property
     def groups(self) -> list[NDArray[np.float64]]:
-        """The boxes of each outcome, then the undecided ones."""
-        return [*(outcome.boxes for outcome in self.outcomes), self.undecided]
+        """The boxes of each outcome, then the undecided ones. Shapes: (boxes, cubes, 2)."""
+        regions = (*self.outcomes, self.undecided)
+        return [region.boxes.reshape(-1, self.task.num_cubes, 2) for region in regions]
+
+    @property
+    def success(self) -> float:
+        """Fraction of all placements from which all cubes are certainly collected."""
+        return self._share_of(is_success=True)
+
+    @property
+    def lost(self) -> float:
+        """Fraction of all placements from which they certainly are not."""
+        return self._share_of(is_success=False)
+
+    @property
+    def is_proved(self) -> bool:
+        """Whether the policy succeeds from every placement."""
+        return self._is_everything(is_success=True)
+
+    def _share_of(self, *, is_success: bool) -> float:
+        share = sum(o.share for o in self.outcomes if o.is_success == is_success)  # rounded
+        return min(share, 1.0 if self._is_everything(is_success=is_success) else 1 - 2.0**-53)
+
+    def _is_everything(self, *, is_success: bool) -> bool:
+        kinds = {outcome.is_success for outcome in self.outcomes}
+        return kinds == {is_success} and not len(self.undecided.boxes)
+
+
+def ending_text(end: str, collected: Sequence[bool], loops: bool) -> str:
+    """Return the end of an episode in words."""
+    which = ", ".join(str(i + 1) for i, is_collected in enumerate(collected) if is_collected)
+    return f"{end}{', to and fro' if loops else ''}, cubes collected: {which or 'none'}"
+
+
+def certificate_file(path: str | Path) -> Path:
+    """Return the file of a certificate: a path, or certificate.json in a folder."""
+    path = as_path(path, "certificate")
+    return path / "certificate.json" if path.is_dir() else path
 
 
 def read_certificate(path: Path) -> Certificate:
-    """Read a certificate from a JSON file.
+    """Read a certificate from `certificate.json` of `drone-rl prove`.
 
     Raises:
         InputError: The file is missing, too large, damaged or not a certificate.
     """
-    content = read_bytes(path, CERTIFICATE_BYTES)
-    try:
-        return parse_certificate(parse_json(content, "it"))
-    except InputError as error:
-        raise InputError(f"certificate {path} can't be used: {error}") from None
-
-
-def parse_certificate(data: Any) -> Certificate:
-    """Convert plain data to a certificate.
-
-    Raises:
-        InputError: A key is missing or unknown, or a value has another type or is out of bounds.
-    """
-    if isinstance(data, Mapping) and data.get("format") != FORMAT:
-        raise InputError(f"its format is not {FORMAT!r}; give certificate.json of drone-rl prove")
-    read = _WHOLE.read(data, "certificate")
-    described = parse(read["policy"]["description"])
-    task = require_cubes(described, "certificates")
-    if task.vertical_bound != 0 or task.lateral_bound == 0:
-        raise InputError(
-            f"its task has vertical_bound={task.vertical_bound} and lateral_bound="
-            f"{task.lateral_bound}; certificates require vertical_bound=0 and lateral_bound above 0"
-        )
-    if task.num_cubes > MAX_CUBES:
-        raise InputError(f"num_cubes={task.num_cubes} is out of range; give at most {MAX_CUBES}")
-    cubes = task.num_cubes
-    outcomes = tuple(
-        _read_outcome(one, f"outcomes[{i}]", cubes) for i, one in enumerate(read["outcomes"])
-    )
-    undecided = _read_boxes(read["undecided"]["boxes"], "undecided.boxes", cubes)
-    if (steps := sum(len(outcome.steps) for outcome in outcomes)) > MAX_STEPS:
-        raise InputError(f"it has {steps} step counts; give at most {MAX_STEPS}")
-    count = sum(len(outcome.boxes) for outcome in outcomes) + len(undecided)
-    if count > (most := MAX_CORNERS >> cubes):
-        raise InputError(f"it has {count} boxes; give at most {most} for {cubes} cubes")
-    return Certificate(
-        name=read["policy"]["name"],
-        weights=read["policy"]["weights"],
-        description=described,
-        outcomes=outcomes,
-        undecided_share=read["undecided"]["share"],
-        undecided=undecided,
-        finished=read["finished"],
-    )
-
-
-_LATER = schema.Instance(object)  # anything; parsed once the number of cubes is known
-_SHARE = schema.Real(0.0, 1.0)
-_STATED_SHARE = schema.Real(0.0, 1.0, is_above=True)  # else any number of steps would be stated
-_OUTCOME = schema.Record(
-    {
-        "end": schema.OneOf(_ENDS),
-        "collected": schema.Several(schema.Flag(), 1, MAX_CUBES),
-        "loops": schema.Flag(),
-        "share": _SHARE,
-        "steps": _LATER,
-        "boxes": _LATER,
-    }
-)
-_ORIGIN = {"versions": schema.Plain(), "git_revision": schema.Plain(), "machine": schema.Plain()}
-_WHOLE = schema.Record(
-    {
-        "format": schema.OneOf((FORMAT,)),
-        "format_version": schema.Whole(FORMAT_VERSION, FORMAT_VERSION),
-        "policy": schema.Record(
-            {"name": schema.Text(), "weights": schema.Text(64), "description": schema.Plain()}
-        ),
-        "outcomes": schema.Several(_OUTCOME, 0, MAX_OUTCOMES),
-        "undecided": schema.Record({"share": _SHARE, "boxes": _LATER}),
-        "finished": schema.Flag(),
-        "stated": schema.Plain(),
-        "found": schema.Plain(),
-        **_ORIGIN,
-    },
-    optional=frozenset(_ORIGIN),
-)
-
-
-def _read_outcome(read: Mapping[str, Any], where: str, cubes: int) -> Outcome:
-    if len(read["collected"]) != cubes:
-        raise InputError(
-            f"{where}.collected has {len(read['collected'])} values; give {cubes}, one per cube"
-        )
-    return Outcome(
-        end=CubesEnd[read["end"].upper()],
-        collected=read["collected"],
-        loops=read["loops"],
-        share=read["share"],
-        steps=_read_steps(read["steps"], f"{where}.steps"),
-        boxes=_read_boxes(read["boxes"], f"{where}.boxes", cubes),
-    )
-
-
-def _read_steps(value: Any, where: str) -> dict[int, float]:
-    """Parse fractions above 0 by number of steps; the numbers have no leading zeros."""
-    steps = {}
-    for name, share in schema.Plain().read(schema.as_mapping(value, where), where).items():
-        if not (name.isascii() and name.isdecimal() and len(name) < 7 and name[0] != "0"):
-            raise InputError(
-                f"{where}.{schema.shown(name)} is not a number of steps; give one above 0"
-            )
-        steps[int(name)] = _STATED_SHARE.read(share, f"{where}.{name}")
-    return steps
-
-
-def _read_boxes(value: Any, where: str, cubes: int) -> NDArray[np.float64]:
-    """Parse lists of boxes, each a list of [low, high] pairs."""
-    shape = f"give a list of boxes, each of {cubes} pairs of numbers [low, high], low below high"
-    if value == []:
-        return np.empty((0, cubes, 2))
-    try:
-        boxes = np.array(value)
-    except ValueError:  # of lists of different lengths
-        boxes = np.empty(0)
-    if boxes.dtype.kind not in "if" or boxes.shape[1:] != (cubes, 2):
-        raise InputError(f"{where} has the wrong shape or values other than numbers; {shape}")
-    size = abs(boxes)
-    if not ((size == 0) | (size >= MIN_BORDER) & (size <= MAX_BORDER)).all():
-        raise InputError(
-            f"{where} contains a border whose magnitude is above {MAX_BORDER:.1g} m, or below "
-            f"{MIN_BORDER:.1g} m and not 0; {shape}"
-        )
-    empty = np.flatnonzero((boxes[..., 0] >= boxes[..., 1]).any(1))
-    if len(empty):
-        raise InputError(f"{where}[{empty[0]}] is empty; {shape}")
-    return boxes.astype(np.float64)
+    return Certificate.read_json(path, CERTIFICATE_BYTES)
 
 
 def check_same_policy(
@@ -220,12 +242,12 @@ def check_same_policy(
         InputError: Another network, camera or task, or the policy has memory or camera faults.
     """
     require_cubes(described, "certificates")
-    if certificate.weights != (policy_hash := fingerprint(weights)):
+    if certificate.policy.weights != (policy_hash := fingerprint(weights)):
         raise InputError(
-            f"the certificate is for a network with hash {certificate.weights[:12]}..., but the "
-            f"policy's network has {policy_hash[:12]}...; set policy to the file that was proved"
+            f"the certificate is for a network with hash {certificate.policy.weights[:12]}..., but "
+            f"the policy's has {policy_hash[:12]}...; set policy to the file that was proved"
         )
-    stated, own_parts = certificate.description.as_dict(), described.as_dict()
+    stated, own_parts = certificate.policy.description.as_dict(), described.as_dict()
     for part in ("appearance", "dynamics", "actions", "camera", "transforms", "network"):
         if stated.get(part) != own_parts.get(part):
             raise InputError(

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from pydantic import computed_field
 from tensordict import TensorDict
 from torch import Tensor
 
@@ -17,10 +18,12 @@ from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.tasks import State
 from drone_rl.sim.tasks.collect_cubes import CubesEnd, WorldState
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.models import Stored
 from drone_rl.verification.checker.certificate import (
     Certificate,
     Outcome,
     check_same_policy,
+    ending_text,
     read_certificate,
 )
 from drone_rl.verification.checker.consistency import (
@@ -39,12 +42,13 @@ _SHORT_LOOP = 2  # up to so many repetitions, a loop need not be stated as one
 ProgressCallback = Callable[[int, int], None]  # called with the number done, and of all
 
 
-@dataclasses.dataclass(frozen=True)
-class Contradiction:
+class Contradiction(Stored):
     """An episode that ended otherwise than stated."""
 
-    where: str  # why it was simulated: "inside" a box, at a "border", or "anywhere"
-    placement: tuple[float, ...]  # metres to the left of each cube
+    where: str
+    """Why it was simulated: "inside" a box, at a "border", or "anywhere"."""
+    placement: tuple[float, ...]
+    """Metres to the left of each cube."""
     stated: str
     found: str
 
@@ -55,35 +59,29 @@ class Contradiction:
         )
 
 
-@dataclasses.dataclass(frozen=True)
-class CheckFindings:
+class CheckFindings(Stored):
     """The result of a check."""
 
-    inconsistencies: tuple[str, ...]  # impossible or refuted statements, without single episodes
-    contradictions: tuple[Contradiction, ...]  # the first episodes that ended otherwise than stated
-    contradicted: int  # number of such episodes
-    flights: Mapping[str, int]  # number of episodes, by why they were simulated
+    findings: tuple[str, ...]
+    """Impossible or refuted statements, without single episodes."""
+    contradictions: tuple[Contradiction, ...] = ()
+    """The first episodes that ended otherwise than stated."""
+    contradicted: int = 0
+    """Number of such episodes."""
+    flights: dict[str, int] = {}
+    """Number of episodes, by why they were simulated."""
 
+    @computed_field
     @property
     def accepted(self) -> bool:
         """Whether nothing contradicts the certificate."""
-        return not self.inconsistencies and not self.contradicted
+        return not self.findings and not self.contradicted
 
     def lines(self) -> list[str]:
         """Return each finding in one line."""
-        lines = [*self.inconsistencies, *map(str, self.contradictions)]
+        lines = [*self.findings, *map(str, self.contradictions)]
         more = self.contradicted - len(self.contradictions)
         return [*lines, f"and {more} flights more ended otherwise than stated"] if more else lines
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values, as in `check.json`."""
-        return {
-            "accepted": self.accepted,
-            "findings": list(self.inconsistencies),
-            "contradicted": self.contradicted,
-            "contradictions": [dataclasses.asdict(c) for c in self.contradictions],
-            "flights": dict(self.flights),
-        }
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,6 +92,10 @@ class EpisodeEnds:
     collected: NDArray[np.bool_]  # (k, cubes); whether each cube was collected
     steps: NDArray[np.int64]  # (k,); number of steps
     repeats: NDArray[np.int64]  # (k,); final steps whose state equals that of two steps before
+
+    def name(self, i: int) -> str:
+        """Return the name of the end of one episode, as in certificates."""
+        return CubesEnd(self.end[i]).name.lower()
 
 
 class Simulator:
@@ -191,11 +193,11 @@ def check_certificate(
         InputError: There is no such device.
     """
     if inconsistencies := tuple(find_inconsistencies(certificate)):
-        return CheckFindings(inconsistencies, (), 0, {})
+        return CheckFindings(findings=inconsistencies)
     sample = sample_placements(certificate, flights, np.random.default_rng(seed))
     stated = sample.outcome < len(certificate.outcomes)
     points, why = sample.points[stated], sample.why[stated]
-    with closing(Simulator(certificate.description, weights, device, renderer)) as simulator:
+    with closing(Simulator(certificate.policy.description, weights, device, renderer)) as simulator:
         rollouts = simulator.fly(points, report)
         some = np.arange(len(rollouts.end))[:: max(1, len(rollouts.end) // MAX_EXACT)]
         simulator.compute_in(torch.float64)
@@ -209,12 +211,20 @@ def check_certificate(
     counts = find_wrong_step_counts(certificate.outcomes, sample.outcome[anywhere], steps[anywhere])
     kept = [
         Contradiction(
-            str(why[i]), tuple(points[i].tolist()), _stated(outcomes[i]), _found(rollouts, i)
+            where=str(why[i]),
+            placement=tuple(points[i].tolist()),
+            stated=_stated(outcomes[i]),
+            found=_found(rollouts, i),
         )
         for i in wrong[:MAX_KEPT]
     ]
     count = {kind: int((why == kind).sum()) for kind in (INSIDE, BORDER, ANYWHERE)}
-    return CheckFindings((*rounded, *counts), tuple(kept), len(wrong), count)
+    return CheckFindings(
+        findings=(*rounded, *counts),
+        contradictions=tuple(kept),
+        contradicted=len(wrong),
+        flights=count,
+    )
 
 
 def read_validated(
@@ -234,9 +244,9 @@ def read_validated(
 
 def ends_as_stated(outcome: Outcome, rollouts: EpisodeEnds, i: int) -> bool:
     """Return whether episode i ended as stated, after a stated number of steps."""
-    if rollouts.end[i] != outcome.end or tuple(rollouts.collected[i]) != outcome.collected:
+    if (rollouts.name(i), tuple(rollouts.collected[i])) != (outcome.end, outcome.collected):
         return False
-    if outcome.end == CubesEnd.STEP_LIMIT:
+    if outcome.end == "step_limit":
         loops = rollouts.repeats[i] > (0 if outcome.loops else _SHORT_LOOP)
         if loops != outcome.loops:
             return False
@@ -262,7 +272,6 @@ def _stated(outcome: Outcome) -> str:
 
 
 def _found(rollouts: EpisodeEnds, i: int) -> str:
-    end, collected = CubesEnd(rollouts.end[i]), tuple(map(bool, rollouts.collected[i]))
-    loops = end == CubesEnd.STEP_LIMIT and bool(rollouts.repeats[i])
-    as_outcome = Outcome(end, collected, loops, 0.0, {}, np.zeros((0, len(collected), 2)))
-    return f"{as_outcome}, steps: {rollouts.steps[i]}"
+    collected = rollouts.collected[i].tolist()
+    loops = rollouts.end[i] == CubesEnd.STEP_LIMIT and bool(rollouts.repeats[i])
+    return f"{ending_text(rollouts.name(i), collected, loops)}, steps: {rollouts.steps[i]}"

@@ -14,7 +14,6 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.utils.intervals import proportion
 from drone_rl.verification.checker.certificate import Certificate, Outcome
 
@@ -75,8 +74,8 @@ def find_inconsistencies(certificate: Certificate) -> Iterator[str]:
         ]
         yield from (f"outcome {i} ({outcome}) {what}" for what in wrong)
     yield from _missing(certificate)
-    left = volume(certificate.undecided) / whole
-    yield from (f"undecided {what}" for what in _wrong_share(certificate.undecided_share, left))
+    left = volume(certificate.undecided.boxes) / whole
+    yield from (f"undecided {what}" for what in _wrong_share(certificate.undecided.share, left))
     if not certificate.finished and not left:
         yield "finished is false, but nothing is undecided"
 
@@ -109,13 +108,13 @@ def _misfits(certificate: Certificate, whole: Fraction) -> Iterator[str]:
 
 def _impossible(outcome: Outcome, step_limit: int) -> Iterator[str]:
     """Yield what the rules of the task exclude."""
-    if (outcome.end == CubesEnd.ALL_CUBES) != all(outcome.collected):
+    if outcome.is_success != all(outcome.collected):
         yield "can't be: a flight ends with all_cubes if and only if all are collected"
-    if outcome.loops and outcome.end != CubesEnd.STEP_LIMIT:
+    if outcome.loops and outcome.end != "step_limit":
         yield "can't be: an oscillation ends at the step limit"
     if any(steps > step_limit for steps in outcome.steps):
         yield f"has more steps than step_limit={step_limit}"
-    if outcome.end == CubesEnd.STEP_LIMIT and {*outcome.steps} - {step_limit}:
+    if outcome.end == "step_limit" and {*outcome.steps} - {step_limit}:
         yield f"has another number of steps than step_limit={step_limit}"
     if (total := sum(outcome.steps.values())) > outcome.share * (1 + TOLERANCE):
         yield f"has a share of {outcome.share!r}, but its steps add up to {total!r}"

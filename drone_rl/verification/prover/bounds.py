@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import ImageNetwork
+from drone_rl.policies.layers import Layer, Unsupported, as_layers
 from drone_rl.policies.rounded_layers import SLACK, UNIT
 from drone_rl.policies.rounding import PIXEL_UNITS, RoundingBound
 from drone_rl.utils.errors import InputError
@@ -25,24 +26,20 @@ class NetworkBounds:
     homogeneous, so biases are scaled instead of halving the sums.
     """
 
-    def __init__(self, network: nn.Module, gap: float) -> None:
+    def __init__(self, network: ImageNetwork, gap: float) -> None:
         """Prepare the layers.
 
         An action is certain only if its logit leads by more than `gap` and by more than the bound
         on rounding errors, see `drone_rl.policies.rounding`.
 
         Raises:
-            InputError: `RoundingBound` does not support the network.
+            InputError: `as_layers` does not support the network.
         """
-        rounding = RoundingBound.find(network)
-        if rounding is None or not isinstance(network, PolicyNetwork):
-            raise InputError(
-                "proofs support only networks of convolutions without padding, linear layers, "
-                f"ReLU, MaxPool2d and Flatten in turn, got {type(network).__name__}; prove another "
-                "policy"
-            )
-        self.gap, self._rounding = gap, rounding
-        *inner, last = network.layers
+        layers = as_layers(network)
+        if isinstance(layers, Unsupported):
+            raise InputError(f"proofs do not support it: {layers.reason}; prove another policy")
+        self.gap, self._rounding = gap, RoundingBound(layers, network.actions)
+        *inner, last = layers.in_turn
         scale, self._steps = 2, []
         for layer in inner:
             self._steps.append((_step(layer, scale), scale))
@@ -122,7 +119,7 @@ _LINEAR = (*_AFFINE, nn.Flatten)  # sums and differences pass through them separ
 Step = Callable[[Tensor, Tensor], tuple[Tensor, Tensor]]  # of sums and differences of interval ends
 
 
-def _step(layer: nn.Module, scale: int) -> Step:
+def _step(layer: Layer, scale: int) -> Step:
     """Return how intervals pass through a layer; `scale` is the factor of sums before it."""
     if isinstance(layer, _AFFINE):
         weight, bias = layer.weight.detach(), layer.bias

@@ -60,12 +60,12 @@ class Prover:
         self.parts = partition_placements(spec, most_combinations)  # not yet started
         self.part = self.parts[:0]  # in progress, if any
         self.done = ProofFindings({}, self.parts[:0], {})  # findings of the parts before
-        self.waiting: dict[LatticeState, list[Boxes]] = defaultdict(list)
-        self.ended: dict[tuple[Ending, int], list[Boxes]] = defaultdict(list)
+        self.waiting: dict[LatticeState, list[Boxes]] = {}
+        self.ended: dict[tuple[Ending, int], list[Boxes]] = {}
         """Of the part in progress, by number of steps."""
         self.forked: list[Boxes] = []  # placements with several possible actions for the first time
         self.longest: dict[LatticeState, int] = {}  # most steps of forks to each state
-        self.fork_ends: dict[Ending | None, list[Boxes]] = defaultdict(list)  # by ending, if known
+        self.fork_ends: dict[Ending | None, list[Boxes]] = {}  # by ending, if known
         self.boxes_under_way = 0  # boxes in all waiting states
         self.num_states = self.num_images = self.most_boxes = 0  # states, images, boxes of a state
         self.decided = 0.0  # volume known; of the part in progress, without forks
@@ -112,7 +112,7 @@ class Prover:
 
     def wait(self, state: LatticeState, boxes: Boxes) -> None:
         """Add placements to be followed from a state."""
-        self.waiting[state].append(boxes)
+        self.waiting.setdefault(state, []).append(boxes)
         self.boxes_under_way += len(boxes)
 
     def findings(self) -> ProofFindings:
@@ -160,10 +160,10 @@ class Prover:
     def _end(self, state: LatticeState, ending: Ending, boxes: Boxes) -> None:
         if state.is_fork:  # a loop with an uncertain action may be left at any time
             is_known = not ending.loops and ending.reason is not CubesEnd.STEP_LIMIT
-            self.fork_ends[ending if is_known else None].append(boxes)
+            self.fork_ends.setdefault(ending if is_known else None, []).append(boxes)
             return
         steps = self.lattice.task.step_limit if ending.loops else state.steps
-        self.ended[ending, steps].append(boxes)
+        self.ended.setdefault((ending, steps), []).append(boxes)
         self.decided += float(volumes(boxes).sum())
 
     def _cut(self, state: LatticeState, boxes: Boxes) -> Iterator[tuple[int, Boxes]]:
@@ -261,7 +261,7 @@ def combine(some: Sequence[ProofFindings]) -> ProofFindings:
     return ProofFindings(
         {ending: np.concatenate(boxes) for ending, boxes in endings.items()},
         np.concatenate([findings.undecided for findings in some]),
-        dict(steps),
+        {ending: dict(volume) for ending, volume in steps.items()},
     )
 
 

@@ -5,7 +5,7 @@ import copy
 import pytest
 from hydra import compose, initialize_config_dir
 
-from drone_rl.cli.hydra.composition import read_settings, register_schemas
+from drone_rl.cli.hydra.composition import read_settings, store_defaults
 from drone_rl.cli.main import COMMANDS, find_command
 from drone_rl.utils.settings import conf_dir
 
@@ -19,8 +19,8 @@ def commands():
 
 @pytest.fixture(scope="session")
 def registered():
-    """Schemas of all commands."""
-    register_schemas(commands())
+    """Defaults of all commands."""
+    store_defaults(commands())
 
 
 @pytest.fixture(scope="session")

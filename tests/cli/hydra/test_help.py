@@ -9,27 +9,17 @@ from pathlib import Path
 import pytest
 
 from drone_rl.cli.commands import TABLE
-from drone_rl.cli.hydra.composition import register_schemas
-from drone_rl.cli.hydra.help import comments, next_steps, show_help
+from drone_rl.cli.hydra.composition import store_defaults
+from drone_rl.cli.hydra.help import next_steps, show_help
 from drone_rl.cli.hydra.mistakes import composed
 from drone_rl.cli.main import find_command
 from drone_rl.utils.errors import InputError
 from tests.cli.hydra.conftest import FILES
 
-CONF = Path(__file__).parents[3] / "conf"
-
-
-def test_a_file_has_the_comments_of_its_parents():
-    texts = comments("train", CONF, {"transforms": "original", "task": "collect_one"})
-    assert texts["transforms.gray"] == "RGB bytes to gray from 0 to 1."
-    assert texts["transforms.crop.top"] == "First row."
-    assert texts["task.spacing"] == "Distance in x from one cube to the next."
-    assert texts["seed"].startswith("Root of all random streams")
-
 
 @pytest.mark.parametrize("command", FILES)
 def test_every_setting_of_every_command_is_explained(command, config, capsys):
-    show_help(command, CONF, ["--help"], find_command(command.replace("_", "-")), ["all"])
+    show_help(command, ["--help"], find_command(command.replace("_", "-")), ["all"])
     lines = capsys.readouterr().out.partition("used now:\n")[2].partition("\nexamples")[0]
     for before, line in itertools.pairwise(lines.splitlines()):
         is_setting = before[:3].strip() != ""
@@ -37,7 +27,7 @@ def test_every_setting_of_every_command_is_explained(command, config, capsys):
 
 
 def test_help_shows_units_defaults_and_choices(config, capsys):
-    show_help("train", CONF, ["--help", "seed=7"], find_command("train"))
+    show_help("train", ["--help", "seed=7"], find_command("train"))
     text = capsys.readouterr().out
     assert "  trainer.total_frames=2000000  (frames)\n      Stop after" in text
     assert "  seed=7\n" in text
@@ -47,25 +37,25 @@ def test_help_shows_units_defaults_and_choices(config, capsys):
 
 def test_help_of_a_group_or_setting_shows_only_that(config, capsys):
     train = find_command("train")
-    show_help("train", CONF, ["--help"], train, ["optimizer", "experiment", "num_cubes"])
+    show_help("train", ["--help"], train, ["optimizer", "experiment", "num_cubes"])
     text = capsys.readouterr().out
     assert "  optimizer=adam\n      One of: adam, sgd.\n" in text and "  experiment=" in text
     assert "  optimizer.lr=0.001\n      Learning rate.\n" in text
-    assert "  task.num_cubes=3\n" in text
+    assert "  task.num_cubes=3  (cubes)\n" in text
     assert "spacing" not in text and "trainer" not in text.partition("examples")[0]
     with pytest.raises(InputError, match=r"^drone-rl train has no setting foo; "):
-        show_help("train", CONF, ["--help"], train, ["foo"])
+        show_help("train", ["--help"], train, ["foo"])
 
 
 @pytest.mark.parametrize("name", TABLE)
 def test_examples_are_command_lines_of_the_command(name):
     command, lines = name.replace("-", "_"), [line for line, _ in TABLE[name]["examples"]]
-    register_schemas({command: find_command(name)})
+    store_defaults({command: find_command(name)})
     for line in lines:
         first, second, *words = line.split()
         assert (first, second) == ("drone-rl", name)
         typed = find_command(name).prepare([w for w in words if "resume=" not in w])
-        composed(command, CONF, [w for w in typed if not w.startswith("-") and "," not in w])
+        composed(command, [w for w in typed if not w.startswith("-") and "," not in w])
 
 
 def test_the_policy_and_the_next_commands():
@@ -89,8 +79,8 @@ def test_next_commands_exist_with_these_settings(name, tmp_path):
     for line in lines:
         if line.startswith("  drone-rl"):
             command, *words = line.split()[1:]
-            register_schemas({command: find_command(command)})
-            composed(command, CONF, words)
+            store_defaults({command: find_command(command)})
+            composed(command, words)
 
 
 def test_next_commands_name_existing_files(tmp_path):

@@ -72,7 +72,7 @@ def test_an_interrupted_sweep_logs_the_command_that_resumes_it(in_process, monke
     [
         ([*GRID, "hydra.sweep.subdir=${seed}"], "runs 0 and 1 have the same folder"),
         ([*GRID, "hydra.sweep.subdir=../${hydra.job.num}"], "'../0' is not inside"),
-        ([*GRID, "seed=0,x"], "seed=x Value 'x' of type 'str'"),
+        ([*GRID, "sed=0,1"], "has no setting sed"),
         ([*GRID, "seed=range(0)"], "a sweep of no runs"),
     ],
 )

@@ -63,14 +63,6 @@ def test_a_move_ends_contacts_except_with_what_is_still_touched():
     assert [names(record.read()) for _ in range(2)] == ["wall", None]
 
 
-def test_what_is_touched_at_takeoff_does_not_become_new():
-    record = CollisionRecord()
-    record.add(contact("Ground", 0.0))
-    record.forget()
-    record.add(contact("Ground", PERIOD))
-    assert record.read() == (None, False)
-
-
 def test_a_touched_cube_is_kept_at_takeoff_until_it_is_read():
     record = CollisionRecord()
     record.add(contact("Ground", 0.0))

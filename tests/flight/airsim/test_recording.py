@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from drone_rl.flight.airsim.recording import to_letters
 from tests.flight.airsim.conftest import pose
 
 
@@ -23,17 +22,6 @@ def test_a_recording_is_a_table_and_images(start, tmp_path):
     assert np.diff(rows["TimeStamp"]).mean() == pytest.approx(50.0, abs=1.0)  # milliseconds
     for name in rows["ImageFile"]:
         assert Image.open(folder / "images" / name).size == (256, 144)
-
-
-def test_numpy_reads_rows_of_any_name(start, tmp_path):
-    text = """{"SimMode": "ComputerVision", "Vehicles": {"red drone #1": {}}}"""
-    _server, client = start(text, recordings=tmp_path)
-    client.call("startRecording")
-    client.call("simContinueForTime", 0.1)
-    client.call("stopRecording")
-    (table,) = tmp_path.glob("*/airsim_rec.txt")
-    rows = np.genfromtxt(table, names=True, dtype=None, encoding="utf-8")
-    assert set(rows["VehicleName"]) == {"red_drone__1"}
 
 
 def test_rows_and_images_are_those_of_the_settings(start, tmp_path):
@@ -59,13 +47,13 @@ def test_rows_and_images_are_those_of_the_settings(start, tmp_path):
     assert Image.open(table.parent / "images" / ids).size == (256, 144)
 
 
-def test_names_of_files_hold_letters_alone():
-    assert to_letters("../a b/ü") == "___a_b__"
-
-
 def test_vehicles_whose_names_have_the_same_letters_have_their_own_images(start, tmp_path):
-    text = """{"SimMode": "ComputerVision", "Vehicles": {"A-1": {}, "A_1": {"X": 4}}}"""
+    names = '"A-1": {}, "A_1": {"X": 4}, "red drone #1": {}, "../": {}'
+    text = f'{{"SimMode": "ComputerVision", "Vehicles": {{{names}}}}}'
     _server, client = start(text, recordings=tmp_path)
     client.call("startRecording")
     client.call("stopRecording")
-    assert len([*tmp_path.glob("*/images/*.png")]) == 2
+    assert len([*tmp_path.glob("*/images/*.png")]) == 4
+    (table,) = tmp_path.glob("*/airsim_rec.txt")
+    rows = np.genfromtxt(table, names=True, dtype=None, encoding="utf-8")
+    assert rows["VehicleName"].tolist() == ["A-1", "A_1", "red_drone__1", "../"]

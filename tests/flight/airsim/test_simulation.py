@@ -6,6 +6,7 @@ import pytest
 
 from drone_rl.config.commands import ServeSettings
 from drone_rl.flight.airsim.messages import Pose, nanoseconds
+from drone_rl.flight.airsim.methods import call
 from drone_rl.flight.airsim.settings_file import parse_settings
 from drone_rl.flight.airsim.simulation import Simulation, Wait
 
@@ -71,7 +72,7 @@ def test_time_stamps_of_vehicles_go_on_after_a_reset_and_from_their_creation(mak
         assert vehicle.rotor_states()["timestamp"] == now
     simulation.wait_for(simulation.continue_for(1.0), [].append)
     simulation.advance(60.0, math.inf)
-    read = [simulation.find("").sensor(kind)["time_stamp"] for kind in ("imu", "barometer")]
+    read = [call(simulation, f"get{kind}Data", [])["time_stamp"] for kind in ("Imu", "Barometer")]
     read.append(simulation.find("").collision()["time_stamp"])
     assert min(read) > now and max(read) <= simulation.stamp + 1000  # float32
 

@@ -3,11 +3,10 @@
 import math
 
 import pytest
-import torch
 
 from drone_rl.flight.airsim.messages import Pose
 from drone_rl.flight.commands.command import PilotError
-from drone_rl.sim.coordinates import HOME, GeoPoint, geo_from_world
+from drone_rl.sim.coordinates import HOME
 from drone_rl.sim.dynamics.state import LOST
 from tests.flight.airsim.flying import BOX, fly, make
 
@@ -54,18 +53,6 @@ def test_a_velocity_that_is_set_is_no_acceleration():
     assert [*found["linear_velocity"].values()] == [3.0, 0.0, 0.0]
     assert [*found["linear_acceleration"].values()] == [0.0, 0.0, 0.0]
     assert [*found["angular_acceleration"].values()] == [0.0, 0.0, 0.0]
-
-
-def test_line_of_sight():
-    vehicle = make(obstacles=BOX)
-
-    def at(x, y, z):
-        return GeoPoint(*geo_from_world(torch.tensor([x, y, z], dtype=torch.float64)).tolist())
-
-    assert not vehicle.sees(at(10.0, 0.0, 0.5))
-    assert vehicle.sees(at(2.0, 0.0, 0.5))
-    assert vehicle.sees(at(10.0, 10.0, 0.5))
-    assert not vehicle.sees(at(2.0, 0.0, -1.0))
 
 
 def test_rotors_of_a_hovering_drone_carry_its_weight_and_the_past_is_not_kept():

@@ -5,7 +5,7 @@ import math
 import pytest
 
 import drone_rl
-from drone_rl.flight.commands.computer_vision import KEYS, STEP, TURN
+from drone_rl.flight.commands.drone import KEYS, STEP, TURN
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 

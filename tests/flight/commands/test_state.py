@@ -5,7 +5,7 @@ import torch
 
 from drone_rl.config.sensors import GpsSettings, SensorSettings
 from drone_rl.flight.commands.pilot import Pilot
-from drone_rl.flight.commands.state import Collision, LandedState, PilotState, Trajectory
+from drone_rl.flight.commands.state import Collision, Trajectory
 from drone_rl.sim.coordinates import HOME, Attitude, attitude_of
 from drone_rl.sim.dynamics.state import DEPTH, GROUND, NORMAL, THING
 from tests.perfect_sensors import without_noise
@@ -52,13 +52,6 @@ def test_contacts_have_names(hovering):
     assert Collision.of(body).thing == "obstacle 3"
 
 
-def test_speed():
-    state = PilotState(
-        0.0, (0, 0, 0), (2, 3, 6), Attitude(0, 0, 0), LandedState.FLYING, True, False, None
-    )
-    assert state.speed == 7.0
-
-
 PERFECT = without_noise(SensorSettings(gps=GpsSettings(latency=0.0)))
 
 
@@ -77,15 +70,6 @@ def test_of_a_flight_they_tell_height_and_place():
     north = math.radians(float(place.place[0]) - HOME.latitude) * 6.37e6
     assert place.is_valid and north == pytest.approx(x, abs=0.3)
     assert pilot.sensors.time == pytest.approx(pilot.time)
-
-
-def test_noise_is_the_seeds():
-    told = []
-    for seed in (1, 1, 2):
-        pilot = Pilot(seed=seed, sensors=SensorSettings())
-        pilot.advance(0.2)
-        told.append(pilot.sensors.barometer().pressure)
-    assert told[0] == told[1] != told[2]
 
 
 def test_where_nobody_asked_they_are_turned_on_by_the_first_look():

@@ -5,7 +5,7 @@ import importlib.resources
 import pytest
 
 pytest.importorskip("selenium.webdriver")
-pytest.importorskip("uvicorn")
+pytest.importorskip("websockets")
 
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By

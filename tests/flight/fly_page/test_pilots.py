@@ -120,14 +120,6 @@ def test_computer_vision_keys_step_the_pose(make_world):
     assert world.worlds.state.steps.tolist() == [0]  # no time passes
 
 
-def test_poses_stay_above_the_ground(make_world):
-    world, controls = make_world(), Controls()
-    pilot = make_pilot("computer_vision", world, Steps().note)
-    controls.hold(["down"])
-    fly(pilot, controls, 3.0)
-    assert 0.3 <= place(world)[2] < 0.55
-
-
 def test_velocities_accelerate_the_drone_and_letting_go_stops_it(make_world):
     world, controls = make_world(), Controls()
     pilot = make_pilot("simple_flight", world, Steps().note)

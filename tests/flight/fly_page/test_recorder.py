@@ -41,18 +41,6 @@ def test_steps_of_a_person_become_a_demonstration(make_flight, written, tmp_path
     assert one.conditions == demonstrations.FlightConditions(*flight.world.conditions)
 
 
-def test_each_episode_of_the_policy_is_a_demonstration(make_flight, written):
-    flight = make_flight()
-    flight.handle({"type": "record", "on": True})
-    flight.handle({"type": "pilot", "pilot": "policy"})
-    run(flight, 40.0)
-    flight.handle({"type": "record", "on": False})
-    assert len(written) >= 2
-    for _, one in written[:2]:
-        assert one.pilot == "policy" and one.done.sum() == 1 and one.done[-1]
-        assert one.rewards.sum() == 3.0
-
-
 def test_recording_switches_to_the_policys_actions(make_flight, written):
     flight = make_flight(mode="simple_flight")
     flight.handle({"type": "record", "on": True})

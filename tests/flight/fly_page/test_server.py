@@ -15,7 +15,6 @@ from drone_rl.flight.fly_page import server
 from drone_rl.utils.errors import InputError
 from tests.flight.fly_page.conftest import decode
 
-pytest.importorskip("uvicorn")
 client = pytest.importorskip("websockets.sync.client")
 exceptions = pytest.importorskip("websockets.exceptions")
 

@@ -82,12 +82,6 @@ def test_the_climb_remembers():
     assert sticks.throttle == pytest.approx(0.5 + 0.5 * (0.4 + 0.3))
 
 
-def test_in_the_air_the_throttle_never_says_that_it_stands():
-    sticks, climb = hands(Setpoint((0.0, 0.0, -9.0)), readings())
-    assert sticks.throttle == 0.1
-    assert climb == pytest.approx(-0.18)
-
-
 def test_the_way_to_a_place_is_straight_and_within_limits():
     """A quarter of 6 m/s for each metre, 6 m/s at most along the line; up at 4 m/s at most."""
     assert velocity_to(np.array([1.0, 0.0, -0.4]), readings(), SETTINGS) == (1.5, 0.0, -0.4)

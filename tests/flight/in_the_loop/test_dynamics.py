@@ -12,7 +12,7 @@ from drone_rl.config import DynamicsSettings
 from drone_rl.flight.betaflight.sitl import betaflight_drone
 from drone_rl.flight.in_the_loop import drone as drone_module
 from drone_rl.flight.in_the_loop import dynamics as module
-from drone_rl.flight.in_the_loop.drone import DroneInTheLoop, FlightControllerError, NotReadyError
+from drone_rl.flight.in_the_loop.drone import DroneInTheLoop, NotReadyError
 from drone_rl.flight.in_the_loop.dynamics import InTheLoopDynamics
 from drone_rl.sim.dynamics import FlightState, Obstacles, Quadrotor
 from tests.flight.arming import arm_at_once
@@ -97,13 +97,6 @@ def test_a_firmware_that_never_arms(monkeypatch):
     dynamics = InTheLoopDynamics(drone(Even(arms=False)), SETTINGS)
     with pytest.raises(NotReadyError, match="refuses to arm"):
         dynamics.begin(dynamics.start(PLACE))
-
-
-def test_a_policy_that_thinks_for_too_long(begun, monkeypatch):
-    dynamics, body = begun
-    monkeypatch.setattr(module, "LONGEST_DECISION", 0.0)
-    with pytest.raises(FlightControllerError, match="the policy took"):
-        dynamics.step(body, torch.tensor([0]))
 
 
 def test_it_goes_where_actions_lead(stub, tmp_path, monkeypatch):

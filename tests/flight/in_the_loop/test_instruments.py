@@ -63,18 +63,3 @@ def test_place_and_altitude_are_counted_from_home():
     assert readings.place.tolist() == [50.0, 8.0, 105.0]
     assert readings.altitude == 105.0
     assert readings.pressure == pytest.approx(100_070.0, abs=0.5)
-
-
-def test_the_heading_of_a_tilted_drone_is_where_its_nose_points():
-    """A quarter turn to the left, then the nose down by 40 degrees and a roll by 30."""
-    half = [math.radians(angle) / 2 for angle in (90.0, 40.0, 30.0)]
-    (cz, cy, cx), (sz, sy, sx) = (list(map(f, half)) for f in (math.cos, math.sin))
-    attitude = np.array([
-        cz * cy * cx + sz * sy * sx,
-        cz * cy * sx - sz * sy * cx,
-        cz * sy * cx + sz * cy * sx,
-        sz * cy * cx - cz * sy * sx,
-    ])  # fmt: skip
-    zeros = np.zeros(3)
-    readings = Readings(0.0, zeros, zeros, attitude, zeros, zeros)
-    assert readings.heading == pytest.approx(math.pi / 2)

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 import torch
 from safetensors.torch import save
-from tests.trust.cards import VERDICT
 
 from drone_rl.policies.zoo import (
     certificate_path,
@@ -20,8 +19,10 @@ from drone_rl.policies.zoo import (
     shifts_path,
 )
 from drone_rl.trust.export import export_policy
+from drone_rl.trust.results import Verdict
 from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.errors import InputError
+from tests.evidence import VERDICT
 from tests.policies.zoo.test_description import DEFAULT
 
 DESCRIPTION = {
@@ -74,17 +75,17 @@ DAMAGED_DESCRIPTION = save(
 def test_export_round_trip_has_no_machine_details(tmp_path):
     path = tmp_path / "mine.safetensors"
     origin = {"command": "drone-rl train", "seed": 5, "chosen": None}
-    export_policy(path, CHECKPOINT, verdict=VERDICT, **origin)
+    export_policy(path, CHECKPOINT, verdict=Verdict.read(VERDICT), **origin)
     found = load_exported(path)
     torch.testing.assert_close(found["policy"], WEIGHTS)
     assert found["description"] == DESCRIPTION
     assert found["progress"] == PROGRESS
     assert {key: found[key] for key in origin} == origin
-    assert (found["verdict"], found["worlds"]) == (VERDICT, "report")
+    assert (found["verdict"]["kind"], found["worlds"]) == ("none of these", "report")
     assert b"somebody" not in path.read_bytes()
     card = path.with_suffix(".md").read_text()
     assert hashlib.sha256(path.read_bytes()).hexdigest() in card
-    assert "1,234 frames" in card and "**poor**" in card and "(seed 5)" in card
+    assert "1,234 frames" in card and "**none of these**" in card and "(seed 5)" in card
     assert "three cubes of 2.5 m, up to 6 m" in card
 
 
@@ -106,7 +107,7 @@ def test_checkpoint_is_read_by_its_description(tmp_path):
         (exported() + b"1", "weights are damaged"),
         (exported(format="drone_rl checkpoint"), "not a drone_rl policy"),
         (exported(about={"extra": 1}), "'extra' is unknown"),
-        (exported(about={"command": "drone-rl train; rm -rf /"}), "not a training command"),
+        (exported(about={"command": "drone-rl train; rm -rf /"}), "must be a training command"),
         (exported(about={"progress": {**PROGRESS, "frames": -1}}), "frames=-1"),
         (exported(about={"verdict": {"a": "b\nc"}}), "a text in"),
         (exported(about={"seed": 0.5}), r"seed=0\.5"),
@@ -191,9 +192,7 @@ def test_failed_export_writes_nothing(tmp_path, where):
     path, carried = tmp_path / "mine.safetensors", {tmp_path / "mine.shifts.json": b"{}"}
     origin = {"command": "drone-rl train", "seed": 5, "chosen": None, "carried": carried}
     with pytest.raises(InputError, match=rf"{where}.*free some space"):
-        export_policy(path, CHECKPOINT, verdict=VERDICT, **origin)
-    with pytest.raises(KeyError):
-        export_policy(path, CHECKPOINT, verdict={**VERDICT, "failures": {}}, **origin)
+        export_policy(path, CHECKPOINT, verdict=Verdict.read(VERDICT), **origin)
     assert [found.name for found in tmp_path.iterdir()] == [where]
 
 

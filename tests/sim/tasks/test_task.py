@@ -9,7 +9,7 @@ import torch
 from tensordict import TensorDict
 from torchrl.envs.utils import check_env_specs
 
-from drone_rl.config import TASKS, BaseTaskSettings, PillarsSettings, TaskSettings, read_task
+from drone_rl.config import TASKS, BaseTaskSettings, PillarsSettings, TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.rendering.scene import SemanticClass
@@ -114,7 +114,7 @@ def test_invalid_settings_raise():
     assert as_task(task) is task
     assert isinstance(as_task("pillars"), Pillars)
     assert as_task("collect_cubes").settings == TaskSettings()
-    with pytest.raises(InputError, match="task='pillar' is unknown; valid names: collect_cubes, p"):
+    with pytest.raises(InputError, match="task='pillar': it must be one of collect_cubes, p"):
         as_task("pillar")
     with pytest.raises(InputError, match=r"task=\(dict\) is no task; give one of collect_cubes"):
         as_task({"num_cubes": 1})
@@ -128,7 +128,9 @@ def test_user_tasks_can_be_registered(monkeypatch):
     register_task(PostsSettings, lambda _: Posts())
     register_task(PostsSettings, lambda _: Posts())  # a module may be imported twice
     assert isinstance(as_task(PostsSettings()), Posts)
-    assert read_task({"name": "posts", "tall": False}, "task") == PostsSettings(tall=False)
+    assert BaseTaskSettings.read({"name": "posts", "tall": False}, "task") == PostsSettings(
+        tall=False
+    )
 
     class Other(PostsSettings):
         pass
@@ -142,19 +144,8 @@ class WithText(BaseTaskSettings):
     cost: float = "0.005"
 
 
-class WithUnion(BaseTaskSettings):
-    name: ClassVar[str] = "mine"
-    cost: int | str = 3
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        (WithText, r"^WithText\.cost='0\.005' is out of range; give a finite number$"),
-        (WithUnion, r"^WithUnion\.cost is of type int \| str; annotate it with a kind"),
-    ],
-)
-def test_mistakes_in_settings_are_named_when_their_task_is_registered(settings, message):
+def test_mistakes_in_settings_are_named_when_their_task_is_registered():
+    settings, message = WithText, r"^WithText\.cost='0\.005': it must be a valid number$"
     with pytest.raises(InputError, match=message):
         register_task(settings, lambda _: Posts())
     assert "mine" not in TASKS
@@ -163,7 +154,7 @@ def test_mistakes_in_settings_are_named_when_their_task_is_registered(settings, 
 def test_tasks_without_settings_are_registered_as_objects():
     with patch.dict(TASKS), patch.dict(MAKERS):
         settings, again = as_settings(Posts()), Posts()
-        assert read_task({"name": "posts"}, "task") == settings == as_settings(settings)
+        assert BaseTaskSettings.read({"name": "posts"}, "task") == settings == as_settings(settings)
         assert isinstance(as_task(settings), Posts)
         register_task(again)  # a cell of a notebook ran twice
         assert as_task(settings) is again

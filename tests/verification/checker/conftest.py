@@ -6,7 +6,7 @@ import json
 import pytest
 
 from benchmarks.gamed_certificates import certificate_of, steps_of
-from drone_rl.verification.checker.certificate import parse_certificate
+from drone_rl.verification.checker.certificate import Certificate
 from tests.verification.checker.making import of_one_cube
 
 
@@ -39,7 +39,7 @@ def two_halves(two_halves_truth):
 
 @pytest.fixture
 def parsed(one_sided):
-    return parse_certificate(one_sided)
+    return Certificate.read(one_sided)
 
 
 @pytest.fixture

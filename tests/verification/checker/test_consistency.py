@@ -5,8 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from drone_rl.sim.tasks.collect_cubes import CubesEnd
-from drone_rl.verification.checker.certificate import Outcome, parse_certificate
+from drone_rl.verification.checker.certificate import Certificate, Outcome
 from drone_rl.verification.checker.consistency import (
     find_inconsistencies,
     find_partition_error,
@@ -16,7 +15,7 @@ from drone_rl.verification.checker.consistency import (
 
 
 def inconsistencies(data):
-    return list(find_inconsistencies(parse_certificate(data)))
+    return list(find_inconsistencies(Certificate.read(data)))
 
 
 def test_true_certificates_are_consistent(one_sided, two_halves):
@@ -171,10 +170,13 @@ STEPS = np.repeat([10, 11, 0], [600, 200, 200])
 """Of 1000 flights 600 took 10 steps, 200 took 11; of 200 nothing is stated."""
 
 
+def won(steps, share):
+    about = {"end": "all_cubes", "collected": [True], "loops": False}
+    return Outcome.read(about | {"share": share, "steps": steps, "boxes": []})
+
+
 def wrong(steps, share=0.8):
-    nowhere = np.zeros((0, 1, 2))
-    outcome = Outcome(CubesEnd.ALL_CUBES, (True,), False, share, steps, nowhere)
-    return list(find_wrong_step_counts([outcome], OWNER, STEPS))
+    return list(find_wrong_step_counts([won(steps, share)], OWNER, STEPS))
 
 
 @pytest.mark.parametrize("steps", [{10: 0.6, 11: 0.2}, {10: 0.62, 11: 0.18}, {10: 0.5}, {}])
@@ -200,8 +202,7 @@ def test_missing_step_counts_may_be_any():
 
 def test_unstated_step_counts_are_counted_together():
     """Each of them is too seldom to refute anything: 40 flights of 1000, all different."""
-    nowhere = np.zeros((0, 1, 2))
-    outcome = Outcome(CubesEnd.ALL_CUBES, (True,), False, 1.0, {10: 1.0 - 1e-6}, nowhere)
+    outcome = won({10: 1.0 - 1e-6}, 1.0)
     steps = np.concatenate([np.full(960, 10), np.arange(20, 60)])
     *_, line = find_wrong_step_counts([outcome], np.zeros(1000, int), steps)
     assert "other numbers of steps than those stated" in line and "40 of 1000" in line

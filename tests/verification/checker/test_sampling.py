@@ -1,10 +1,9 @@
 """Placements that the checker simulates: inside boxes, at borders, anywhere."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
+from drone_rl.verification.checker.certificate import Region
 from drone_rl.verification.checker.sampling import (
     ANYWHERE,
     BORDER,
@@ -114,7 +113,7 @@ def test_sample_placements_by_seed(parsed):
 
 def test_sample_placements_without_outcomes(parsed):
     whole = np.array([[[-6.0, 6.0]]])
-    nothing = dataclasses.replace(parsed, outcomes=(), undecided=whole)
+    nothing = parsed.replace(outcomes=(), undecided=Region(share=1.0, boxes=whole))
     placements = sample_placements(nothing, 10, np.random.default_rng(0))
     assert placements.outcome.tolist() == [0] * 10
     assert set(placements.why) == {ANYWHERE}

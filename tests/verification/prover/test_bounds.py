@@ -182,5 +182,5 @@ def last_layer(weight, bias, *before):
     ids=["own forward", "tanh"],
 )
 def test_unsupported_networks_are_refused(network):
-    with pytest.raises(InputError, match="proofs support only networks of"):
+    with pytest.raises(InputError, match="proofs do not support it: network "):
         NetworkBounds(network, gap=0.0)

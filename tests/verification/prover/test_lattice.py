@@ -1,6 +1,5 @@
 """Moves on the lattice and the graph of all nodes, compared with the simulator's rules."""
 
-import dataclasses
 import math
 
 import numpy as np
@@ -108,10 +107,10 @@ def test_order_of_states():
 
 def test_rounded_step_lengths_are_refused():
     with pytest.raises(InputError, match=r"step_length=0.1 are rounded"):
-        Lattice(dataclasses.replace(TASK, step_length=0.1, step_limit=900))
+        Lattice(TASK.replace(step_length=0.1, step_limit=900))
     with pytest.raises(InputError, match=r"are rounded, so .* or differ between simulator"):
-        Lattice(dataclasses.replace(TASK, step_length=1 + 2**-30))  # no float32
-    Lattice(dataclasses.replace(TASK, step_length=0.75))
+        Lattice(TASK.replace(step_length=1 + 2**-30))  # no float32
+    Lattice(TASK.replace(step_length=0.75))
 
 
 def test_graph_by_hand(small, place):

@@ -12,8 +12,6 @@ from drone_rl.config import AppearanceSettings, TaskSettings
 from drone_rl.policies.zoo import parse
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.boxes import volumes
-from drone_rl.verification.prover.cells import Cells
-from drone_rl.verification.prover.cube_images import CubeView
 from drone_rl.verification.prover.lattice import Lattice
 from drone_rl.verification.prover.policy_spec import (
     make_compositor,
@@ -69,15 +67,6 @@ def test_blur_is_monotone(spec):
     brighter[0, 12, 32] += 0.1
     dark, bright = compositor.see(nothing), compositor.see(brighter)
     assert (bright >= dark).all() and (bright > dark)[0, 0, 10:15, 30:35].all()
-
-
-def test_cells_at_the_distance_of_a_cube(spec):
-    """The second cube is 24 m ahead of the start, so 19.6 m of the camera after 4 steps."""
-    cells = spec.cells(1, 4, -3.0, 3.0)
-    expected = Cells(spec.camera, 24.0 - 4.0 - 0.4, -3.0, 3.0, CubeView(spec.images, 1, 4))
-    assert np.array_equal(cells.limits, expected.limits)
-    assert np.array_equal(cells.images, expected.images)
-    assert len(cells) > 10 and cells.images.any()
 
 
 @pytest.mark.parametrize(

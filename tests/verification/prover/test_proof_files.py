@@ -11,7 +11,6 @@ import drone_rl
 from drone_rl.policies.zoo import fingerprint
 from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.provenance import provenance
 from drone_rl.verification.prover.boxes import volumes
 from drone_rl.verification.prover.lattice import Ending
 from drone_rl.verification.prover.policy_spec import make_policy_spec
@@ -97,11 +96,10 @@ def proof(tmp_path_factory):
 
 def test_fractions_add_up(proof):
     found = proof.certificate
-    total = sum(o["share"] for o in found["outcomes"]) + found["undecided"]["share"]
-    assert total == pytest.approx(1.0, abs=1e-12)
-    assert found["finished"] is True
-    for outcome in found["outcomes"]:
-        assert sum(outcome["steps"].values()) <= outcome["share"] + 1e-12
+    assert found.finished
+    assert found.success + found.lost + found.undecided.share == pytest.approx(1.0, abs=1e-12)
+    for outcome in found.outcomes:
+        assert sum(outcome.steps.values()) <= outcome.share + 1e-12
 
 
 def test_fractions_are_at_most_one():
@@ -115,8 +113,8 @@ def test_fractions_are_at_most_one():
     with closing(make_policy_spec(policy.description, policy.make_network(), 1e-4)) as spec:
         prover = Prover(spec)
         prover.findings = lambda: found
-        (outcome,) = certify("name", policy.description, "", prover, 1.0)["outcomes"]
-    assert outcome["share"] == outcome["steps"]["26"] == 1.0
+        (outcome,) = certify("name", policy.description, "", prover, 1.0).outcomes
+    assert outcome.share == outcome.steps[26] == 1.0
 
 
 def test_the_checker_accepts_a_certificate(proof):
@@ -126,7 +124,7 @@ def test_the_checker_accepts_a_certificate(proof):
 def test_the_checker_accepts_an_unfinished_certificate(tmp_path):
     policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=2.0)
     network = policy.make_network()
-    path, found = tmp_path / "certificate.json", {}
+    path = tmp_path / "certificate.json"
     with closing(make_policy_spec(policy.description, network, 1e-4)) as spec:
         prover = Prover(spec, 200)
         while prover.parts.size:
@@ -136,13 +134,13 @@ def test_the_checker_accepts_an_unfinished_certificate(tmp_path):
         assert prover.part.size and prover.waiting and prover.done.endings
         weights = fingerprint(policy.state["policy"])
         found = certify(policy.name, policy.description, weights, prover, 1.0, "limit_s")
-    path.write_text(json.dumps(found | provenance()))
-    assert not found["finished"] and found["found"]["stopped_by"] == "limit_s"
-    shares = sum(o["share"] for o in found["outcomes"])
-    assert 0.0 < shares < 1.0 and shares + found["undecided"]["share"] == pytest.approx(1.0)
+    found.write_json(path)
+    assert not found.finished and found.found.stopped_by == "limit_s"
+    assert 0.0 < found.success + found.lost < 1.0
     assert drone_rl.check(path, flights=150).accepted
-    found["outcomes"][0]["boxes"] += found["undecided"]["boxes"][:1]
-    path.write_text(json.dumps(found | provenance()))
+    data = json.loads(path.read_text())
+    data["outcomes"][0]["boxes"] += data["undecided"]["boxes"][:1]
+    path.write_text(json.dumps(data))
     assert not drone_rl.check(path, flights=150).accepted
 
 
@@ -153,5 +151,5 @@ def test_a_damaged_state_is_refused(spec, tmp_path, state):
         path.write_bytes(state)
     else:
         torch.save(state, path)
-    with pytest.raises(InputError, match="is not a saved proof state"):
+    with pytest.raises(InputError, match="is damaged, or of an older version"):
         load(Prover(spec), path, "this")

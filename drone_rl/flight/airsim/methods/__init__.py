@@ -9,7 +9,6 @@ from drone_rl.flight.airsim.methods import control as control
 from drone_rl.flight.airsim.methods import detections as detections
 from drone_rl.flight.airsim.methods import images as images
 from drone_rl.flight.airsim.methods import movements as movements
-from drone_rl.flight.airsim.methods import no_effect as no_effect
 from drone_rl.flight.airsim.methods import scene as scene
 from drone_rl.flight.airsim.methods import state as state
 from drone_rl.flight.airsim.methods.registry import METHODS as METHODS

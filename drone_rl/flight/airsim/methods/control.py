@@ -1,7 +1,9 @@
-"""Methods of the handshake, of control, of the clock and of recordings."""
+"""Methods of the handshake, of control, of the clock and of recordings; those without effect."""
 
+from drone_rl.flight.airsim.calls import remark
 from drone_rl.flight.airsim.messages import flag, number, whole
 from drone_rl.flight.airsim.methods.registry import given, method, vehicle_method
+from drone_rl.flight.airsim.methods.support import GAINS, NOT_SHOWN
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.vehicle import Vehicle
 
@@ -32,3 +34,13 @@ method("simContinueForFrames", given(whole, "frames", 0, 10**6))(
 method("startRecording")(Simulation.start_recording)
 method("stopRecording")(Simulation.stop_recording)
 method("isRecording")(lambda simulation: simulation.recording is not None)
+
+method(NOT_SHOWN)(lambda simulation: remark("there is no window"))
+method(GAINS)(lambda simulation: remark("gains are settings of the dynamics"))
+
+
+@method("simRunConsoleCommand simSetLightIntensity")
+def _refuse(simulation: object) -> bool:
+    """Return false, as AirSim does for a command or a light that it does not know."""
+    remark("there are no such commands and lights")
+    return False

@@ -12,23 +12,20 @@ from drone_rl.flight.airsim.messages import Map, flag, text, whole
 from drone_rl.flight.airsim.methods.cameras import CAMERA, camera_in_world, read_camera
 from drone_rl.flight.airsim.methods.registry import SIM_VEHICLE, given, method
 from drone_rl.flight.airsim.simulation import Simulation
-from drone_rl.flight.airsim.stage import Shot, Stage, png
+from drone_rl.flight.airsim.stage import Shot, png
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.flight.image_types import ImageType
 from drone_rl.utils.errors import InputError
 
 MAX_IMAGES = 64
 """Images in one call."""
-_INFRARED = 7
-"""An image type: segmentation ids in gray."""
 
 
 @dataclasses.dataclass(frozen=True)
 class _Request:
     camera: Any
     """The camera as the client called it."""
-    number: int
-    """Of the image type."""
+    kind: ImageType
     is_float: bool
     is_compressed: bool
     channels: str
@@ -58,24 +55,12 @@ def _read_requests(value: Any, name: str) -> list[_Request]:
     return [_read_request(one) for one in value]
 
 
-def _read_type(value: Any, name: str) -> int:
+def _read_type(value: Any, name: str) -> ImageType:
     number = whole(value, name, 0, 10)
-    if number > _INFRARED:
+    if number >= len(ImageType):
         names = ", ".join(f"{kind.value} ({kind.name.lower()})" for kind in ImageType)
-        raise InputError(
-            f"{name}={number} is not supported; give one of: {names}, {_INFRARED} (infrared)"
-        )
-    return number
-
-
-def _rendered(number: int) -> ImageType:
-    return ImageType.SEGMENTATION if number == _INFRARED else ImageType(number)
-
-
-def _pixels(stage: Stage, shot: Shot, number: int, *, as_float: bool) -> Tensor:
-    if number == _INFRARED:
-        return stage.infrared(shot, as_float=as_float)
-    return stage.image(ImageType(number), shot, as_float=as_float)
+        raise InputError(f"{name}={number} is not supported; give one of: {names}")
+    return ImageType(number)
 
 
 @method("simGetImages", given(_read_requests, "requests"), SIM_VEHICLE)
@@ -84,7 +69,7 @@ def _images(simulation: Simulation, requests: Sequence[_Request], vehicle: Vehic
     responses: dict[int, Map] = {}
     for camera in dict.fromkeys(cameras):
         rows = [i for i, one in enumerate(cameras) if one == camera]
-        kinds = [_rendered(requests[i].number) for i in rows]
+        kinds = [requests[i].kind for i in rows]
         shots = simulation.stage.render(vehicle.body, vehicle.cameras[camera], kinds)
         place = messages.pose(camera_in_world(vehicle, camera))
         for i, shot in zip(rows, shots, strict=True):
@@ -93,7 +78,7 @@ def _images(simulation: Simulation, requests: Sequence[_Request], vehicle: Vehic
 
 
 def _response(simulation: Simulation, request: _Request, shot: Shot, place: Map) -> Map:
-    image = _pixels(simulation.stage, shot, request.number, as_float=request.is_float)
+    image = simulation.stage.image(request.kind, shot, as_float=request.is_float)
     numbers: list[float] = []
     content, channels = b"", request.channels
     if request.is_float:
@@ -114,7 +99,7 @@ def _response(simulation: Simulation, request: _Request, shot: Shot, place: Map)
         "compress": request.is_compressed,
         "width": shot.capture.width,
         "height": shot.capture.height,
-        "image_type": request.number,
+        "image_type": int(request.kind),
     }
     if channels == "rgba":
         return {**response, "camera_id": request.camera}
@@ -132,7 +117,6 @@ def _raw(image: Tensor, channels: str) -> bytes:
 
 
 @method("simGetImage", CAMERA, given(_read_type, "image_type"), SIM_VEHICLE)
-def _image(simulation: Simulation, camera: str, number: int, vehicle: Vehicle) -> bytes:
-    kinds = [_rendered(number)]
-    (shot,) = simulation.stage.render(vehicle.body, vehicle.cameras[camera], kinds)
-    return png(_pixels(simulation.stage, shot, number, as_float=False))
+def _image(simulation: Simulation, camera: str, kind: ImageType, vehicle: Vehicle) -> bytes:
+    (shot,) = simulation.stage.render(vehicle.body, vehicle.cameras[camera], [kind])
+    return png(simulation.stage.image(kind, shot, as_float=False))

@@ -1,9 +1,19 @@
 """Methods that report, or set, the state of a vehicle."""
 
+import math
 from typing import Any
 
 from drone_rl.flight.airsim import messages
-from drone_rl.flight.airsim.messages import Map, Pose, flag, read_map, read_pose, text
+from drone_rl.flight.airsim.messages import (
+    Map,
+    Pose,
+    flag,
+    nanoseconds,
+    ned,
+    read_map,
+    read_pose,
+    text,
+)
 from drone_rl.flight.airsim.methods.registry import (
     SIM_VEHICLE,
     VEHICLE,
@@ -12,10 +22,9 @@ from drone_rl.flight.airsim.methods.registry import (
     sim_vehicle_method,
     vehicle_method,
 )
-from drone_rl.flight.airsim.sensors import SENSORS
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.vehicle import Vehicle
-from drone_rl.sim.coordinates import GeoPoint
+from drone_rl.sim.coordinates import GeoPoint, ned_attitude_from_world
 from drone_rl.sim.sensors.instruments import standard_pressure
 
 vehicle_method("getMultirotorState")(Vehicle.multirotor_state)
@@ -34,9 +43,65 @@ vehicle_method("getGpsLocation")(Vehicle.geo_point)
 vehicle_method("getRCData")(lambda vehicle: vehicle.multirotor_state()["rc_data"])
 
 
-for _kind in SENSORS:  # of each there is one, whatever its name
-    vehicle_method(f"get{_kind.title()}Data", given(text, "sensor_name", default=""))(
-        lambda vehicle, _, kind=_kind: vehicle.sensor(kind)
+def _time(seconds: float, vehicle: Vehicle) -> int:
+    """Return the time stamp of a reading; 0 if there is none yet."""
+    return vehicle.epoch + nanoseconds(seconds) if math.isfinite(seconds) else 0
+
+
+def _imu(vehicle: Vehicle) -> Map:
+    reading = vehicle.sensors.imu()
+    turn = ned_attitude_from_world(reading.attitude).tolist()
+    return {
+        "time_stamp": _time(reading.time, vehicle),
+        "orientation": messages.quaternion(turn),
+        "angular_velocity": messages.vector(ned(reading.angular_velocity)),
+        "linear_acceleration": messages.vector(ned(reading.specific_force)),
+    }
+
+
+def _barometer(vehicle: Vehicle) -> Map:
+    reading = vehicle.sensors.barometer()
+    return {
+        "time_stamp": _time(reading.time, vehicle),
+        "altitude": reading.altitude,
+        "pressure": reading.pressure,
+        "qnh": vehicle.sensors.settings.barometer.sea_level_pressure,
+    }
+
+
+def _magnetometer(vehicle: Vehicle) -> Map:
+    reading = vehicle.sensors.magnetometer()
+    return {
+        "time_stamp": _time(reading.time, vehicle),
+        "magnetic_field_body": messages.vector(ned(reading.field)),
+        "magnetic_field_covariance": [],
+    }
+
+
+def _gps(vehicle: Vehicle) -> Map:
+    reading = vehicle.sensors.gps()
+    return {
+        "time_stamp": _time(reading.time, vehicle),
+        "gnss": {
+            "geo_point": messages.geo_point(reading.place.tolist()),
+            "eph": reading.error,
+            "epv": reading.error,
+            "velocity": messages.vector(ned(reading.velocity)),
+            "fix_type": int(reading.fix),
+            "time_utc": _time(reading.time, vehicle) // 1000,
+        },
+        "is_valid": reading.is_valid,
+    }
+
+
+for _names, _read in (
+    ("getImuData", _imu),
+    ("getBarometerData", _barometer),
+    ("getMagnetometerData", _magnetometer),
+    ("getGpsData", _gps),
+):  # of each there is one, whatever its name
+    vehicle_method(_names, given(text, "sensor_name", default=""))(
+        lambda vehicle, _, read=_read: read(vehicle)
     )
 
 

@@ -71,6 +71,11 @@ def test_line_of_sight_and_rotors(start):
     assert client.call("simTestLineOfSightBetweenPoints", home, above) is True
     below = {**home, "altitude": home["altitude"] - 1.0}
     assert client.call("simTestLineOfSightBetweenPoints", below, above) is False
+    _, blocks = start(CV, scene="blocks")  # of 4 m, 12 m apart; 0.0001 degrees are 11 m
+    home = blocks.call("getHomeGeoPoint")
+    behind = {**home, "latitude": home["latitude"] + 0.00015}
+    assert blocks.call("simTestLineOfSightToPoint", behind, "") is False
+    assert blocks.call("simTestLineOfSightToPoint", {**behind, "altitude": 222.0}, "") is True
     assert len(client.call("getRotorStates", "")["rotors"]) == 4
     assert client.call("getImuData", "", "")["orientation"]["w_val"] == pytest.approx(1.0)
     assert client.call("simGetGroundTruthEnvironment", "")["gravity"]["z_val"] == pytest.approx(
