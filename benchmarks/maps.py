@@ -71,15 +71,15 @@ def bench_maps(setup: Setup) -> dict[str, Any]:
 def failed_tests(trial: Trial) -> list[str]:
     """Return the tests that the true map of a policy fails; none if it is trusted."""
     checks = check_maps(trial, {"true": path_weights}, num_methods=NUM_METHODS)
-    return checks["methods"]["true"]["failed"]
+    return [*checks.methods["true"].failed]
 
 
 def trusted_adversarial(trial: Trial, absent: Tensor) -> tuple[list[str], int]:
     """Return the names of the adversarial maps that are trusted on a policy, and their total."""
     other = SmallCNN(trial.network.in_shape, 3, generator=torch.Generator().manual_seed(99))
     candidates = adversarial_maps(absent, other)
-    methods = check_maps(trial, candidates, num_methods=NUM_METHODS)["methods"]
-    return [name for name, method in methods.items() if method["trusted"]], len(candidates)
+    methods = check_maps(trial, candidates, num_methods=NUM_METHODS).methods
+    return [name for name, method in methods.items() if method.trusted], len(candidates)
 
 
 def imagined(scenes: Scenes, episodes: int, frames: int) -> tuple[WorldState, np.ndarray]:

@@ -26,7 +26,7 @@ def changed(evidence: Mapping[str, Any], changes: Mapping[str, Any]) -> Plain:
         node: Any = result
         for key in parents:
             node = node[int(key) if isinstance(node, list) else key]
-        node[int(last) if isinstance(node, list) else last] = value
+        node[int(last) if isinstance(node, list) else last] = copy.deepcopy(value)
     return result
 
 
@@ -113,136 +113,6 @@ PROOF: Plain = {
     "agreeing": 400,
 }
 """Entries of a verdict about a certificate of success from every placement."""
-
-
-def _method(trusted: bool, failed: list[str], score: float) -> Plain:
-    return {
-        "trusted": trusted,
-        "failed": failed,
-        "score": _mean(score, score - 0.1, score + 0.1),
-        "placebos": {
-            "ones": {"median": score, "lower": score - 0.1, "upper": score + 0.1},
-            "horizon": {"median": score - 0.2, "lower": score - 0.3, "upper": score},
-        },
-        "pointing": {"median": 0.3, "lower": 0.1, "upper": 0.5, "hit": 0.6, "chance": 0.1},
-    }
-
-
-def _objective(probabilities: list[float], highest: list[float]) -> Plain:
-    counts = {"starts": 8, "num_settings": 6}
-    return {"probabilities": probabilities, "highest": highest, **counts}
-
-
-def _places(side: str, height: float, blind: float, collected: int) -> Plain:
-    of = {"blind": blind, "collected": collected, "places": 72}
-    return {"side": side, "height": height, **of}
-
-
-_LEVEL = [
-    _places("left", 0.0, 0.6, 64), _places("ahead", 0.0, 0.0, 72), _places("right", 0.0, 0.5, 60),
-]  # fmt: skip
-HIGHER = [
-    _places("left", 1.2, 0.6, 50), _places("ahead", 1.2, 0.0, 72), _places("right", 1.2, 0.5, 40),
-]  # fmt: skip
-"""Rows of a response map for cubes above the drone."""
-
-
-def _side(share: float, actions: list[float], unseen: float, blind: float) -> Plain:
-    return {"share": share, "actions": actions, "unseen": unseen, "blind": blind}
-
-
-EXPLANATION: Plain = {
-    "source": "a/explanation.json",
-    "date": "2026-01-31T12:00:00+00:00",
-    "provenance": {"git_revision": "0123abc"},
-    "verdict": VERDICT,
-    **FIXED_SEED,
-    "dataset": {
-        "frames": 600,
-        "episodes": 30,
-        "steps": 1300,
-        "action_shares": [0.8, 0.1, 0.1],
-        "entropy": _mean(0.1, 0.06, 0.2),
-        "goals_reached": 60,
-    },
-    "tsne": {
-        name: {
-            "layer": "fc1",
-            "neighbours": 10,
-            "neighbours_kept": 0.8,
-            "neighbours_chance": 0.02,
-            "trustworthiness": 0.99,
-        }
-        for name in ("features", "pixels")
-    },
-    "contradictions": {
-        "frames": 600,
-        "pairs": 5,
-        "contradictions": 2,
-        "justified": 2,
-        "unknown": 1,
-        "worst_opposition": 0.7,
-    },
-    "loops": {
-        "loops": 4,
-        "longest": 9,
-        "frames_share": 0.02,
-        "episodes": _share(3, 30, 0.02, 0.27),
-    },
-    "class_model": {
-        "probability": _objective([0.9, 0.3, 0.9], [0.9, 0.3, 0.9]),
-        "logit": _objective([0.99, 0.4, 0.98], [0.99, 0.4, 0.98]),
-    },
-    "attribution": {
-        "layer": "relu2",
-        "shown": "grad_cam",
-        "film": {"heat_by": ["grad_cam", "grad_cam_logit", None, "grad_cam"]},
-    },
-    "truth": {
-        "trusted": "saliency",
-        "methods": {
-            "saliency": _method(True, [], 0.5),
-            "occlusion": _method(False, ["placebos", "pointing"], 0.1),
-        },
-        "placebos": {"ones": _mean(0.0, 0.0, 0.0), "horizon": _mean(0.3, 0.2, 0.4)},
-        "frames": 280,
-        "frames_unmoved": 20,
-        "outcomes": {
-            "flights": 60,
-            "follows": _mean(0.8, 0.6, 0.95),
-            "ground_changed": _mean(0.02, 0.0, 0.1),
-        },
-        "interventions": {
-            "target taken away": _mean(0.4, 0.3, 0.5),
-            "ground patch changed": _mean(0.05, 0.02, 0.2),
-        },
-    },
-    "response": {"rows": _LEVEL, "blind_below": 0.1},
-    "places": {
-        "window": {"nearest": 2.5, "farthest": 20.0, "sideways": 8.0},
-        "sides": {
-            "left": _side(0.4, [0.75, 0.25, 0.0], 0.2, 0.75),
-            "ahead": _side(0.2, [1.0, 0.0, 0.0], 0.0, 0.0),
-            "right": _side(0.4, [0.5, 0.0, 0.5], 0.0, 0.5),
-        },
-        "actions": [0.7, 0.1, 0.2],
-        "alone": 0,
-        "unseen": 0.08,
-        "blind": 0.5,
-        "least_gap": 0.000012,
-        "least_gap_ahead": 7.25,
-        "least_gap_left": -1.5,
-        "logit_gap": 0.0001,
-        "close": 0.0003,
-        "in_doubt": 0.0002,
-    },
-    "left_out": {"embedding": "It has no layers."},
-    "asymmetry": {
-        "dataset": {"signed": _mean(-0.2, -0.3, -0.1), "absolute": _mean(0.3, 0.2, 0.4)},
-        "grid": {"absolute": 0.25},
-    },
-}
-"""Content of `explanation.json` of the same policy."""
 
 
 def _level(number: int, value: float, position: float, successes: int, oracle: int) -> Plain:

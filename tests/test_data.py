@@ -14,11 +14,8 @@ from tools.readme.settings import list_commands, list_groups, list_parts
 
 MUTABLE = {
     "collectors.complete_episodes:CompleteEpisodes",
-    "explanations.class_models:Attempts",
-    "explanations.class_models:ClassModel",
     "explanations.heat_maps:Explainer",
     "explanations.truth:Intervention",
-    "explanations.report.explanation:Explanation",
     "explanations.rollouts:RolloutDataset",
     "trust.domain:End",
     "sweeps.figures:Layout",

@@ -49,9 +49,9 @@ class ExplainCommand(CommandSettings, ExplainSettings):
             progress=log,
         )
         print(result)
-        verdicts = [numbers["verdict"] for numbers in result.numbers.values()]
-        unmet = [v for v in verdicts if not (v["certain"] and v["kind"] == self.require)]
-        statuses = [verdict["exit_code"] or VerdictKind.NONE.exit_code for verdict in unmet]
+        verdicts = [one.verdict for one in result.policies.values() if one.verdict]
+        unmet = [v for v in verdicts if not (v.certain and v.kind == self.require)]
+        statuses = [verdict.exit_code or VerdictKind.NONE.exit_code for verdict in unmet]
         return max(statuses if self.require else (), default=0), str(result.report)
 
 
@@ -64,9 +64,9 @@ class ReportCommand(CommandSettings):
 
     def run(self, folder: Path) -> tuple[int, str]:
         """Write a report from explanations; return the exit status and the report's path."""
-        from drone_rl.explanations.report.page import find_explanations, report
+        from drone_rl.explanations.report.page import find_explanations, write_report
 
-        made = report(find_explanations(self.explanations, self.paths.outputs), folder)
+        made = write_report(find_explanations(self.explanations, self.paths.outputs), folder)
         _log.info("report: %s", made)
         return 0, str(made)
 

@@ -9,50 +9,38 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.explanations.context import FILMED, Context
+from drone_rl.explanations.results import Attribution, KeyStep
 from drone_rl.explanations.rollouts import RolloutDataset
 from drone_rl.sim.tasks import Task
 
 SHOWN = ("grad_cam", "grad_cam_logit")
-"""Maps of "film_heat"; the second is shown where the first has no heat."""
+"""Maps that are shown by default; the second one where the first has no heat."""
 INSTEAD = ("saliency", "occlusion")  # without Grad-CAM, the first one that the policy allows
 COUNT = 6  # key frames of an episode, as in Figs. 13 to 15.
 
 
-def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Return "attribution".
-
-    Arrays of the film's n steps: "film_frames" (n, H, W, 3), "film_heat" (n, H, W) and
-    "film_heat_..." of each method, the maximum of each 1, "film_probabilities", "film_actions".
-    """
+def section(context: Context) -> Attribution:
+    """Compute the heat maps of the film."""
     flights, explainer, film = context.flights, context.explainer, context.film
-    to_frame = context.scenes.to_frame
     first = int(np.flatnonzero(flights.episode == FILMED)[0])
     inputs = film.tensor("observations"), film.tensor("actions")
-    heats = {n: to_frame(of(*inputs)) for n, of in explainer.methods().items()}
-    methods = shown_methods(heats)
-    heat, by = first_heat({name: heats[name] for name in methods})
-    arrays = {f"film_heat_{name}": _normalized(maps) for name, maps in heats.items()}
-    arrays |= {
-        "film_frames": film.frames,
-        "film_heat": _normalized(heat),
-        "film_probabilities": film.probabilities,
-        "film_actions": film.actions,
-    }
+    maps = {n: context.scenes.to_frame(of(*inputs)) for n, of in explainer.methods().items()}
+    methods = shown_methods(maps)
     frames = key_frames(flights, FILMED, context.scenes.task, len(film))
-    numbers = {
-        "layer": explainer.layer,
-        "methods": list(heats),
-        "shown": methods[0],
-        "film": {
-            "heat_by": by,
-            "key_steps": [{"step": frame - first, "why": why} for frame, why in frames],
-        },
-    }
-    return {"attribution": numbers}, arrays
+    return Attribution(
+        layer=explainer.layer,
+        shown=methods[0],
+        heat_by=tuple(first_heat({name: maps[name] for name in methods})[1]),
+        key_steps=tuple(KeyStep(step=frame - first, why=why) for frame, why in frames),
+        frames=film.frames,
+        heat={name: _normalized(of) for name, of in maps.items()},
+        probabilities=film.probabilities,
+        actions=film.actions,
+    )
 
 
 def shown_methods(methods: Collection[str]) -> list[str]:
-    """Return the methods of "film_heat" among those that a policy allows, the first one first."""
+    """Return the methods to show by default among those that a policy allows."""
     preferred = [name for name in SHOWN if name in methods]
     return preferred or [name for name in INSTEAD if name in methods][:1]
 

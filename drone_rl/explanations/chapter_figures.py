@@ -20,8 +20,7 @@ from drone_rl.explanations.class_model_gallery import CHAPTER, class_models
 from drone_rl.explanations.embedding import embed
 from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.hooks import feature_layer
-from drone_rl.explanations.report.embedding import tsne_map
-from drone_rl.explanations.report.explanation import Explanation
+from drone_rl.explanations.report.embedding import thumbnail_map
 from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frames, select_frames
 from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.policies.policy import Policy, load_policy
@@ -38,17 +37,10 @@ from drone_rl.utils.settings import Settings
 
 STEP_LENGTH = 0.25
 """Metres per action: episodes then have about as many frames as those of the chapter."""
-_POLICIES: Mapping[int, tuple[str, ...]] = {
-    7: ("poor", "right_and_forward"), 8: ("good",), 9: ("good",), 10: ("good",), 11: ("uniform",),
-    12: ("right_and_forward",), 13: ("good",), 14: ("uniform",), 15: ("right_and_forward",),
-}  # fmt: skip
-"""Shipped policies of each figure."""
 _COUNTS = {(7, "poor"): (400, 15), (7, "right_and_forward"): (400, 8), (8, "good"): (625, 7)}
 """Frames and episodes that the chapter states for figures of t-SNE."""
 _PERPLEXITY = 30.0
 """Of t-SNE, unless there are too few frames."""
-_SEQUENCE = 6
-"""Frames of Figs. 13 to 15."""
 
 
 class FigureSettings(Settings):
@@ -130,38 +122,33 @@ def reproduce(
             Fig. 9 the policy moves to one side only.
     """
     settings = from_arguments(FigureSettings, settings, {"figure": figure, **changes}, reproduce)
-    if figure not in _MAKERS:
-        numbers = ", ".join(map(str, _MAKERS))
+    if figure not in _FIGURES:
+        numbers = ", ".join(map(str, _FIGURES))
         raise InputError(f"figure={figure} can't be reproduced; give one of {numbers}")
-    subjects = [load_policy(name, outputs=outputs) for name in _POLICIES.get(figure, ())]
-    image, caption, numbers = _MAKERS[figure](settings, subjects)
+    make, names = _FIGURES[figure]
+    image, caption, numbers = make(settings, *(load_policy(n, outputs=outputs) for n in names))
     return ChapterFigure(settings, image, caption, numbers)
 
 
 _Drawn = tuple[Image.Image, str, dict[str, Any]]
-_Maker = Callable[[FigureSettings, list[Policy]], _Drawn]
 
 
-def _three_states(settings: FigureSettings, subjects: list[Policy]) -> _Drawn:
+def _three_states(settings: FigureSettings) -> _Drawn:
     """Fig. 3: REINFORCE on the process, and its gradient next to the exact one."""
-    del subjects
     seeds = [(settings.seed + i) % 2**64 for i in range(5)]  # torch's generators take 64 bits
-    runs = [train_three_state(60, seed=seed) for seed in seeds]
+    runs = torch.stack([train_three_state(60, seed=seed).leaving for seed in seeds])
+    estimates = sample_gradients(300, seed=seeds[0])
+    exact, estimated = float(exact_gradient([0.5] * 3).sum()), float(estimates.mean())
+    spread = 1.96 * float(estimates.std()) / len(estimates) ** 0.5
     figure = Figure(figsize=(9, 3.4), layout="constrained")
     left, right = figure.subplots(1, 2)
-    for run in runs:
-        left.plot(run.leaving.numpy(), color=css(MUTED), linewidth=0.9)
-    mean = torch.stack([run.leaving for run in runs]).mean(0)
-    left.plot(mean.numpy(), color=css(INK), label="mean of 5 seeds")
+    left.plot(runs.T.numpy(), color=css(MUTED), linewidth=0.9)
+    left.plot(runs.mean(0).numpy(), color=css(INK), label="mean of 5 seeds")
     left.axhline(1.0, color=css(MUTED), linestyle="--", label="optimal policy")
     left.set(xlabel="updates of 8 episodes", ylabel="probability of a1 in s0", ylim=(0, 1.04))
     left.legend(loc="lower right", frameon=False)
-    estimates = sample_gradients(300, seed=seeds[0])
-    exact = float(exact_gradient([0.5] * 3).sum())
-    spread = 1.96 * float(estimates.std()) / len(estimates) ** 0.5
     right.hist(estimates.numpy(), bins=25, color=css(MUTED), label="estimates (Eq. 12)")
     right.axvline(exact, color=css(INK), label=f"exact gradient: {exact:.4f}")
-    estimated = float(estimates.mean())
     label = f"mean estimate: {estimated:.4f} ± {spread:.4f}"
     right.axvline(estimated, color=css(INK), linestyle=":", label=label)
     right.set(xlabel="gradient by the logit of a1, uniform policy", ylabel="batches")
@@ -174,41 +161,35 @@ def _three_states(settings: FigureSettings, subjects: list[Policy]) -> _Drawn:
         "exact_gradient": exact,
         "estimated_gradient": estimated,
         "half_width95": spread,
-        "final_probability": float(mean[-1]),
+        "final_probability": float(runs.mean(0)[-1]),
     }
     return Image.open(io.BytesIO(to_png(figure))), caption, numbers
 
 
-def _embeddings(settings: FigureSettings, subjects: list[Policy]) -> _Drawn:
+def _embeddings(settings: FigureSettings, *policies: Policy) -> _Drawn:
     """Figs. 7 and 8: t-SNE of the last layer's features, frames tinted by action."""
     maps, numbers = [], {}
-    for subject in subjects:
-        frames, episodes = _COUNTS[settings.figure, subject.name]
-        data, network, scenes = _record(subject, settings, frames, episodes)
-        layer = feature_layer(network)
+    for policy in policies:
+        data, network, scenes = _record(policy, settings, *_COUNTS[settings.figure, policy.name])
+        layer, actions = feature_layer(network), scenes.actions
         assert layer is not None
-        perplexity = min(_PERPLEXITY, (len(data) - 1) // 3)
         points, faithful = embed(
             data.features[layer],
-            perplexity=perplexity,
+            perplexity=min(_PERPLEXITY, (len(data) - 1) // 3),
             seed=legacy_seed(settings.seed),
             kernel=settings.kernel,
         )
-        arrays = dict(data.arrays)
-        if settings.tint == "predicted":
-            arrays["actions"] = data.probabilities.argmax(1)
-        about = {"name": subject.name, "actions": scenes.actions.as_dict()}
-        explanation = Explanation(about, {"tsne_features": points}, arrays)
+        taken = data.probabilities.argmax(1) if settings.tint == "predicted" else data.actions
+        image = thumbnail_map(data.frames, points, [actions.colors[action] for action in taken])
         count = len(np.unique(data.episode))
-        title = f"{subject.name}: {len(data)} frames of {count} episodes"
-        maps.append(images.titled(tsne_map(explanation, "features"), title))
-        by_action = np.bincount(arrays["actions"], minlength=len(scenes.actions.names)).tolist()
-        numbers[subject.name] = {
+        title = f"{policy.name}: {len(data)} frames of {count} episodes"
+        maps.append(images.titled(image, title))
+        numbers[policy.name] = {
             "frames": len(data),
             "episodes": count,
             "layer": layer,
-            **faithful,
-            "frames_by_action": dict(zip(scenes.actions.names, by_action, strict=True)),
+            **faithful.model_dump(),
+            "frames_by_action": {n: int((taken == a).sum()) for a, n in enumerate(actions.names)},
         }
     names = "forward violet, left orange, right blue"
     method = "SNE (Eq. 17 as printed)" if settings.kernel == "gaussian" else "t-SNE"
@@ -218,43 +199,41 @@ def _embeddings(settings: FigureSettings, subjects: list[Policy]) -> _Drawn:
     return images.gridded(canvases, len(maps)), caption, numbers
 
 
-def _pair(settings: FigureSettings, subjects: list[Policy]) -> _Drawn:
+def _pair(settings: FigureSettings, policy: Policy) -> _Drawn:
     """Fig. 9: two similar frames with opposite actions."""
-    (subject,) = subjects
-    data, _, scenes = _record(subject, settings, 625, 7)
+    data, _, scenes = _record(policy, settings, 625, 7)
     predicted, actions = data.probabilities.argmax(1), scenes.actions
     left, right = (np.flatnonzero(predicted == side) for side in (actions.left, actions.right))
     if not (len(left) and len(right)):
         raise InputError(
-            f"policy {subject.name} moves to one side only in {len(data)} frames; give another "
+            f"policy {policy.name} moves to one side only in {len(data)} frames; give another "
             "seed, or more frames and episodes"
         )
     flat = data.observations.reshape(len(data), -1)
     distance = cdist(flat[left], flat[right]) / np.sqrt(flat.shape[1])
     row, column = np.unravel_index(distance.argmin(), distance.shape)
     pair = [int(left[row]), int(right[column])]
-    tiles = [
-        images.frame_with_probabilities(data.arrays, frame, f"frame {frame}") for frame in pair
-    ]
-    apart = float(np.abs(np.diff(data.offset(scenes.task)[pair], axis=0)).max())
-    where = f"the next cube is {apart:.1f} m from its place in the other one"
-    if np.isnan(apart):
-        where = "one of them has no next cube"
+    tiles = [images.frame_with_probabilities(data.arrays, one, f"frame {one}") for one in pair]
+    metres = float(np.abs(np.diff(data.offset(scenes.task)[pair], axis=0)).max())
+    has_both = not np.isnan(metres)
+    where = f"the next cube is {metres:.1f} m from its place in the other one"
     caption = (
-        f"The two most similar frames on which policy {subject.name} most probably moves to "
-        f"opposite sides; {where}."
+        f"The two most similar frames on which policy {policy.name} most probably moves to "
+        f"opposite sides; {where if has_both else 'one of them has no next cube'}."
     )
-    metres = None if np.isnan(apart) else apart
-    numbers = {"frames": pair, "distance": float(distance.min()), "metres_apart": metres}
+    numbers = {
+        "frames": pair,
+        "distance": float(distance.min()),
+        "metres_apart": metres if has_both else None,
+    }
     return images.gridded(tiles, 2), caption, numbers
 
 
-def _class_models(settings: FigureSettings, subjects: list[Policy]) -> _Drawn:
+def _class_models(settings: FigureSettings, policy: Policy) -> _Drawn:
     """Figs. 10 to 12: class models with the chapter's refinements."""
-    (subject,) = subjects
-    models = class_models(subject, seed=settings.seed, **CHAPTER)
+    models = class_models(policy, seed=settings.seed, **CHAPTER)
     caption = (
-        f"Class models of policy {subject.name}: gradient ascent on the action's probability "
+        f"Class models of policy {policy.name}: gradient ascent on the action's probability "
         "(Eq. 18) in steps of fixed length, with blur and the training set's mean and deviation."
     )
     header, values = models.rows()
@@ -262,10 +241,9 @@ def _class_models(settings: FigureSettings, subjects: list[Policy]) -> _Drawn:
     return models.image(), caption, {"probabilities": probabilities}
 
 
-def _attributions(settings: FigureSettings, subjects: list[Policy]) -> _Drawn:
+def _attributions(settings: FigureSettings, policy: Policy) -> _Drawn:
     """Figs. 13 to 15: Grad-CAM of the sampled action in six frames."""
-    (subject,) = subjects
-    data, network, scenes = _record(subject, settings, None, 20)
+    data, network, scenes = _record(policy, settings, None, 20)
     task: Any = scenes.task
     rows = _spread_by_side(data.offset(task)[:, 1], task.settings.touch_distance)
     explainer = Explainer(network, scenes.observe(empty_scene(scenes))[0])
@@ -276,19 +254,25 @@ def _attributions(settings: FigureSettings, subjects: list[Policy]) -> _Drawn:
         bars = images.indicator(data.probabilities[row].tolist(), int(data.actions[row]), hot.width)
         tiles.append(images.stacked([hot, bars]))
     caption = (
-        f"Grad-CAM (Eqs. 19 and 20) of policy {subject.name} for the sampled action, whose bar is "
+        f"Grad-CAM (Eqs. 19 and 20) of policy {policy.name} for the sampled action, whose bar is "
         "dark; the next cube is to the left, ahead or to the right."
     )
     return images.gridded(tiles, 3), caption, {"frames": rows.tolist()}
 
 
-_MAKERS: Mapping[int, _Maker] = {
-    3: _three_states,
-    **dict.fromkeys((7, 8), _embeddings),
-    9: _pair,
-    **dict.fromkeys((10, 11, 12), _class_models),
-    **dict.fromkeys((13, 14, 15), _attributions),
+_FIGURES: Mapping[int, tuple[Callable[..., _Drawn], tuple[str, ...]]] = {
+    3: (_three_states, ()),
+    7: (_embeddings, ("poor", "right_and_forward")),
+    8: (_embeddings, ("good",)),
+    9: (_pair, ("good",)),
+    10: (_class_models, ("good",)),
+    11: (_class_models, ("uniform",)),
+    12: (_class_models, ("right_and_forward",)),
+    13: (_attributions, ("good",)),
+    14: (_attributions, ("uniform",)),
+    15: (_attributions, ("right_and_forward",)),
 }
+"""The function that makes each figure, and its shipped policies."""
 
 
 def _record(
@@ -319,7 +303,5 @@ def _record(
 def _spread_by_side(aside: NDArray, touch_distance: float) -> NDArray:
     """Return two frames each with the next cube to the left, ahead and to the right."""
     sides = (aside > touch_distance, np.abs(aside) <= touch_distance, aside < -touch_distance)
-    count = _SEQUENCE // len(sides)
     rows = [np.flatnonzero(side) for side in sides if side.any()]
-    middles = [np.linspace(0, len(one) - 1, count + 2)[1:-1].astype(int) for one in rows]
-    return np.concatenate([one[middle] for one, middle in zip(rows, middles, strict=True)])
+    return np.concatenate([r[np.linspace(0, len(r) - 1, 4)[1:-1].astype(int)] for r in rows])

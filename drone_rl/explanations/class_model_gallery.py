@@ -13,9 +13,10 @@ from drone_rl.config.configuration import from_arguments
 from drone_rl.explanations.class_models import (
     NO_GRADIENTS,
     Attempts,
-    ImageStatistics,
+    image_statistics,
     visualise,
 )
+from drone_rl.explanations.results import ImageStatistics
 from drone_rl.explanations.rollouts import collect
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.explanations.settings import (
@@ -111,7 +112,7 @@ class ClassModels(TableResult):
         written = {
             "policy": self.policy.origin["policy"],
             **self.seed.as_dict(),
-            "statistics": dataclasses.asdict(self.statistics),
+            "statistics": self.statistics.model_dump(),
             "settings": {
                 title: {**attempts.settings.values(), **attempts.best_values()}
                 for title, attempts in self.tried.items()
@@ -170,7 +171,7 @@ def class_models(
     with subject.flying(min(settings.episodes, _BATCH), seed=seed.value) as (env, actor):
         seen = collect(env, actor, num_episodes=settings.episodes).tensor("observations")
         channels = Scenes(env).channels
-    statistics = ImageStatistics.of(seen)
+    statistics = image_statistics(seen)
     tried = {"given settings": settings.as_base(ClassModelSettings)}
     if settings.gallery:
         tried = {title: ClassModelSettings(**changed) for title, changed in GALLERY.items()}

@@ -3,22 +3,20 @@
 import copy
 import dataclasses
 import itertools
-from typing import Any
+from collections.abc import Sequence
 
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
 from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.explanations.context import Context, LeftOutError
-from drone_rl.explanations.heat_maps import Objective
+from drone_rl.explanations.results import BestModels, ClassModel, ImageStatistics
 from drone_rl.explanations.settings import ClassModelSettings
 from drone_rl.policies import ImageNetwork
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import plain_generator
 
-OBJECTIVES: tuple[Objective, ...] = ("probability", "logit")
 NO_GRADIENTS = (
     "Class models need gradients of the logits with respect to the pixels, and this policy has "
     "none; give it as a PyTorch function of float images, such as the transform rgb returns."
@@ -26,24 +24,25 @@ NO_GRADIENTS = (
 AS_PROBABLE = 0.01  # of observations whose probabilities differ by less, the smoothest is the best
 
 
-def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Return "class_model"; arrays "class_model_probability", "class_model_logit" (A, C, h, w)."""
+def section(context: Context) -> ClassModel:
+    """Search the best observation of each action, by probability and by logit."""
     if not context.network.is_differentiable:
         raise LeftOutError(NO_GRADIENTS)
-    statistics = ImageStatistics.of(context.dataset.tensor("observations"))
+    statistics = image_statistics(context.dataset.tensor("observations"))
     network = copy.deepcopy(context.network)  # it accumulates gradients
-    seed = context.seed.value
-    models = {each: search(network, statistics, each, seed=seed) for each in OBJECTIVES}
-    numbers = {
-        "statistics": dataclasses.asdict(statistics),
-        "channels": context.scenes.channels,
-        **{objective: model.summary() for objective, model in models.items()},
-    }
-    arrays = {f"class_model_{name}": model.images.numpy() for name, model in models.items()}
-    return {"class_model": numbers}, arrays
+
+    def best(objective: str) -> BestModels:
+        return best_models(search(network, statistics, objective, seed=context.seed.value))
+
+    return ClassModel(
+        statistics=statistics,
+        channels=context.scenes.channels,
+        probability=best("probability"),
+        logit=best("logit"),
+    )
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True)
 class Attempts:
     """Results of one setting from each random start, for each action."""
 
@@ -70,65 +69,28 @@ class Attempts:
         }
 
 
-@dataclasses.dataclass
-class ClassModel:
-    """The best optimized observation of each action, and all attempts."""
-
-    tried: list[Attempts]  # attempts of each setting, with the same number of starts
-
-    @property
-    def every(self) -> Attempts:
-        """All attempts together, in the order of the settings."""
-        fields = ("images", "probabilities", "roughness")
-        joined = {name: torch.cat([getattr(a, name) for a in self.tried], 1) for name in fields}
-        return Attempts(**joined, settings=self.tried[0].settings)
-
-    @property
-    def images(self) -> Tensor:
-        """The best observation of each action. Shape: (num_actions, C, H, W)."""
-        return self.every.best_images()
-
-    def summary(self) -> dict[str, Any]:
-        """Return plain values; lists are by action, "highest" is that of all attempts."""
-        every, starts = self.every, self.tried[0].settings.starts
-        best = every.best()
-        rows = [
-            {
-                **attempts.settings.values(),
-                **attempts.best_values(),
-                "chosen": [a for a, i in enumerate(best) if i // starts == setting],
-            }
-            for setting, attempts in enumerate(self.tried)
-        ]
-        return {
-            **every.best_values(),
-            "starts": starts,
-            "num_settings": len(self.tried),
-            "highest": every.probabilities.amax(1).tolist(),
-            "tried": rows,
-        }
+def best_models(tried: Sequence[Attempts]) -> BestModels:
+    """Return the best of attempts with several settings, which have the same number of starts."""
+    fields = ("images", "probabilities", "roughness")
+    joined = {name: torch.cat([getattr(a, name) for a in tried], 1) for name in fields}
+    every = Attempts(**joined, settings=tried[0].settings)
+    return BestModels(
+        probabilities=tuple(every.best_values()["probabilities"]),
+        attempts=every.probabilities.shape[1],
+        highest=tuple(every.probabilities.amax(1).tolist()),
+        images=every.best_images().numpy(),
+    )
 
 
-@dataclasses.dataclass(frozen=True)
-class ImageStatistics:
-    """Statistics of the data set's observations, which optimized ones keep."""
-
-    mean: float
-    std: float
-    low: float
-    high: float
-    roughness: float
-
-    @classmethod
-    def of(cls, observations: Tensor) -> "ImageStatistics":
-        """Return the statistics of observations (T, C, H, W)."""
-        return cls(
-            mean=float(observations.mean()),
-            std=float(observations.std()),
-            low=float(observations.min()),
-            high=float(observations.max()),
-            roughness=float(_differences(observations).mean()),
-        )
+def image_statistics(observations: Tensor) -> ImageStatistics:
+    """Return the statistics of observations (T, C, H, W)."""
+    return ImageStatistics(
+        mean=float(observations.mean()),
+        std=float(observations.std()),
+        low=float(observations.min()),
+        high=float(observations.max()),
+        roughness=float(_differences(observations).mean()),
+    )
 
 
 def visualise(
@@ -165,18 +127,14 @@ def visualise(
 
 
 def search(
-    network: ImageNetwork,
-    statistics: ImageStatistics,
-    objective: Objective = "logit",
-    *,
-    seed: int = 0,
-) -> ClassModel:
+    network: ImageNetwork, statistics: ImageStatistics, objective: str = "logit", *, seed: int = 0
+) -> list[Attempts]:
     """Try a few settings, each from all starts."""
     tried = []
     for kind, blur in itertools.product(("pixel", "fourier"), (0.5, 0.9, 1.4)):
         settings = ClassModelSettings(maximize=objective, parameterisation=kind, blur=blur)
         tried.append(visualise(network, statistics, settings, seed=seed))
-    return ClassModel(tried)
+    return tried
 
 
 @dataclasses.dataclass(frozen=True)

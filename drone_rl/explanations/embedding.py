@@ -1,7 +1,6 @@
 """Section "embedding": t-SNE of the policy's features and of raw pixels (section 5.1)."""
 
 import logging
-from typing import Any
 
 import numpy as np
 import openTSNE
@@ -9,6 +8,7 @@ from numpy.typing import NDArray
 from sklearn.decomposition import PCA
 
 from drone_rl.explanations.context import Context, LeftOutError
+from drone_rl.explanations.results import Embedding, Faithfulness, Tsne
 from drone_rl.explanations.settings import check_perplexity
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import num_cores
@@ -23,8 +23,8 @@ GAUSSIAN_DOF = 1e4
 FEW = 2000  # up to so many points, exact neighbours and Barnes-Hut on one thread are fastest
 
 
-def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Return "tsne"; arrays "tsne_features" and "tsne_pixels" (T, 2)."""
+def section(context: Context) -> Tsne:
+    """Embed the analysed frames by the policy's features, and by their pixels."""
     layer = context.layer
     if layer is None:
         raise LeftOutError(
@@ -32,23 +32,24 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
             "as a torch module made of layers."
         )
     data, settings = context.dataset, context.settings
-    numbers, arrays = {}, {}
-    for name, originals in (("features", data.features[layer]), ("pixels", data.observations)):
-        points, faithful = embed(
-            originals, perplexity=settings.perplexity, seed=legacy_seed(context.seed.value)
+    originals = {"features": data.features[layer], "pixels": data.observations}
+    maps = {}
+    for name, values in originals.items():
+        points, measured = embed(
+            values, perplexity=settings.perplexity, seed=legacy_seed(context.seed.value)
         )
-        arrays[f"tsne_{name}"] = points
-        numbers[name] = {
-            "layer": layer if name == "features" else None,
-            "perplexity": settings.perplexity,
-            **faithful,
-        }
-    return {"tsne": numbers}, arrays
+        maps[name] = Embedding(
+            layer=layer if name == "features" else None,
+            perplexity=settings.perplexity,
+            points=points,
+            **measured.model_dump(),
+        )
+    return Tsne(**maps)
 
 
 def embed(
     originals: NDArray, *, perplexity: float = 30.0, seed: int = 0, kernel: str = "student"
-) -> tuple[NDArray, dict[str, float]]:
+) -> tuple[NDArray, Faithfulness]:
     """Embed points (T, *) in the plane (Eqs. 16 and 17); return them (T, 2), and `faithfulness`.
 
     Args:
@@ -85,16 +86,10 @@ def embed(
     return points, faithfulness(centred, points)
 
 
-def faithfulness(originals: NDArray, points: NDArray, k: int = NEIGHBOURS) -> dict[str, float]:
+def faithfulness(originals: NDArray, points: NDArray, k: int = NEIGHBOURS) -> Faithfulness:
     """Measure how well an embedding (T, 2) keeps the neighbourhoods of originals (T, D).
 
     With ties, all points as near as the k-th count as nearest, also in the figure for chance.
-
-    Returns:
-        "neighbours": size of a neighbourhood, smaller than k if there are few points;
-        "trustworthiness": 1 if all neighbours in the plane are neighbours originally (Venna and
-        Kaski, 2001); "neighbours_kept": fraction of the nearest in the plane that are among the
-        nearest originally; "neighbours_chance": the same for a random embedding.
     """
     count = len(originals)
     k = min(k, (count - 1) // 2)
@@ -108,12 +103,12 @@ def faithfulness(originals: NDArray, points: NDArray, k: int = NEIGHBOURS) -> di
     strangers = np.maximum(rank - k, 0).sum()
     worst = len(queries) * k * (2 * count - 3 * k - 1) / 2
     as_near = (true <= ordered[:, [k]]).sum(1) - 1
-    return {
-        "neighbours": k,
-        "trustworthiness": float(1 - strangers / worst),
-        "neighbours_kept": float((rank <= k).mean()),
-        "neighbours_chance": float(as_near.mean() / (count - 1)),
-    }
+    return Faithfulness(
+        neighbours=k,
+        trustworthiness=float(1 - strangers / worst),
+        neighbours_kept=float((rank <= k).mean()),
+        neighbours_chance=float(as_near.mean() / (count - 1)),
+    )
 
 
 def _distinct(points: NDArray, seed: int) -> NDArray:

@@ -1,7 +1,6 @@
 """`drone-rl explain`: compute all sections, write them as files, and make one report."""
 
 import dataclasses
-import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
@@ -9,29 +8,28 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Unpack
 
-import numpy as np
-from numpy.typing import NDArray
 from torchrl.envs import EnvBase
 
 from drone_rl.config.configuration import from_arguments
 from drone_rl.explanations import attribution, behavior, class_models, embedding, response, truth
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.report import write_report
-from drone_rl.explanations.report.explanation import FORMAT, FORMAT_VERSION
+from drone_rl.explanations.results import Explanation
 from drone_rl.explanations.settings import ExplainOptions, ExplainSettings
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
+from drone_rl.sim.vocabulary import shown_actions
 from drone_rl.trust.coverage import find_domain
 from drone_rl.trust.recorded import record_verdict
-from drone_rl.trust.results import Verdict
 from drone_rl.trust.rounding_sensitivity import require_function
 from drone_rl.trust.shifts_results import SavedShifts
 from drone_rl.trust.verdict import CertificateClaim, FindClaim
 from drone_rl.utils.display import Result, page
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path, new_run_folder, to_file_name
+from drone_rl.utils.models import Model
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.schema import Whole
@@ -39,23 +37,24 @@ from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import seed_line
 from drone_rl.utils.threads import pool_like_caller, torch_threads
 
-_Result = tuple[dict[str, Any], dict[str, NDArray], float] | LeftOutError  # with seconds
 Given = str | Path | BasePolicy | Logits  # a policy or something that `as_policy` converts to one
-Section = Callable[[Context], tuple[dict[str, Any], dict[str, NDArray]]]
-"""Returns entries of `explanation.json` and `arrays.npz`; writes nothing, runs at any time."""
+Section = Callable[[Context], Model | dict[str, Any] | None]
+"""Returns the result of a section, None if there is nothing to show; runs at any time."""
 SECTIONS: dict[str, Section] = {
     "attribution": attribution.section,
-    "class_models": class_models.section,
+    "class_model": class_models.section,
     "dataset": behavior.dataset_section,
-    "embedding": embedding.section,
-    "evaluation": behavior.evaluation_section,
+    "tsne": embedding.section,
+    "verdict": behavior.verdict_section,
     "flaws": behavior.flaws_section,
     "response": response.section,
+    "asymmetry": response.asymmetry_section,
     "shifts": behavior.shifts_section,
     "truth": truth.section,
 }
-"""Sections by name; `drone_rl.explain` adds "places". `report.page.PARTS` displays them."""
-THREADED = frozenset({"attribution", "class_models", "embedding", "flaws"})
+"""Sections by the names of their results in `Explanation`; `drone_rl.explain` adds "places".
+`report.page.PARTS` displays them."""
+THREADED = frozenset({"attribution", "class_model", "flaws", "tsne"})
 """Sections that run in a second thread: they step no environment and use a copy of the network."""
 
 
@@ -67,17 +66,17 @@ class Explanations(Result):
     """Holds a folder for each policy and the report."""
     report: Path
     """One self-contained HTML file."""
-    numbers: dict[str, dict[str, Any]]
-    """Contents of `explanation.json`, by the policies' names."""
+    policies: dict[str, Explanation]
+    """Results by the policies' names."""
     seed: RootSeed
     """Root of all random streams."""
 
     def __str__(self) -> str:
         lines = []
-        for name, numbers in self.numbers.items():
-            verdict = numbers["verdict"]
-            certainty = "" if verdict["certain"] else " (not certain)"
-            lines.append(f"{name}: {verdict['kind']}{certainty}. {verdict['sentence']}")
+        for name, explanation in self.policies.items():
+            if verdict := explanation.verdict:
+                certainty = "" if verdict.certain else " (not certain)"
+                lines.append(f"{name}: {verdict.kind}{certainty}. {verdict.sentence}")
         return "\n".join([*lines, f"report: {self.report}", seed_line(self.seed.as_dict())])
 
     def _repr_html_(self) -> str:
@@ -120,7 +119,7 @@ def explain(
     folder = new_run_folder("explain", outputs) if folder is None else as_path(folder, "folder")
     folders = {n: folder / f"{i}_{to_file_name(n)}" for i, n in enumerate(by_name)}
 
-    def explain_one(policy: BasePolicy, folder: Path) -> dict[str, Any]:
+    def explain_one(policy: BasePolicy, folder: Path) -> Explanation:
         require_function(policy, seed=seed.value, renderer=settings.renderer)
         network = policy.make_network()
         env = policy.make_env(num_envs, seed=seed.value, renderer=settings.renderer)
@@ -141,13 +140,14 @@ def explain(
             )
 
     with torch_threads(1):  # same results for any number of cores; more would gain nothing
-        numbers = {name: explain_one(one, folders[name]) for name, one in by_name.items()}
+        explained = {name: explain_one(one, folders[name]) for name, one in by_name.items()}
     for name, one in by_name.items():
-        record_verdict(folders[name], one, Verdict.read(numbers[name]["verdict"]))
+        if verdict := explained[name].verdict:
+            record_verdict(folders[name], one, verdict)
     progress("report")
     report = write_report(list(folders.values()), folder)
     progress("explained", 1, 1)
-    return Explanations(folder, report, numbers, seed)
+    return Explanations(folder, report, explained, seed)
 
 
 def _named(policies: Given | Sequence[Given], outputs: str | Path) -> dict[str, BasePolicy]:
@@ -177,7 +177,7 @@ def explain_policy(
     measured: SavedShifts | None = None,
     unlike: Mapping[str, Any] | None = None,
     seed: RootSeed | None = None,
-) -> dict[str, Any]:
+) -> Explanation:
     """Compute all sections for one policy and write them to a folder.
 
     The environments are held out, have not been stepped, and have the policy's transforms; the
@@ -186,40 +186,50 @@ def explain_policy(
     each. The verdict quotes `claim`, `measured` and `unlike`. The seed is the settings' by default.
 
     Returns:
-        The contents of `explanation.json`; "left_out" gives the reason for each section that can't
-        be computed for this policy.
+        The results, also in `explanation.json`; "left_out" gives the reason for each section that
+        can't be computed for this policy.
 
     Raises:
         InputError: The folder can't be written or a setting does not fit the policy.
     """
     context = Context(env, network, settings, claim, measured, unlike, seed)
-    results = _run(SECTIONS if sections is None else sections, context, progress)
-    left_out = {title: str(one) for title, one in results.items() if isinstance(one, LeftOutError)}
-    computed = {title: one for title, one in results.items() if not isinstance(one, LeftOutError)}
-    content = {
-        "format": FORMAT,
-        "format_version": FORMAT_VERSION,
-        "name": name,
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "settings": context.settings.values(),
+    sections = SECTIONS if sections is None else sections
+    results: dict[str, Any] = {}
+    left_out: dict[str, str] = {}
+    seconds: dict[str, float] = {}
+    for title, (result, duration) in _run(sections, context, progress).items():
+        if isinstance(result, LeftOutError):
+            left_out[title] = str(result)
+        else:
+            results[title], seconds[title] = result, duration
+    explanation = Explanation(
+        name=name,
+        date=datetime.now(UTC).isoformat(timespec="seconds"),
+        settings=context.settings.values(),
         **context.seed.as_dict(),
-        "seconds": {title: seconds for title, (_, _, seconds) in computed.items()},
-        "actions": context.scenes.actions.as_dict(),
-        "terms": context.scenes.task.vocabulary.as_dict(),
-        **{key: value for numbers, _, _ in computed.values() for key, value in numbers.items()},
-        **({"left_out": left_out} if left_out else {}),
-        "provenance": provenance,
-    }
-    arrays = {key: value for _, part, _ in computed.values() for key, value in part.items()}
-    _write(folder, content, arrays, context)
-    return content
+        seconds=seconds,
+        actions=shown_actions({"actions": context.scenes.actions.as_dict()}),
+        terms=context.scenes.task.vocabulary,
+        provenance=provenance,
+        left_out=left_out,
+        **results,
+    )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        context.dataset.save(folder / "dataset.npz", context.flights)
+        explanation.save(folder)
+    except OSError as error:
+        raise InputError(
+            f"explanation {folder} can't be written ({error.strerror}); choose another folder"
+        ) from error
+    return explanation
 
 
 def _run(
     sections: Mapping[str, Section], context: Context, progress: Callable[[str], None]
-) -> dict[str, _Result]:
-    """Run all sections, those in `THREADED` in a second thread."""
-    twin, results = context.copied_for_thread(), dict[str, _Result]()
+) -> dict[str, tuple[Any, float]]:
+    """Return results and seconds of all sections; those in `THREADED` run in a second thread."""
+    twin, results = context.copied_for_thread(), dict[str, tuple[Any, float]]()
     with pool_like_caller(1) as pool:
         aside = {t: pool.submit(_compute, sections[t], twin) for t in sections if t in THREADED}
         for title in sorted(sections, key=THREADED.__contains__):
@@ -229,25 +239,10 @@ def _run(
     return {title: results[title] for title in sections}
 
 
-def _compute(section: Section, context: Context) -> _Result:
+def _compute(section: Section, context: Context) -> tuple[Any, float]:
     began = time.perf_counter()
     try:
-        numbers, arrays = section(context)
+        result = section(context)
     except LeftOutError as error:
-        return error
-    return numbers, arrays, round(time.perf_counter() - began, 2)
-
-
-def _write(
-    folder: Path, numbers: dict[str, Any], arrays: dict[str, NDArray], context: Context
-) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        context.dataset.save(folder / "dataset.npz", context.flights)
-        # numpy's annotation takes any keyword to be allow_pickle
-        np.savez_compressed(folder / "arrays.npz", **arrays)  # pyright: ignore[reportArgumentType]
-        (folder / "explanation.json").write_text(json.dumps(numbers, indent=1))
-    except OSError as error:
-        raise InputError(
-            f"explanation {folder} can't be written ({error.strerror}); choose another folder"
-        ) from error
+        result = error
+    return result, round(time.perf_counter() - began, 2)

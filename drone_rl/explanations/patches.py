@@ -8,7 +8,6 @@ scene can have a higher one, which the placebos measure.
 import copy
 import dataclasses
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any
 
 import numpy as np
 import torch
@@ -19,7 +18,6 @@ from torch.nn import functional
 
 from drone_rl.explanations.hooks import BATCH, probabilities
 from drone_rl.policies import ImageNetwork
-from drone_rl.utils.intervals import episode_means, mean_bounds
 from drone_rl.utils.seeding import plain_generator
 
 PATCHES = 40  # approximate number of patches of a frame
@@ -156,11 +154,6 @@ def sample_frames(episode: NDArray, most: int) -> NDArray:
         rows = np.flatnonzero(episode == number)
         parts.append(rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(np.int64)])
     return np.concatenate(parts)
-
-
-def summarise_scores(values: NDArray, episode: NDArray) -> dict[str, Any]:
-    """Return the mean of scores over episodes with its interval; see `mean_bounds`."""
-    return mean_bounds(episode_means(values, episode).clip(-1, 1), -1.0, 1.0).model_dump()
 
 
 def _levels(heat: NDArray) -> NDArray:

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from numpy.typing import NDArray
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import EnvBase
@@ -26,8 +25,8 @@ from drone_rl.explanations.scenes import Scenes
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.composer_task import seconds_per_step
-from drone_rl.sim.rendering import Appearance, Mounting
-from drone_rl.sim.rendering.appearance import product, rotate
+from drone_rl.sim.rendering import Appearance
+from drone_rl.sim.rendering.appearance import product
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.trust.plots.images import heated, shown_picture
 from drone_rl.trust.video import CAMERAS, probabilities, render_step, run_episode
@@ -48,6 +47,8 @@ CLASS_COLORS: Mapping[SemanticClass, palette.Rgb] = {
     SemanticClass.DISTRACTOR: palette.MUTED,
 }
 """Colors of the segmentation image and of the boxes."""
+_CAMERA = "world/drone/camera"
+"""Path of the policy's camera, whose pose is relative to the drone's."""
 
 
 def record(
@@ -79,15 +80,13 @@ def record(
         InputError: The extra `rerun` is missing, or a file can't be written.
     """
     rerun = extra("rerun", "rerun", "format=rerun")
-    files: list[Path] = []
+    files = [folder / f"episode_{number}.rrd" for number in range(episodes)]
     with policy.flying(1, seed=seed, device=device, renderer=renderer) as (env, actor):
         network = policy.make_network(device)
-        for number in range(episodes):
-            path = folder / f"episode_{number}.rrd"
+        for number, path in enumerate(files):
             with _open(rerun, path, f"{policy.name}, seed {seed}, episode {number}") as stream:
                 record_episode(env, actor, network, EpisodeLog(rerun, stream, env), greedy=greedy)
             _log.info("written: %s", path)
-            files.append(path)
     return files
 
 
@@ -130,32 +129,20 @@ def _open(rerun: Any, path: Path, name: str) -> Iterator[Any]:
 def _layout(rerun: Any, timestep: float) -> Any:
     """Return the arrangement of a recording's parts in the viewer, which plays in real time."""
     views = rerun.blueprint
-
-    def image(path: str, name: str) -> Any:
-        return views.Spatial2DView(origin=path, name=name)
-
-    scene = views.Vertical(
-        views.Spatial3DView(origin="world", name="scene"),
-        image("cameras/chase", "from behind"),
-        views.Horizontal(*(image(f"cameras/{n}", n.replace("_", " ")) for n in CAMERAS)),
-        row_shares=[3, 3, 1],
-    )
-    observed = views.Grid(
-        image("world/camera", "policy's camera"),
-        image("segmentation", "segmentation"),
-        image("observation", "observation"),
-        image("heat_map", "heat map"),
-        grid_columns=2,
-    )
-    numbers = views.Vertical(
-        observed,
-        views.TimeSeriesView(origin="action/probabilities", name="action probabilities"),
-        views.TimeSeriesView(origin="reward", name="reward and return"),
-        views.TextLogView(contents=["action/taken", "heat_map/method", "end"], name="log"),
-        row_shares=[2, 1, 1, 1],
-    )
+    cameras = [f"cameras/{name}" for name in ("chase", *CAMERAS)]
+    observed = [_CAMERA, "segmentation", "observation", "heat_map"]
+    scene, *images = (views.Spatial2DView(origin=path) for path in (*cameras, *observed))
     return views.Blueprint(
-        views.Horizontal(scene, numbers, column_shares=[3, 2]),
+        views.Horizontal(
+            views.Vertical(views.Spatial3DView(origin="world"), scene),
+            views.Vertical(
+                views.Grid(*images),
+                views.TimeSeriesView(origin="action/probabilities"),
+                views.TimeSeriesView(origin="reward"),
+                views.TextLogView(contents=["action/taken", "heat_map/method", "end"]),
+                row_shares=[3, 1, 1, 1],
+            ),
+        ),
         views.TimePanel(timeline="step", fps=1 / timestep, state="collapsed"),
         collapse_panels=True,
     )
@@ -166,22 +153,27 @@ class EpisodeLog:
 
     def __init__(self, rerun: Any, stream: Any, env: EnvBase) -> None:
         """Log what does not change: classes, axes, the drone's size, names of the actions."""
-        self._rr, self._stream = rerun, stream
+        self._rr, self._log = rerun, stream.log
+        self._set_time = stream.set_time
         self._base = base_env(env)
         self._worlds, self._scenes = self._base.worlds, Scenes(env)
         self._actions = self._worlds.dynamics.actions
         self._timestep = seconds_per_step(self._worlds.dynamics)
-        stream.send_blueprint(_layout(rerun, self._timestep))
-        self._boxes = self._worlds.scene.prop_boxes()
-        kinds = torch.tensor([*self._worlds.scene.semantic_classes, SemanticClass.SKY])
-        self._class_of_geom = kinds.to(torch.uint8)  # geom -1 (the sky) reads the last entry
         self._path: list[list[float]] = []
         """The drone's positions."""
         self._observed: list[Tensor] = []
         self._parts: list[int] = []
         """The parts of the actions taken."""
         self._return = 0.0
-        self._log_static()
+        stream.send_blueprint(_layout(rerun, self._timestep))
+        half = self._worlds.task.drone_size / 2
+        lines = rerun.SeriesLines(names=self._actions.names, colors=self._actions.colors)
+        classes = [(kind.value, kind.name.lower(), color) for kind, color in CLASS_COLORS.items()]
+        self._log("/", rerun.AnnotationContext(classes), static=True)
+        self._log("world", rerun.ViewCoordinates.FLU, static=True)
+        drone = self._box(SemanticClass.DRONE, half_sizes=[[half] * 3])
+        self._log("world/drone", drone, static=True)
+        self._log("action/probabilities", lines, static=True)
 
     def state(self, context: StepContext, reward: float) -> None:
         """Log the environment as it is now, and the reward of the action before, if any."""
@@ -191,19 +183,19 @@ class EpisodeLog:
         self._log_poses()
         self._observed.append(context.observe()[0].cpu())
         if len(self._path) > 1:
-            self._stream.log("reward/step", self._rr.Scalars(reward))
-        self._stream.log("reward/return", self._rr.Scalars(self._return))
+            self._log("reward/step", self._rr.Scalars(reward))
+        self._log("reward/return", self._rr.Scalars(self._return))
         end = self._worlds.task.ends(int(context.state.end_reason[0]))
         if end:
-            self._stream.log("end", self._rr.TextLog(f"end: {end.name.lower()}"))
+            self._log("end", self._rr.TextLog(f"end: {end.name.lower()}"))
 
     def action(self, act: Act) -> None:
         """Log the action that the policy takes now, and the probabilities of all."""
         part = int(self._actions.part(act.action[0]))
         self._parts.append(part)
         probs = probabilities(act, self._actions).cpu().numpy()
-        self._stream.log("action/probabilities", self._rr.Scalars(probs))
-        self._stream.log("action/taken", self._rr.TextLog(self._actions.names[part]))
+        self._log("action/probabilities", self._rr.Scalars(probs))
+        self._log("action/taken", self._rr.TextLog(self._actions.names[part]))
 
     def observations(self, network: ImageNetwork) -> None:
         """Log all observations, and heat maps of the actions taken laid over them."""
@@ -212,72 +204,58 @@ class EpisodeLog:
         images = [shown_picture(one.numpy(), low, high, channels) for one in observed]
         for step, image in enumerate(images):
             self._set_step(step)
-            self._stream.log("observation", self._rr.Image(image))
-        if network.is_differentiable and not network.is_recurrent:
-            self._log_heat(network, observed[:-1], images)
-
-    def _log_heat(self, network: ImageNetwork, observed: Tensor, images: list[NDArray]) -> None:
-        """Log the heat map of each action taken, and its method if there is any heat."""
+            self._log("observation", self._rr.Image(image))
+        if network.is_recurrent or not network.is_differentiable:
+            return
         # the methods that are shown for a policy with gradients do not read the baseline
         maps = Explainer(network, absent=observed[0]).methods()
-        inputs = observed.to(self._base.device), torch.tensor(self._parts, device=self._base.device)
+        device = self._base.device
+        inputs = observed[:-1].to(device), torch.tensor(self._parts, device=device)
         heat, by = first_heat({name: maps[name](*inputs) for name in shown_methods(maps)})
         for step, (one, method) in enumerate(zip(heat.cpu().numpy(), by, strict=True)):
             self._set_step(step)
-            self._stream.log("heat_map", self._rr.Image(heated(images[step], one)))
+            self._log("heat_map", self._rr.Image(heated(images[step], one)))
             if method is not None:
-                self._stream.log("heat_map/method", self._rr.TextLog(f"heat map: {method}"))
+                self._log("heat_map/method", self._rr.TextLog(f"heat map: {method}"))
         self._set_step(len(by))  # the last step, at which no action is taken
-        self._stream.log("heat_map", self._rr.Clear(recursive=False))
+        self._log("heat_map", self._rr.Clear(recursive=False))
 
     def _set_step(self, step: int) -> None:
-        self._stream.set_time("step", sequence=step)
-        self._stream.set_time("seconds", duration=step * self._timestep)
-
-    def _log_static(self) -> None:
-        rr, half = self._rr, self._worlds.task.drone_size / 2
-        classes = [(kind.value, kind.name.lower(), color) for kind, color in CLASS_COLORS.items()]
-        drone = self._box(SemanticClass.DRONE, half_sizes=[[half] * 3])
-        names, colors = self._actions.names, self._actions.colors
-        stream = self._stream
-        stream.log("/", rr.AnnotationContext(classes), static=True)
-        stream.log("world", rr.ViewCoordinates.FLU, static=True)
-        stream.log("world/drone", drone, static=True)
-        lines = rr.SeriesLines(names=names, colors=colors)
-        stream.log("action/probabilities", lines, static=True)
-        for name, color in (("step", palette.GOOD), ("return", palette.MUTED)):
-            line = rr.SeriesLines(names=[name], colors=[color])
-            stream.log(f"reward/{name}", line, static=True)
+        self._set_time("step", sequence=step)
+        self._set_time("seconds", duration=step * self._timestep)
 
     def _log_images(self) -> None:
-        rr, seen = self._rr, render_step(self._base)
-        worlds, look = self._worlds, self._base.appearances.current()
+        rr, images, worlds = self._rr, render_step(self._base), self._worlds
+        look = self._base.appearances.current()
         geoms = worlds.render(worlds.state, worlds.view(modality="segmentation"), look)[0]
-        classes = self._class_of_geom[geoms.long().cpu()].numpy()
-        self._stream.log("world/camera", rr.Image(seen.camera.cpu().numpy()))
-        self._stream.log("segmentation", rr.SegmentationImage(classes))
-        for name, image in zip(("chase", *CAMERAS), (seen.chase, *seen.strip), strict=True):
+        kinds = torch.tensor([*worlds.scene.semantic_classes, SemanticClass.SKY])
+        classes = kinds.to(torch.uint8)[geoms.long().cpu()].numpy()  # -1 (the sky) reads the last
+        self._log(_CAMERA, rr.Image(images.camera.cpu().numpy()))
+        self._log("segmentation", rr.SegmentationImage(classes))
+        for name, image in zip(("chase", *CAMERAS), (images.chase, *images.strip), strict=True):
             encoded = rr.Image(image.cpu().numpy()).compress(jpeg_quality=JPEG_QUALITY)
-            self._stream.log(f"cameras/{name}", encoded)
+            self._log(f"cameras/{name}", encoded)
 
     def _log_poses(self) -> None:
         worlds = self._worlds
         appearance = (self._base.appearances.current() or Appearance()).over(worlds.appearance)
         body, poses = worlds.state.body, worlds.poses(worlds.state, appearance)
+        if not self._path:
+            self._log_camera(appearance)
         self._path.append(body.position[0].tolist())
         self._log_pose("world/drone", body.position[0], body.attitude[0])
-        self._stream.log("world/trajectory", self._rr.LineStrips3D([self._path]))
-        self._log_camera(poses.position[0], poses.attitude[0], appearance.camera)
-        sizes = [1.0] * len(self._boxes)
+        self._log("world/trajectory", self._rr.LineStrips3D([self._path]))
+        boxes = worlds.scene.prop_boxes()
+        sizes = [1.0] * len(boxes)
         if appearance.distractors is not None:  # the last of the props
             scaled = appearance.distractors.expand(1).sizes[0].tolist()
             sizes[len(sizes) - len(scaled) :] = scaled
-        for box, place, size in zip(self._boxes, poses.props[0].cpu().numpy(), sizes, strict=True):
+        for box, place, size in zip(boxes, poses.props[0].cpu().numpy(), sizes, strict=True):
             center, half = place + size * box.center, size * box.half_size
             drawn = self._rr.Clear(recursive=False)
             if center[2] + half[2] > 0.0:  # tasks hide props under the ground
                 drawn = self._box(box.semantic_class, centers=[center], half_sizes=[half])
-            self._stream.log(["world", "objects", box.name], drawn)
+            self._log(["world", "objects", box.name], drawn)
 
     def _box(self, kind: SemanticClass, **shape: Any) -> Any:
         """Return a box in the color of its class."""
@@ -285,26 +263,27 @@ class EpisodeLog:
             class_ids=[kind.value], fill_mode="solid", show_labels=False, **shape
         )
 
-    def _log_camera(self, position: Tensor, attitude: Tensor, mounting: Mounting | None) -> None:
-        """Log pose and projection of the policy's camera, from the drone's pose: (3,), (4,)."""
+    def _log_camera(self, appearance: Appearance) -> None:
+        """Log pose and projection of the policy's camera, which are those of the whole episode."""
         view, model = self._worlds.policy_view, self._worlds.scene.model
-        number = self._worlds.scene.camera(view.cameras[0])
+        number, mounting = self._worlds.scene.camera(view.cameras[0]), appearance.camera
         place, turn = (torch.tensor(values[number]) for values in (model.cam_pos, model.cam_quat))
         zoom = 1.0
         if mounting is not None and mounting.camera == view.cameras[0]:
             place = place + torch.as_tensor(mounting.offset).cpu().reshape(3)
             turn = product(torch.as_tensor(mounting.turn, dtype=turn.dtype).cpu().reshape(4), turn)
             zoom = 1.0 if mounting.zoom is None else float(mounting.zoom)
-        at, turned = position.cpu(), attitude.cpu()
-        self._log_pose("world/camera", at + rotate(turned, place), product(turned, turn))
+        self._log_pose(_CAMERA, place, turn)
         half_angle = math.radians(float(model.cam_fovy[number])) / 2
-        focal = zoom * view.height / 2 / math.tan(half_angle)
-        axes, size = self._rr.ViewCoordinates.RUB, {"width": view.width, "height": view.height}
-        lens = self._rr.Pinhole(focal_length=focal, camera_xyz=axes, **size)
-        self._stream.log("world/camera", lens)
+        lens = self._rr.Pinhole(
+            focal_length=zoom * view.height / 2 / math.tan(half_angle),
+            camera_xyz=self._rr.ViewCoordinates.RUB,
+            width=view.width,
+            height=view.height,
+        )
+        self._log(_CAMERA, lens)
 
     def _log_pose(self, path: str, position: Tensor, attitude: Tensor) -> None:
         w, *xyz = attitude.tolist()
         turn = self._rr.Quaternion(xyzw=[*xyz, w])
-        pose = self._rr.Transform3D(translation=position.tolist(), quaternion=turn)
-        self._stream.log(path, pose)
+        self._log(path, self._rr.Transform3D(translation=position.tolist(), quaternion=turn))

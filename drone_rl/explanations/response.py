@@ -1,8 +1,6 @@
-"""Sections on one target: "response" (maps over its place) and "asymmetry"."""
+"""Sections "response" (maps over the place of one target) and "asymmetry"."""
 
-import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 import torch
@@ -11,6 +9,14 @@ from torch import Tensor
 
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.hooks import probabilities
+from drone_rl.explanations.results import (
+    Asymmetry,
+    Mirrored,
+    OutcomeMap,
+    Response,
+    ResponseMap,
+    ResponseRow,
+)
 from drone_rl.explanations.rollouts import run_to_end
 from drone_rl.explanations.scenes import Scenes, empty_scene, place_target
 from drone_rl.policies import ImageNetwork
@@ -20,53 +26,31 @@ from drone_rl.utils.intervals import mean_interval
 from drone_rl.utils.seeding import Stream, torch_generator
 
 BLIND = 0.1  # a policy is blind to a target that changes its action probabilities by less than this
+SHOWN = 3  # frames that differ most from their mirror images
 _RESPONSE, _OUTCOME = 0, 1  # numbers of the maps' grids
 
 
-def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Return "response", and "asymmetry": on the "dataset" and on the "grid" of the response map.
-
-    Arrays: "response_..." and "outcome_...", the fields of `ResponseMap` and `OutcomeMap`.
-    """
+def section(context: Context) -> Response:
+    """Evaluate the policy with one target at many places."""
     scenes, network, seed = context.scenes, context.network, context.seed.value
-    data, actions = context.dataset, scenes.actions
     response = response_map(scenes, network, seed=seed)
     outcome = outcome_map(scenes, network, seed=seed)
-    maps = {"response": vars(response), "outcome": vars(outcome)}
-    arrays = {f"{n}_{key}": array for n, fields in maps.items() for key, array in fields.items()}
-    on_frames = asymmetry(network, data.tensor("observations"), data.episode, actions)
-    numbers = {
-        "response": summarise(response, outcome, scenes.task.strata),
-        "asymmetry": {"dataset": on_frames, "grid": grid_asymmetry(response, actions)},
-    }
-    return numbers, arrays
+    here, actions = response.probabilities, scenes.actions
+    there = actions.mirror(here[:, :, ::-1])  # the mirrored map is the map read backwards
+    return Response(
+        rows=count_places(response, outcome, scenes.task.strata),
+        blind_below=BLIND,
+        asymmetry=float(actions.distance(here, there).mean()),
+        map=response,
+        outcome=outcome,
+    )
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class TargetGrid:
-    """Places of one target: Z up, F ahead, L sideways."""
-
-    height: NDArray  # (Z,); metres above the drone
-    forward: NDArray  # (F,); metres ahead of it
-    lateral: NDArray  # (L,); metres to its left
-    oracle: NDArray  # (L,); the needed action: a turn where flying straight on would miss
-    stratum: NDArray  # (L,); the task's stratum of a target there: its side
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class ResponseMap(TargetGrid):
-    """Action probabilities for one target at each place."""
-
-    probabilities: NDArray  # (Z, F, L, A)
-    without_target: NDArray  # (A,); action probabilities without a target
-    blind: NDArray  # (Z, F, L) bool; see `find_blind`
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class OutcomeMap(TargetGrid):
-    """Whether greedy rollouts reach a target at each place."""
-
-    collected: NDArray  # (Z, F, L) bool
+def asymmetry_section(context: Context) -> Asymmetry:
+    """Compare the policy with its mirror image on the analysed frames."""
+    data = context.dataset
+    observations = data.tensor("observations")
+    return asymmetry(context.network, observations, data.episode, context.scenes.actions)
 
 
 def response_map(
@@ -171,53 +155,38 @@ def outcome_map(
     return OutcomeMap(**fields, collected=collected.cpu().numpy())
 
 
-def summarise(response: ResponseMap, outcome: OutcomeMap, strata: Sequence[str]) -> dict[str, Any]:
-    """Return counts by height and stratum, such as "left", "ahead" and "right".
-
-    "rows" has for each height and side the fraction of places at which the policy is "blind" (None
-    if the grid has none on that side, or the needed action is unknown), and the number of "places"
-    and of those "collected".
-    """
+def count_places(
+    response: ResponseMap, outcome: OutcomeMap, strata: Sequence[str]
+) -> tuple[ResponseRow, ...]:
+    """Return results by height and stratum, such as "left", "ahead" and "right"."""
     rows, is_known = [], bool((response.oracle >= 0).all())
     for layer, height in enumerate(response.height.tolist()):
         for number, side in enumerate(strata):
             blind = response.blind[layer][:, response.stratum == number]
             collected = outcome.collected[layer][:, outcome.stratum == number]
             rows.append(
-                {
-                    "height": height,
-                    "side": side,
-                    "blind": float(blind.mean()) if blind.size and is_known else None,
-                    "collected": int(collected.sum()),
-                    "places": int(collected.size),
-                }
+                ResponseRow(
+                    height=height,
+                    side=side,
+                    blind=float(blind.mean()) if blind.size and is_known else None,
+                    collected=int(collected.sum()),
+                    places=int(collected.size),
+                )
             )
-    return {"without_target": response.without_target.tolist(), "blind_below": BLIND, "rows": rows}
+    return tuple(rows)
 
 
 def asymmetry(
     network: ImageNetwork, observations: Tensor, episode: NDArray, actions: Actions
-) -> dict[str, Any]:
-    """Compare the policy with its mirror image on observations x (T, C, H, W).
-
-    "signed" is the mean of pi(left | x) - pi(right | mirrored x), below 0 if the policy prefers
-    right; "absolute" the mean distance of the probabilities; "worst" the frames with the largest.
-    """
+) -> Asymmetry:
+    """Compare the policy with its mirror image on observations (T, C, H, W)."""
     here = probabilities(network, observations)
     there = actions.mirror(probabilities(network, observations.flip(-1)))
     signed = (actions.prob_left(here) - actions.prob_left(there)).double().cpu().numpy()
     distance = actions.distance(here, there).double().cpu().numpy()
-    worst = np.argsort(-distance, kind="stable")[:8]
-    return {
-        "signed": mean_interval(signed, episode, low=-1.0).model_dump(),
-        "absolute": mean_interval(distance, episode).model_dump(),
-        "worst": [{"frame": int(t), "distance": float(distance[t])} for t in worst],
-    }
-
-
-def grid_asymmetry(response: ResponseMap, actions: Actions) -> dict[str, float]:
-    """Compare a response map with its mirror image, which is the map read backwards."""
-    here, there = response.probabilities, actions.mirror(response.probabilities[:, :, ::-1])
-    signed = actions.prob_left(here) - actions.prob_left(there)
-    distance = actions.distance(here, there)
-    return {"signed": float(signed.mean()), "absolute": float(distance.mean())}
+    worst = np.argsort(-distance, kind="stable")[:SHOWN]
+    return Asymmetry(
+        signed=mean_interval(signed, episode, low=-1.0),
+        absolute=mean_interval(distance, episode),
+        worst=tuple(Mirrored(frame=int(t), distance=float(distance[t])) for t in worst),
+    )

@@ -17,7 +17,6 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import torch
@@ -34,16 +33,26 @@ from drone_rl.explanations.patches import (
     sample_frames,
     shuffled_networks,
 )
+from drone_rl.explanations.results import (
+    Likeness,
+    MapTests,
+    Median,
+    MethodTest,
+    Pointing,
+    RandomWeights,
+)
 from drone_rl.explanations.scenes import Scenes, alternatives, empty_scene
 from drone_rl.policies import ImageNetwork
 from drone_rl.sim.tasks import State
-from drone_rl.utils.intervals import episode_means, median_bounds
+from drone_rl.utils.intervals import Mean, episode_means, mean_interval, median_bounds
 
 MapOf = Callable[[ImageNetwork, Tensor, Tensor], Tensor]
 """A method: network, observations (T, C, h, w) and actions (T,) to maps (T, h, w), 0 or more."""
 ERROR_RATE = 0.05  # probability that any method is trusted whose maps do not depend on the policy
 FRAMES_AN_EPISODE = 10  # frames of an episode that are tested, evenly spaced
 WEIGHT_SEEDS = 5  # shuffled policies whose maps are compared with the policy's, pixel by pixel
+UNMOVED = "nothing moves the policy"
+"""Why a method can't be tested without frames."""
 MAX_CORRELATION = 0.5  # from this correlation with maps of shuffled weights on, a map ignores them
 
 
@@ -156,85 +165,71 @@ def method_maps(explainer: Explainer) -> dict[str, MapOf]:
 
 
 def check_maps(
-    trial: Trial,
-    methods: Mapping[str, MapOf],
-    *,
-    num_methods: int | None = None,
-) -> dict[str, Any]:
+    trial: Trial, methods: Mapping[str, MapOf], *, num_methods: int | None = None
+) -> MapTests:
     """Test methods, by name.
 
     The error rate is shared by `num_methods`, by default those that are given.
-
-    Returns:
-        "trusted": name of the best method that passed all tests, None if none did; "methods", by
-        name, see `check_method`; "placebos": their scores; "frames", "episodes", "frames_unmoved";
-        "level": error rate of each method; "confidence" of the intervals "lower" to "upper".
     """
     level = ERROR_RATE / (num_methods or max(1, len(methods)))
     results = {name: check_method(trial, method, level) for name, method in methods.items()}
-    scores = {name: one["score"]["lower95"] for name, one in results.items() if one["trusted"]}
-    return {
-        "trusted": max(scores, key=lambda name: scores[name], default=None),
-        "methods": results,
-        "placebos": {
-            name: patches.summarise_scores(placebo, trial.episode)
-            for name, placebo in trial.placebo_scores.items()
-        },
-        "frames": len(trial.episode),
-        "frames_unmoved": trial.frames_without_effect,
-        "episodes": len(np.unique(trial.episode)),
-        "level": level,
-        "confidence": 1.0 - 2 * level,
-    }
+    scores = {name: one.score.lower95 for name, one in results.items() if one.trusted}
+    return MapTests(
+        trusted=max(scores, key=lambda name: scores[name], default=None),
+        methods=results,
+        placebos={n: _mean(scores, trial.episode) for n, scores in trial.placebo_scores.items()},
+        frames=len(trial.episode),
+        frames_unmoved=trial.frames_without_effect,
+        episodes=len(np.unique(trial.episode)),
+        level=level,
+        confidence=1.0 - 2 * level,
+    )
 
 
-def check_method(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
-    """Test one method; see `check_maps`.
-
-    Returns:
-        "trusted", and "failed": names of the failed tests; "score": mean over episodes with its
-        interval; "placebos": by name, how much more it scores; "pointing": how much more often than
-        "chance" it hits, and the mean "hit"; "likeness" to maps of shuffled weights;
-        "random_weights"; "maps_without_heat". With bounds: "median", "lower" and "upper", each of
-        which holds with probability 1 - level; None for too few episodes. Without frames only
-        "trusted", "failed", which says why, and "score".
-    """
+def check_method(trial: Trial, method: MapOf, level: float) -> MethodTest:
+    """Test one method; each bound of a median holds with probability 1 - level."""
     episode = trial.episode
     if not len(episode):
-        none = patches.summarise_scores(np.zeros(0), np.zeros(0))
-        return {"trusted": False, "failed": ["nothing moves the policy"], "score": none}
+        return MethodTest(trusted=False, failed=(UNMOVED,), score=_mean(episode, episode))
     maps = trial.maps(method)
     scores = trial.scores(maps)
     hit, chance = patches.pointing(trial.grid.means(maps), trial.effects)
-    result = {
-        "score": patches.summarise_scores(scores, episode),
-        "placebos": {
-            name: _median(scores - placebo, episode, level)
-            for name, placebo in trial.placebo_scores.items()
-        },
-        "pointing": {
-            **_median(hit - chance, episode, level),
-            "hit": float(hit.mean()),
-            "chance": float(chance.mean()),
-        },
-        "likeness": _likeness(trial, method, level),
-        "maps_without_heat": int((maps.flatten(1).amax(1) <= 0).sum()),
+    placebos = {
+        name: _median(scores - placebo, episode, level)
+        for name, placebo in trial.placebo_scores.items()
     }
-    failed = _failed(result)
-    if not failed:
-        result["random_weights"] = random_weights(trial, method, level)
-        failed = ["random weights"] if result["random_weights"]["as_good"] else []
-    return {"trusted": not failed, "failed": failed, **result}
+    pointing = Pointing(
+        **_median(hit - chance, episode, level).model_dump(),
+        hit=float(hit.mean()),
+        chance=float(chance.mean()),
+    )
+    resembling = _likeness(trial, method, level)
+    is_passed = {  # a bound of None fails
+        "placebos": all((b.lower or 0.0) > 0.0 for b in placebos.values()),
+        "pointing": (pointing.lower or 0.0) > 0.0,
+        "likeness": resembling.upper is not None
+        and max(resembling.upper, *resembling.seeds) < MAX_CORRELATION,
+    }
+    shuffled = random_weights(trial, method, level) if all(is_passed.values()) else None
+    if shuffled is not None:
+        is_passed["random weights"] = shuffled.as_good == 0
+    return MethodTest(
+        trusted=all(is_passed.values()),
+        failed=tuple(name for name, passed in is_passed.items() if not passed),
+        score=_mean(scores, episode),
+        placebos=placebos,
+        pointing=pointing,
+        likeness=resembling,
+        random_weights=shuffled,
+        maps_without_heat=int((maps.flatten(1).amax(1) <= 0).sum()),
+    )
 
 
-def random_weights(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
+def random_weights(trial: Trial, method: MapOf, level: float) -> RandomWeights:
     """Compare the method's score on the policy with its scores on policies with shuffled weights.
 
-    It stops at the first policy on which the method scores as much.
-
-    Returns:
-        "score" on one frame of each episode; "best" and "mean" of the others; "tried": number of
-        shuffled policies; "as_good": how many of them scored as much.
+    The maps are those of one frame of each episode. It stops at the first policy on which the
+    method scores as much.
     """
     few = trial.thinned()
     score = float(few.scores(few.maps(method)).mean())
@@ -245,38 +240,33 @@ def random_weights(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
         others.append(float(few.scores(few.maps(method, network)).mean()))
         if is_as_good := others[-1] >= score - 1e-9:
             break
-    return {
-        "score": score,
-        "best": max(others),
-        "mean": float(np.mean(others)),
-        "tried": len(others),
-        "as_good": int(is_as_good),
-    }
+    return RandomWeights(
+        score=score,
+        best=max(others),
+        mean=float(np.mean(others)),
+        tried=len(others),
+        as_good=int(is_as_good),
+    )
 
 
-def _failed(result: dict[str, Any]) -> list[str]:
-    """Return the failed tests, except "random weights"; a bound of None fails."""
-    upper, seeds = result["likeness"]["upper"], result["likeness"]["seeds"]
-    is_passed = {
-        "placebos": all((b["lower"] or 0.0) > 0.0 for b in result["placebos"].values()),
-        "pointing": (result["pointing"]["lower"] or 0.0) > 0.0,
-        "likeness": upper is not None and max(upper, *seeds) < MAX_CORRELATION,
-    }
-    return [name for name, passed in is_passed.items() if not passed]
-
-
-def _likeness(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
+def _likeness(trial: Trial, method: MapOf, level: float) -> Likeness:
     """Compare a policy's maps with those of shuffled weights, all seeds together and each."""
     few = trial.thinned()
     maps = few.maps(method)
     networks = shuffled_networks(trial.network, trial.observations, WEIGHT_SEEDS, trial.seed)
     seeds = np.stack([likeness(maps, few.maps(method, network)) for network in networks])
-    medians = np.median(seeds, axis=1).tolist()
-    return {**_median(seeds.mean(0), few.episode, level), "seeds": medians}
+    medians = tuple(np.median(seeds, axis=1).tolist())
+    return Likeness(**_median(seeds.mean(0), few.episode, level).model_dump(), seeds=medians)
 
 
-def _median(values: NDArray, episode: NDArray, level: float) -> dict[str, float | None]:
+def _median(values: NDArray, episode: NDArray, level: float) -> Median:
     """Return the median of the episodes' means; each bound holds with probability 1 - level."""
     means = episode_means(values, episode)
     lower, upper = median_bounds(means, 1.0 - 2 * level) or (None, None)
-    return {"median": float(np.median(means)), "lower": lower, "upper": upper}
+    return Median(median=float(np.median(means)), lower=lower, upper=upper)
+
+
+def _mean(scores: NDArray, episode: NDArray) -> Mean:
+    """Return the mean of scores over episodes with its interval."""
+    means = episode_means(scores, episode).clip(-1, 1)
+    return mean_interval(means, np.arange(len(means)), -1.0)

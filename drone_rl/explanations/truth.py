@@ -1,7 +1,6 @@
 """Section "truth": tests of the heat maps against the effects of changes to the scene."""
 
 import dataclasses
-from typing import Any
 
 import numpy as np
 import torch
@@ -12,45 +11,35 @@ from drone_rl.explanations import trust
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.patches import sample_frames
+from drone_rl.explanations.results import Outcomes, Truth
 from drone_rl.explanations.rollouts import Step, run_from
 from drone_rl.explanations.scenes import DARK_GROUND, Region, Scenes
 from drone_rl.policies import ImageNetwork
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import State
-from drone_rl.utils.intervals import episode_means, mean_bounds, mean_interval
+from drone_rl.utils.intervals import mean_interval
 
 
-def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Return "truth".
-
-    It has the results of `check_maps`, of no method if the weights are unknown; "interventions":
-    effects of changes to the scene; "outcomes" of rollouts (None if no frame has a next target).
-
-    Arrays: "interventions" (K, H, W, 3): one frame after each change; "patch_effects" (rows,
-    columns): mean effect of each patch.
-    """
+def section(context: Context) -> Truth:
+    """Test the heat maps, none if the weights are unknown; measure effects of changes."""
     data, scenes, network = context.dataset, context.scenes, context.network
     episode, seed = data.episode, context.seed.value
     state = data.state(scenes.task, scenes.worlds.dynamics).to(str(context.env.device))
     trial = trust.make_trial(scenes, network, state, data.tensor("actions"), episode, seed)
     changes = intervene(scenes, network, state, data.tensor("regions"), seed=seed)
     shown_frame = clear_frame(changes[0])
+    methods = trust.method_maps(context.explainer) if network.has_weights else {}
     outcomes = measure_outcomes(scenes, network, state, episode)
-    numbers = {
-        **trust.check_maps(
-            trial, trust.method_maps(context.explainer) if network.has_weights else {}
-        ),
-        "interventions": {c.name: mean_interval(c.effect, episode).model_dump() for c in changes},
-        "outcomes": outcomes if outcomes["flights"] else None,
-        "shown_frame": shown_frame,
-    }
     effects = trial.effects if len(trial.effects) else np.zeros((1, trial.grid.count))
-    arrays = {
-        "interventions": np.stack([c.frames[shown_frame].cpu().numpy() for c in changes]),
-        "patch_effects": effects.mean(0).reshape(trial.grid.rows, trial.grid.columns),
-    }
-    return {"truth": numbers}, arrays
+    return Truth(
+        **vars(trust.check_maps(trial, methods)),
+        interventions={c.name: mean_interval(c.effect, episode) for c in changes},
+        outcomes=outcomes if outcomes.flights else None,
+        shown_frame=shown_frame,
+        changed=np.stack([c.frames[shown_frame].cpu().numpy() for c in changes]),
+        patch_effects=effects.mean(0).reshape(trial.grid.rows, trial.grid.columns),
+    )
 
 
 OTHER_TARGETS = Appearance(
@@ -143,17 +132,11 @@ class TargetRollouts:
 
 def measure_outcomes(
     scenes: Scenes, network: ImageNetwork, state: State, episode: NDArray
-) -> dict[str, Any]:
+) -> Outcomes:
     """Compare greedy rollouts with the next target moved, and with another ground.
 
     That an action's probability changes does not show that the outcome changes. The rollouts start
     from T states of the data set; `episode` has shape (T,).
-
-    Returns:
-        Means over episodes with intervals: "collected", by variant ("as it was", "moved left",
-        "moved right"); "follows": metres that the drone moves sideways with the target per metre, 0
-        if it ignores it, 1 if it always goes there; "ground_changed": fraction whose outcome
-        differs with another ground. "flights": number of rollouts of each variant.
     """
     task = scenes.task
     ahead = (~task.next_offset(state)[:, 0].isnan()).nonzero()[:, 0].cpu().numpy()
@@ -168,15 +151,12 @@ def measure_outcomes(
     runs = {name: run_to_target(scenes, network, s, target) for name, s in variants.items()}
     repainted = run_to_target(scenes, network, start, target, DARK_GROUND)
 
-    def mean(values: NDArray, low: float = 0.0) -> dict[str, Any]:
-        return mean_bounds(episode_means(values.astype(np.float64), group), low, 1.0).model_dump()
-
-    return {
-        "flights": len(rows),
-        "collected": {name: mean(run.collected) for name, run in runs.items()},
-        "follows": mean(followed(runs["moved left"], runs["moved right"]), -1.0),
-        "ground_changed": mean(runs["as it was"].collected != repainted.collected),
-    }
+    return Outcomes(
+        flights=len(rows),
+        collected={name: mean_interval(run.collected, group) for name, run in runs.items()},
+        follows=mean_interval(followed(runs["moved left"], runs["moved right"]), group, -1.0),
+        ground_changed=mean_interval(runs["as it was"].collected != repainted.collected, group),
+    )
 
 
 def run_to_target(

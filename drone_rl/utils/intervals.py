@@ -36,19 +36,6 @@ class Mean(Stored):
     """Number of values."""
 
 
-class EpisodeMean(Stored):
-    """A mean over episodes of the means of their frames, with an interval that counts episodes."""
-
-    mean: float | None
-    """The mean; None without frames, like the ends."""
-    lower95: float | None
-    upper95: float | None
-    frames: int
-    """Frames with a value."""
-    episodes: int
-    """Episodes with such a frame."""
-
-
 def proportion(successes: int, trials: int, confidence: float = 0.95) -> Share:
     """Return a rate with its exact (Clopper-Pearson) interval."""
     from scipy.special import betaincinv  # slow to import, and trainings report no interval
@@ -148,21 +135,10 @@ def episode_means(values: NDArray, episode: NDArray) -> NDArray:
     return totals / np.bincount(number)
 
 
-def mean_interval(
-    values: NDArray, episode: NDArray, low: float = 0.0, high: float = 1.0
-) -> EpisodeMean:
+def mean_interval(values: NDArray, episode: NDArray, low: float = 0.0, high: float = 1.0) -> Mean:
     """Return the mean over episodes of their means, with a 95% interval that counts episodes.
 
     Frames of one episode are alike, so that an interval for independent frames would be too narrow.
     `values` and `episode` are as for `episode_means`, from `low` to `high`.
     """
-    means = episode_means(values, episode)
-    bounds = mean_bounds(means, low, high)
-    has_mean = bounds.mean is not None
-    return EpisodeMean(
-        mean=bounds.mean,
-        lower95=bounds.lower95 if has_mean else None,
-        upper95=bounds.upper95 if has_mean else None,
-        frames=int(np.isfinite(values).sum()),
-        episodes=len(means),
-    )
+    return mean_bounds(episode_means(values, episode), low, high)

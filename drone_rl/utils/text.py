@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import jinja2
 
-    from drone_rl.utils.intervals import EpisodeMean, Mean, Share
+    from drone_rl.utils.intervals import Mean, Share
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
 _ENDINGS = {1: "st", 2: "nd", 3: "rd"}
@@ -56,16 +56,6 @@ def setting(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.12g}"  # without ".0"
     return value if isinstance(value, str) else json.dumps(value)
-
-
-def bounds(interval: Mapping[str, Any], show: Callable[[float], str] = "{:.2f}".format) -> str:
-    """Return a 95% interval in words."""
-    return f"95%: {show(interval['lower95'])} to {show(interval['upper95'])}"
-
-
-def among(share: Mapping[str, Any]) -> str:
-    """Return a rate as "k of n"."""
-    return f"{share['successes']} of {share['trials']}"
 
 
 def listed(parts: Sequence[str], last: str = "and") -> str:
@@ -139,13 +129,13 @@ exact_percent = functools.partial(percent, digits=2)
 """Returns a known fraction in percent with two decimals."""
 
 
-def interval(figure: "Share | Mean | EpisodeMean | Mapping[str, Any]") -> str:
+def interval(figure: "Share | Mean | Mapping[str, Any]") -> str:
     """Return the 95% confidence interval of a rate."""
     ends = figure if isinstance(figure, Mapping) else dict(figure)
     return f"{percent(ends['lower95'])} to {percent(ends['upper95'])}"
 
 
-def rate(figure: "Share | Mean | EpisodeMean | Mapping[str, Any]", label: str = "95% CI ") -> str:
+def rate(figure: "Share | Mean | Mapping[str, Any]", label: str = "95% CI ") -> str:
     """Return a rate with its 95% confidence interval, which the label precedes.
 
     A rate of None is "not offered".

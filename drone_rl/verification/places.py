@@ -15,17 +15,16 @@ from drone_rl.config.commands import PlacesSettings
 from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.config.options import PlacesOptions
 from drone_rl.envs import Pipeline
-from drone_rl.explanations.report.places import rows, say_places
+from drone_rl.explanations.report.places import chart, describe, rows
+from drone_rl.explanations.results import ExactMap
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.vocabulary import SHOWN_MOVES
-from drone_rl.trust.plots import regions
 from drone_rl.trust.plots.saving import save_drawn
 from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
-from drone_rl.utils.text import say
 from drone_rl.utils.threads import torch_threads
 from drone_rl.verification.prover.action_map import ActionMap, map_policy
 from drone_rl.verification.prover.policy_spec import make_policy_spec
@@ -39,8 +38,10 @@ class Places(TableResult):
     settings: PlacesSettings
     places: ActionMap
     """The cells."""
+    summary: ExactMap
+    """The map in figures."""
     numbers: dict[str, Any]
-    """Summary, as in `places.json`."""
+    """The same with its origin, as in `places.json`."""
 
     def at(self, ahead: float, left: float) -> str:
         """Return the action for a cube at a position.
@@ -71,15 +72,15 @@ class Places(TableResult):
 
     def rows(self) -> list[list[str]]:
         """Return the fractions of the area as a table: a header, then a row for each side."""
-        return rows(self.numbers, SHOWN_MOVES.names)
+        return rows(self.summary, SHOWN_MOVES.names)
 
     def notes(self) -> list[str]:
         """Return the findings in words."""
-        return [say(say_places, {"places": self.numbers})]
+        return [describe(self.summary, SHOWN_MOVES.names)]
 
     def figure(self) -> Figure:
         """Return the map."""
-        return regions.chart(self.numbers, self.places.outlines(), SHOWN_MOVES)
+        return chart(self.summary, SHOWN_MOVES)
 
 
 def places(
@@ -122,13 +123,14 @@ def places(
         progress("deciding the cells")
         action_map = map_policy(spec.images, transform, network, settings)
     progress("mapped", 1, 1)
+    summary = action_map.summary(settings.logit_gap)
     numbers = {
         "policy": policy.name,
         "path": str(policy.path),
         "task": policy.task.values(),
         "names": list(SHOWN_MOVES.names),
-        **action_map.summary(settings.logit_gap),
+        **summary.model_dump(exclude={"outlines", "share"}),
         "compared": compared,
         "seconds": time.perf_counter() - begin,
     }
-    return Places(policy, settings, action_map, numbers)
+    return Places(policy, settings, action_map, summary, numbers)

@@ -1,13 +1,11 @@
 """Section "places" of explanations: the exact map of the action over one cube's place."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import PlacesSettings
 from drone_rl.explanations.context import Context
+from drone_rl.explanations.results import ExactMap, NoMap
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.utils.errors import InputError
@@ -21,18 +19,13 @@ _COMPARED = 1000
 """Rendered frames that are compared with the closed form; fewer than in `drone-rl places`."""
 
 
-def places_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Return "places", or why it is "refused" if no exact map is known for this configuration.
-
-    Arrays: "places_..." of the outlines, see `ActionMap.outlines`.
-    """
+def places_section(context: Context) -> ExactMap | NoMap:
+    """Return the map, or why none is known."""
     settings = PlacesSettings()
     try:
-        action_map = _exact_map(context, settings)
+        return _exact_map(context, settings).summary(settings.logit_gap)
     except InputError as error:
-        return {"places": {"refused": str(error)}}, {}
-    arrays = {f"places_{name}": array for name, array in action_map.outlines().items()}
-    return {"places": action_map.summary(settings.logit_gap)}, arrays
+        return NoMap(refused=str(error))
 
 
 def _exact_map(context: Context, settings: PlacesSettings) -> ActionMap:

@@ -5,12 +5,13 @@ from pathlib import Path
 import drone_rl
 from drone_rl.explanations.explain import Explanations
 from drone_rl.utils.seeding import RootSeed
+from tests.explanations.example import changed_explanation
 from tests.explanations.quick import few_sections, quick_figures
 
 
 def test_explain_then_report(in_process, tmp_path):
     few = ["frames=30", "episodes=8", "perplexity=5", "num_envs=32"]
-    with few_sections("dataset", "evaluation"), quick_figures():
+    with few_sections("dataset", "verdict"), quick_figures():
         done = in_process("explain", "policy=poor", "require=good", *few, "hydra.run.dir=run")
         again = in_process("report", "explanations=run", "hydra.run.dir=again")
     assert "poor: poor" in done.stdout
@@ -26,16 +27,20 @@ def test_several_policies_are_explained_together(in_process, monkeypatch):
 
     def explain(policies, settings, **kwargs):
         seen.update(names=[policy.name for policy in policies], frames=settings.frames, **kwargs)
-        verdicts = {
-            name: {"kind": kind, "certain": True, "sentence": "It is.", "exit_code": code}
+        explained = {
+            name: changed_explanation(
+                {
+                    "verdict.kind": kind,
+                    "verdict.exit_code": code,
+                }
+            )
             for name, (kind, code) in kinds.items()
         }
-        numbers = {name: {"verdict": verdict} for name, verdict in verdicts.items()}
-        return Explanations(Path("x"), Path("x/report.html"), numbers, RootSeed(1, is_fixed=True))
+        return Explanations(Path("x"), Path("x/report.html"), explained, RootSeed(1, is_fixed=True))
 
     monkeypatch.setattr(drone_rl, "explain", explain)
     done = in_process("explain", "policy=[good,poor]", "frames=150", "num_envs=7")
     assert (done.returncode, seen["names"]) == (0, ["good", "poor"])
     assert (seen["frames"], seen["num_envs"]) == (150, 7)
-    assert "good: good. It is." in done.stdout and "poor: poor. It is." in done.stdout
+    assert "good: good. This policy" in done.stdout and "poor: poor. This policy" in done.stdout
     assert in_process("explain", "policy=[good,poor]", "require=good").returncode == 13

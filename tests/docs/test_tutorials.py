@@ -106,7 +106,7 @@ def workplace(tmp_path, monkeypatch):
     loader = jinja2.ChoiceLoader([theirs, templates])
     monkeypatch.setattr(jinja2, "PackageLoader", lambda _: loader)
     report_page._environment.cache_clear()  # another tutorial may have made it, with another loader
-    few = few_sections("dataset", "evaluation")
+    few = few_sections("dataset", "verdict")
     with (
         patch.dict(TASKS),
         patch.dict(MAKERS),

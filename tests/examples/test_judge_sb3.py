@@ -19,13 +19,13 @@ def test_train_save_judge_and_explain(example, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(drone_rl, "policy_from", short)
     example.train(512, num_envs=32, steps=16).save(tmp_path / "ppo.zip")
     model = sb3.PPO.load(tmp_path / "ppo.zip")
-    few = few_sections("attribution", "dataset", "evaluation")
+    few = few_sections("attribution", "dataset", "verdict")
     with few, quick_figures():
         example.trust(model, str(tmp_path), frames=30, episodes=6, perplexity=5)
     verdict, *_, report = capsys.readouterr().out.splitlines()
     assert "episodes are too few to be certain" in verdict
     page = Path(report).read_text()
     assert (
-        "Grad-CAM of layer policy.features_extractor.cnn.5" in page
+        "of layer policy.features_extractor.cnn.5" in page
     )  # the nonlinearity after the last convolution
     assert "What is left out" not in page

@@ -1,8 +1,8 @@
 """Small searches, grids and figures, for tests of what surrounds them."""
 
 import contextlib
-import dataclasses
 import functools
+import itertools
 from collections.abc import Iterator
 
 import pytest
@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from drone_rl.explanations import class_models, explain, response
 from drone_rl.explanations.explain import SECTIONS
 from drone_rl.explanations.report import attribution
+from drone_rl.explanations.results import NoMap
 from drone_rl.trust.plots import saving
 from drone_rl.verification import places_section as places
 from drone_rl.verification.places_section import places_section
@@ -35,8 +36,8 @@ def few_sections(*names: str) -> Iterator[None]:
     """Compute these sections alone; all of them take a minute."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(explain, "SECTIONS", {name: SECTIONS[name] for name in names})
-        refused = {"places": {"refused": "the test needs none"}}
-        patch.setattr(places, "places_section", lambda context: (refused, {}))
+        refused = NoMap(refused="the test needs none")
+        patch.setattr(places, "places_section", lambda context: refused)
         yield
 
 
@@ -46,18 +47,13 @@ def quick_figures() -> Iterator[None]:
 
     The fixture `report` has whole figures.
     """
-    to_png, film = saving.to_png, attribution.film
+    to_png, joined = saving.to_png, attribution.joined
 
     def no_chart(picture):
         return b"\x89PNG" if isinstance(picture, Figure) else to_png(picture)
 
-    def three_frames(explanation, method):
-        few = explanation.arrays["film_frames"][:3]
-        arrays = {**explanation.arrays, "film_frames": few}
-        return film(dataclasses.replace(explanation, arrays=arrays), method)
-
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(saving, "to_png", no_chart)
         patch.setattr(saving, "_lay_out", lambda figure: figure.set_layout_engine(None))
-        patch.setattr(attribution, "film", three_frames)
+        patch.setattr(attribution, "joined", lambda film: joined(itertools.islice(film, 3)))
         yield

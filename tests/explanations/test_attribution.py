@@ -10,15 +10,13 @@ from drone_rl.sim.tasks.collect_cubes import CubesEnd
 
 
 def test_the_film_has_the_steps_of_the_first_episode(context):
-    numbers, arrays = section(context)
-    found = numbers["attribution"]
+    found = section(context)
     steps = int((context.flights.episode == FILMED).sum())
-    for method in found["methods"]:
-        maps = arrays[f"film_heat_{method}"].reshape(steps, -1)
-        assert set(np.unique(maps.max(1))) <= {0.0, 1.0}  # nothing, or a peak of one
-    assert len(arrays["film_frames"]) == len(found["film"]["heat_by"]) == steps
-    assert arrays["film_actions"].tolist() == context.flights.actions[:steps].tolist()
-    assert np.allclose(arrays["film_probabilities"].sum(-1), 1, atol=1e-3)
+    for heat in found.heat.values():
+        assert set(np.unique(heat.reshape(steps, -1).max(1))) <= {0.0, 1.0}  # none, or a peak of 1
+    assert len(found.frames) == len(found.heat_by) == steps
+    assert found.actions.tolist() == context.flights.actions[:steps].tolist()
+    assert np.allclose(found.probabilities.sum(-1), 1, atol=1e-3)
 
 
 def test_the_default_method_is_grad_cam_or_the_first_available():

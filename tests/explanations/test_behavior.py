@@ -7,18 +7,14 @@ import pytest
 
 from drone_rl.explanations.behavior import (
     dataset_section,
-    evaluation_section,
     find_loops,
     find_pairs,
+    flaws_section,
     median_frame_change,
-    shifts_section,
-    summarise_loops,
-    summarise_pairs,
+    verdict_section,
 )
 from drone_rl.explanations.rollouts import RolloutDataset
 from drone_rl.sim.actions import MOVES
-from drone_rl.trust.shifts_results import SavedShifts, packed
-from tests.evidence import SAVED_SHIFTS, SHIFTS
 from tests.five_actions import FIVE
 
 F, L, R = 0, 1, 2
@@ -57,9 +53,6 @@ def test_pairs_are_classified_by_the_place_of_the_target():
     }  # fmt: skip
     assert pairs[0].opposition == pytest.approx(0.8)
     assert pairs[0].distance == pytest.approx(0.1 / np.sqrt(2))
-    summary = summarise_pairs(pairs, data)
-    assert (summary["contradictions"], summary["justified"], summary["unknown"]) == (1, 1, 1)
-    assert summary["pairs"] == 3 and summary["worst_opposition"] == pytest.approx(0.8)
 
 
 def test_the_least_opposition_of_a_pair():
@@ -92,13 +85,6 @@ def test_each_frame_is_in_one_pair():
     assert [(p.left, p.right) for p in pairs] == [(1, 2)]
 
 
-def test_all_pairs_are_counted_and_fifty_are_listed():
-    data = fake(np.zeros((110, 2)), [LEFT, RIGHT] * 55, [[5, 1]] * 110)
-    summary = summarise_pairs(pairs_of(data, alike=1.0), data)
-    assert summary["pairs"] == summary["contradictions"] == 55
-    assert len(summary["list"]) == 50
-
-
 def test_the_median_change_is_within_episodes():
     # root mean squares of 6, 1, 3 and, in the second episode, 4 and 5; what lies between the two
     # episodes, 90, does not count
@@ -124,19 +110,14 @@ def test_statistics_of_the_data_set_by_hand():
         actions=np.array([0, 0, 0, 2, 0]),
         event=np.array([0, 1, 1, 0, -1], np.int8),
     )
-    numbers, arrays = dataset_section(
-        SimpleNamespace(dataset=data, flights=flights, remembers=False)
-    )
-    found = numbers["dataset"]
-    assert arrays == {}
-    assert (found["frames"], found["episodes"], found["steps"]) == (3, 3, 5)
-    assert found["action_shares"] == [0.8, 0.0, 0.2]
-    assert found["goals_reached"] == 2
+    context = SimpleNamespace(dataset=data, flights=flights, remembers=False)
+    found = dataset_section(context)
+    assert (found.frames, found.episodes, found.steps, found.goals_reached) == (3, 3, 5, 2)
+    assert found.action_shares == (0.8, 0.0, 0.2)
     # an episode counts once: 0, and the mean of log 2 / log 3 and 1
-    assert found["entropy"]["mean"] == pytest.approx((0 + (np.log(2) / np.log(3) + 1) / 2) / 2)
+    assert found.entropy.mean == pytest.approx((0 + (np.log(2) / np.log(3) + 1) / 2) / 2)
 
 
-F, L, R = 0, 1, 2
 UP, DOWN, TO_LEFT, TO_RIGHT, STAY = range(5)
 
 
@@ -144,66 +125,36 @@ def flights(actions, episode):
     return RolloutDataset({"actions": np.array(actions, int), "episode": np.array(episode)}, {}, {})
 
 
+def loops_of(moves, episode, actions=MOVES):
+    loops = find_loops(flights(moves, episode), actions)
+    return [(loop.first, loop.length, loop.reversals) for loop in loops]
+
+
 def test_loops_by_hand():
     #         a loop of five    no loop     ends with the episode  two turns: a loop
     actions = [F, L, R, L, R, L, F, L, L, R, F, L, R, R, L, R, F]
-    data = flights(actions, [0] * 12 + [1] * 5)
-    loops = find_loops(data, MOVES)
-    assert [tuple(loop.values()) for loop in loops] == [(1, 5, 4), (12, 4, 2)]
-    summary = summarise_loops(data, loops)
-    assert (summary["episodes"]["successes"], summary["episodes"]["trials"]) == (2, 2)
-    assert summary["longest"] == 5 and summary["frames_share"] == pytest.approx(9 / 17)
-
-
-def test_episodes_with_a_loop_are_counted_once():
-    data = flights([L, R, L, F, L, R, L, F, F, F], [0] * 8 + [1] * 2)
-    summary = summarise_loops(data, find_loops(data, MOVES))
-    assert summary["loops"] == 2 and summary["frames_share"] == pytest.approx(0.6)
-    assert (summary["episodes"]["successes"], summary["episodes"]["trials"]) == (1, 2)
-    assert summary["list"][1] == {"first": 4, "length": 3, "reversals": 2}
+    assert loops_of(actions, [0] * 12 + [1] * 5) == [(1, 5, 4), (12, 4, 2)]
 
 
 def test_loops_with_other_actions():
-    """Up and down go nowhere; up and left is a way; staying is nothing that one can undo."""
-    moves = [
-        UP,
-        DOWN,
-        UP,
-        STAY,
-        UP,
-        TO_LEFT,
-        UP,
-        TO_LEFT,
-        STAY,
-        TO_LEFT,
-        TO_RIGHT,
-        TO_LEFT,
-        TO_RIGHT,
-    ]
-    loops = find_loops(flights(moves, [0] * len(moves)), FIVE)
-    assert [tuple(loop.values()) for loop in loops] == [(0, 3, 2), (9, 4, 3)]
+    """Up and down are opposites, up and left are not; a stay can't be undone."""
+    moves = [UP, DOWN, UP, STAY, UP, TO_LEFT, UP, TO_LEFT, STAY]
+    moves += [TO_LEFT, TO_RIGHT, TO_LEFT, TO_RIGHT]
+    assert loops_of(moves, [0] * len(moves), FIVE) == [(0, 3, 2), (9, 4, 3)]
 
 
-def test_a_robustness_evaluation_is_copied():
-    bright, dark = (packed(np.full((5, 16, 3), value, np.uint8)) for value in (7, 0))
-    images = {"image_size": (5, 16), "pictures": {"blur": (bright, None, *[dark] * 4)}}
-    axes = {"blur": SHIFTS["axes"]["blur"]}
-    measured = SavedShifts.read({**SAVED_SHIFTS, "shifts": {**SHIFTS, **images, "axes": axes}})
-    numbers, arrays = shifts_section(SimpleNamespace(measured=measured))
-    assert SavedShifts.read(numbers["shifts"]).shifts.axes == measured.shifts.axes
-    assert arrays["shifts_blur"].shape == (6, 5, 16, 3)
-    assert arrays["shifts_blur"][0].min() == 7 and arrays["shifts_blur"][1].max() == 0
-    refused = measured.replace(shifts=None, refused="it is of another task")
-    numbers, arrays = shifts_section(SimpleNamespace(measured=refused))
-    assert numbers["shifts"]["refused"] == "it is of another task" and arrays == {}
-    assert shifts_section(SimpleNamespace(measured=None)) == ({}, {})
+def test_episodes_with_a_loop_are_counted_once():
+    data = fake(np.zeros((10, 1)), [LEFT] * 10, [[5, 1]] * 10)
+    data.arrays["actions"][:] = [L, R, L, F, L, R, L, F, F, F]
+    data.arrays["episode"][8:] = 1
+    data.offset = lambda task: data.meta["offsets"]
+    scenes = SimpleNamespace(actions=MOVES, task=None)
+    found = flaws_section(SimpleNamespace(dataset=data, flights=data, scenes=scenes))
+    assert len(found.loops) == 2 and found.looping_steps == pytest.approx(0.6)
+    assert (found.looping_episodes.successes, found.looping_episodes.trials) == (1, 2)
 
 
 def test_the_verdict_does_not_depend_on_earlier_episodes(context):
-    numbers, arrays = evaluation_section(context)
-    again, _ = evaluation_section(context)
-    verdict = numbers["verdict"]
-    assert arrays == {}
-    assert verdict["greedy"]["episodes"] == 6
-    assert verdict["good_share"] == 0.7
-    assert numbers == again
+    verdict = verdict_section(context)
+    assert (verdict.greedy.episodes, verdict.good_share) == (6, 0.7)
+    assert verdict_section(context) == verdict

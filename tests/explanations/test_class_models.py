@@ -1,6 +1,5 @@
 """Observations optimized for each action: ascent, search, and the command."""
 
-import dataclasses
 from types import SimpleNamespace
 
 import pytest
@@ -11,14 +10,16 @@ from drone_rl.explanations.class_model_gallery import GALLERY
 from drone_rl.explanations.class_models import (
     Attempts,
     ClassModelSettings,
-    ImageStatistics,
     _Ascent,
+    best_models,
     gaussian_blur,
+    image_statistics,
     search,
     section,
     visualise,
 )
 from drone_rl.explanations.context import LeftOutError
+from drone_rl.explanations.results import ImageStatistics
 from drone_rl.policies import MLP
 from drone_rl.utils.errors import InputError
 
@@ -73,21 +74,20 @@ def test_an_action_that_no_image_reaches_has_a_low_probability():
     network = MLP((1, 6, 12), 3, hidden=())
     with torch.no_grad():
         network.layers.logits.bias.copy_(torch.tensor([0.0, -20.0, 0.0]))
-    summary = search(network, STATISTICS).summary()
-    assert summary["highest"][1] < 0.01 and summary["highest"][0] > 0.5
-    assert len(summary["tried"]) == summary["num_settings"] == 6
+    found = best_models(search(network, STATISTICS))
+    assert found.highest[1] < 0.01 and found.highest[0] > 0.5
+    assert found.attempts == 6 * 8
 
 
 def test_statistics_by_hand():
     """Columns 0 1 0 1: neighbours across differ by 1, those down by 0; the data set's by 2."""
     stripes = torch.tensor([0.0, 1.0]).repeat(3).expand(1, 1, 4, 6)
-    statistics = ImageStatistics.of(2 * stripes)
-    assert statistics == ImageStatistics(
-        mean=1.0, std=pytest.approx((24 / 23) ** 0.5), low=0.0, high=2.0, roughness=2.0
-    )
+    statistics = image_statistics(2 * stripes)
+    assert (statistics.mean, statistics.low, statistics.high, statistics.roughness) == (1, 0, 2, 2)
+    assert statistics.std == pytest.approx((24 / 23) ** 0.5)
     rows = stripes.mT.contiguous()
-    assert ImageStatistics.of(rows).roughness == 1.0
-    assert ImageStatistics.of(torch.cat([stripes, 0 * stripes])).roughness == 0.5
+    assert image_statistics(rows).roughness == 1.0
+    assert image_statistics(torch.cat([stripes, 0 * stripes])).roughness == 0.5
 
 
 PLAIN = ClassModelSettings(steps=1, jitter=0, starts=1)
@@ -136,43 +136,6 @@ def test_a_step_on_the_pixels_by_hand(halves, unrefined):
     torch.testing.assert_close(found[0, 0], 3.0 * gradient)
 
 
-def test_a_step_on_fourier_coefficients_is_longer_where_the_frequency_is_low(unrefined):
-    """Adam moves each part by the rate over 400; the picture's by as much over the frequency."""
-    network = MLP((1, 8, 12), 3, hidden=(), generator=torch.Generator().manual_seed(0))
-    start = torch.rand(1, 1, 8, 12, generator=torch.Generator().manual_seed(0))
-    moved, still = (
-        _Ascent(network, torch.tensor([1]), WIDE, dataclasses.replace(PLAIN, lr=lr), None).fourier(
-            start
-        )
-        for lr in (4.0, 1e-12)
-    )
-    difference = torch.fft.rfft2(moved - still)[0, 0]
-    rows, columns = torch.fft.fftfreq(8)[:, None], torch.fft.rfftfreq(12)[None]
-    frequency = (rows**2 + columns**2).sqrt()
-    steps = (difference * frequency)[1:4, 1:6]  # coefficients that nothing ties to others
-    torch.testing.assert_close(steps.real.abs(), torch.full((3, 5), 0.01), rtol=0.02, atol=0)
-    torch.testing.assert_close(steps.imag.abs(), torch.full((3, 5), 0.01), rtol=0.02, atol=0)
-    assert abs(float(difference[0, 0].real)) == pytest.approx(
-        0.01 * 12, rel=0.02
-    )  # 1 / 12 at least
-
-
-def refine(images, statistics):
-    return _Ascent(None, None, statistics, ClassModelSettings(blur=0.7), None).refine(images)
-
-
-def test_refined_images_have_the_data_sets_mean_deviation_and_range():
-    images = torch.randn(3, 1, 6, 12, generator=torch.Generator().manual_seed(0)) * 4 + 9
-    refined = refine(images, WIDE)
-    torch.testing.assert_close(refined.mean((1, 2, 3)), torch.full((3,), 0.3))
-    torch.testing.assert_close(refined.std((1, 2, 3)), torch.full((3,), 2.0))
-    narrow = dataclasses.replace(WIDE, low=-1.0, high=0.5)
-    assert refine(images, narrow).unique()[[0, -1]].tolist() == [-1.0, 0.5]
-    blurred = gaussian_blur(images, 0.7)
-    deviation = (blurred - blurred.mean((1, 2, 3), keepdim=True)) / blurred[0].std()
-    torch.testing.assert_close(refined[0], 0.3 + 2 * deviation[0])
-
-
 def test_blur_by_hand():
     flat = torch.full((1, 2, 5, 5), 3.0)
     torch.testing.assert_close(gaussian_blur(flat, 1.0), flat)
@@ -189,15 +152,6 @@ def test_blur_by_hand():
     assert gaussian_blur(spot, 0.1)[0, 0, 4, 4] == pytest.approx(1.0)
 
 
-def test_squared_pixels_are_subtracted_from_the_objective():
-    images = torch.full((2, 1, 6, 12), 0.5)
-    settings = ClassModelSettings(jitter=0, l2=0.1)
-    ascent = _Ascent(constant(1.0, 2.0, 3.0), torch.tensor([0, 2]), WIDE, settings, None)
-    ascent = dataclasses.replace(ascent, generator=torch.Generator())
-    penalty = 0.1 * 72 * 0.25
-    assert ascent.value(images).tolist() == pytest.approx([-1 - penalty, 1 - penalty])
-
-
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
@@ -208,17 +162,10 @@ def test_squared_pixels_are_subtracted_from_the_objective():
 )
 def test_refinements_by_hand(changes, expected):
     images = torch.tensor([[-1.7, 2.3]])[None, None]
-    statistics = dataclasses.replace(WIDE, low=-1.0, high=2.0)
+    statistics = WIDE.model_copy(update={"low": -1.0, "high": 2.0})
     settings = ClassModelSettings(**{"blur": 0.0, "clamp": False, **changes})
     found = _Ascent(None, None, statistics, settings, None).refine(images)
     torch.testing.assert_close(found[0, 0], torch.tensor(expected), rtol=1e-5, atol=1e-5)
-
-
-def test_a_constant_start_is_the_mean_pixel():
-    settings = ClassModelSettings(initial="constant", steps=1, lr=1e-9, jitter=0, starts=2)
-    settings = settings.replace(normalize="none", blur=0.0, clamp=False)
-    found = visualise(constant(0.0, 0.0, 0.0), WIDE, settings)
-    torch.testing.assert_close(found.images, torch.full((3, 2, 1, 6, 12), WIDE.mean))
 
 
 def test_without_gradients_they_are_left_out():

@@ -14,16 +14,22 @@ from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
 from drone_rl.explanations import explain as explaining
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.explain import Explanations, _named, explain_policy
+from drone_rl.explanations.results import Explanation
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import MLP
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import RootSeed
-from tests.evidence import VERDICT
+from tests.explanations.example import changed_explanation
 from tests.explanations.quick import ALL_SECTIONS, quick
 from tests.second_task import NUM_POSTS, Posts
 
 SEED = RootSeed(6, is_fixed=False)
+
+
+def explanation(kind, **verdict):
+    changes = {"kind": kind, **verdict}
+    return changed_explanation({f"verdict.{name}": value for name, value in changes.items()})
 
 
 def test_policies_of_the_same_name_are_named_by_their_files():
@@ -61,7 +67,7 @@ def test_all_policies_are_explained_from_one_fresh_seed(tmp_path, monkeypatch):
     def note(env, network, folder, settings, *, seed, **kwargs):
         states = env.base_env.state_dict()["random_states"]
         seen.append((seed, settings.seed, states[0]))
-        return {"verdict": VERDICT}
+        return explanation("good", certain=True)
 
     monkeypatch.setattr(explaining, "explain_policy", note)
     monkeypatch.setattr(explaining, "write_report", lambda *args: tmp_path)
@@ -78,14 +84,11 @@ def test_all_policies_are_explained_from_one_fresh_seed(tmp_path, monkeypatch):
 
 def test_the_result_prints_verdict_and_report(tmp_path):
     (tmp_path / "report.html").write_text("<h1>trusted?</h1>")
-    verdict = {"kind": "good", "certain": False, "sentence": "It does."}
-    shown = Explanations(tmp_path, tmp_path / "report.html", {"x": {"verdict": verdict}}, SEED)
-    report = f"report: {tmp_path / 'report.html'}"
-    assert str(shown).splitlines() == [
-        "x: good (not certain). It does.",
-        report,
-        "environments: seed 6 (fresh)",
-    ]
+    of_x = explanation("good", certain=False)
+    shown = Explanations(tmp_path, tmp_path / "report.html", {"x": of_x}, SEED)
+    first, *rest = str(shown).splitlines()
+    assert first.startswith("x: good (not certain). This policy looks good")
+    assert rest == [f"report: {tmp_path / 'report.html'}", "environments: seed 6 (fresh)"]
     assert shown._repr_html_().startswith(
         '<iframe sandbox="allow-scripts" srcdoc="&lt;h1&gt;trusted?'
     )
@@ -103,7 +106,7 @@ def explain(env, network, folder, settings=SMALL, **kwargs):
 
 
 def test_the_order_of_sections_changes_no_result(make_pipeline, tmp_path):
-    names, contents = ["dataset", "evaluation", "response", "flaws", "attribution"], []
+    names, contents = ["dataset", "verdict", "response", "flaws", "attribution"], []
     for order in (names, names[::-1]):
         env, actor = make_pipeline(num_envs=30, seed=2, task=TaskSettings(num_cubes=1))
         network, folder = actor.module[0].module, tmp_path / order[0]
@@ -114,10 +117,12 @@ def test_the_order_of_sections_changes_no_result(make_pipeline, tmp_path):
             contents.append((numbers, dict(arrays)))
         assert sum(len(m._forward_hooks) for m in network.modules()) == 0
     (numbers, arrays), (again, same) = contents
-    assert numbers == again
-    assert arrays.keys() == same.keys()
+    assert numbers == again and arrays.keys() == same.keys()
     assert all(np.array_equal(arrays[key], same[key], equal_nan=True) for key in arrays)
-    assert numbers["dataset"]["episodes"] == numbers["loops"]["episodes"]["trials"] == 30
+    assert Explanation.load(tmp_path / "dataset").attribution.heat.keys() >= {
+        "grad_cam",
+        "occlusion",
+    }
 
 
 def test_a_section_that_fails_is_left_out_with_the_reason(make_pipeline, tmp_path):
@@ -128,27 +133,8 @@ def test_a_section_that_fails_is_left_out_with_the_reason(make_pipeline, tmp_pat
 
     sections = {"eyes": fails, "dataset": ALL_SECTIONS["dataset"]}
     numbers = explain(env, actor.module[0].module, tmp_path, sections=sections)
-    assert numbers["left_out"] == {"eyes": "It has no eyes."}
-    assert numbers["dataset"]["frames"] == SMALL.frames and "eyes" not in numbers["seconds"]
-    del sections["eyes"]
-    assert "left_out" not in explain(env, actor.module[0].module, tmp_path, sections=sections)
-
-
-def test_sections_in_a_thread_get_a_copy_of_the_network(make_pipeline, tmp_path):
-    env, actor = make_pipeline(num_envs=6)
-    network, met = actor.module[0].module, {}
-
-    def meet(name):
-        def section(context):
-            met[name] = context.network
-            return {name: 1}, {}
-
-        return section
-
-    sections = {"flaws": meet("flaws"), "truth": meet("truth")}
-    written = explain(env, network, tmp_path, sections=sections)
-    assert met["truth"] is network and met["flaws"] is not network
-    assert [*written["seconds"]] == [k for k in written if k in sections] == [*sections]
+    assert numbers.left_out == {"eyes": "It has no eyes."}
+    assert numbers.dataset.frames == SMALL.frames and [*numbers.seconds] == ["dataset"]
 
 
 def test_an_unknown_layer_is_refused_before_any_work(make_pipeline, tmp_path):
@@ -186,8 +172,6 @@ def test_all_sections_work_with_another_task(posts, tmp_path):
         numbers = explain_policy(
             posts.env, posts.network, tmp_path, posts.settings, name="posts", provenance={}
         )
-    assert numbers["verdict"]["num_cubes"] == NUM_POSTS
-    assert [row["side"] for row in numbers["response"]["rows"]] == ["left", "right"]
-    assert set(numbers["truth"]["outcomes"]["collected"]) == {
-        "as it was", "moved left", "moved right",
-    }  # fmt: skip
+    assert numbers.verdict.num_cubes == NUM_POSTS
+    assert [row.side for row in numbers.response.rows] == ["left", "right"]
+    assert numbers.truth.outcomes.collected.keys() == {"as it was", "moved left", "moved right"}

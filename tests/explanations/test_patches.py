@@ -1,14 +1,11 @@
 """Patches, their effects, scores of maps, placebos and shuffled weights."""
 
-import math
-
 import numpy as np
 import pytest
 import torch
 
 from drone_rl.explanations.patches import (
     PatchGrid,
-    blob,
     has_effect,
     horizon_row,
     likeness,
@@ -20,34 +17,21 @@ from drone_rl.explanations.patches import (
     sample_frames,
     scores,
     shuffled_networks,
-    smoothed,
 )
 from drone_rl.policies import MLP, SmallCNN
 
-SIZES = [(25, 64), (13, 32), (38, 96), (8, 8), (1, 7), (7, 1), (3, 200), (37, 65), (43, 111)]
 
-
-@pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("patches", [40, 12])
-def test_the_grid_has_the_least_cost(size, patches):
-    """What is lost weighs 4, a wrong number 1 and a long patch half, each as a logarithm."""
-    height, width = size
-
-    def cost(grid):
-        covered = grid.count * grid.height * grid.width / (height * width)
-        wrong, long = math.log(grid.count / patches), math.log(grid.width / grid.height)
-        return 4 * (1 - covered) + abs(wrong) + 0.5 * abs(long)
-
-    all_grids = [
-        PatchGrid(height // rows, width // columns, rows, columns)
-        for rows in range(1, height + 1)
-        for columns in range(1, width + 1)
-        if rows * columns <= 2 * patches
-    ]
-    found = make_grid(height, width, patches)
-    assert cost(found) == pytest.approx(min(map(cost, all_grids)))
-    assert found.top == (height - found.rows * found.height) // 2
-    assert found.left == (width - found.columns * found.width) // 2
+@pytest.mark.parametrize(
+    ("size", "grid"),
+    [
+        ((25, 64), PatchGrid(5, 8, 5, 8)),
+        ((36, 64), PatchGrid(7, 8, 5, 8)),
+        ((8, 8), PatchGrid(1, 1, 8, 8)),
+        ((1, 7), PatchGrid(1, 1, 1, 7)),
+    ],
+)
+def test_the_grid_has_about_forty_nearly_square_patches(size, grid):
+    assert make_grid(*size) == grid
 
 
 def test_means_by_hand():
@@ -84,12 +68,6 @@ def odds(logit):
     return 1 / (1 + np.exp(-logit))
 
 
-def test_effects_by_hand(network):
-    x, other = torch.zeros(1, 1, 2, 2), torch.ones(1, 1, 2, 2)
-    expected = [odds(w) - 0.5 for w in (0, 1, 2, 3)]
-    np.testing.assert_allclose(patch_effects(network, x, [other], GRID)[0], expected, atol=1e-6)
-
-
 def test_effects_are_means_over_alternatives(network):
     x = torch.zeros(1, 1, 2, 2)
     found = patch_effects(network, x, [torch.ones_like(x), x, -torch.ones_like(x)], GRID)
@@ -104,14 +82,6 @@ def test_scores_by_hand():
     )
     # mid-ranks 1.5 1.5 3.5 3.5 against 1 2 3 4: covariance 4, deviations sqrt(4) and sqrt(5)
     np.testing.assert_allclose(scores(heat, effects), [1, -1, 0, 0, 4 / np.sqrt(4 * 5)])
-
-
-def test_scores_are_invariant_to_scale_and_rounding():
-    effects = np.array([[0.1, 0.2, 0.3 - 1e-12, 0.3 + 1e-12]])
-    heat = np.array([[1.0, 2.0, 3.0, 3.0]])
-    for unit in (1e-9, 1.0, 1e9):
-        np.testing.assert_allclose(scores(unit * heat, effects), [1.0])
-        assert pointing(unit * heat, effects)[0].tolist() == [1.0]
 
 
 def test_pointing_by_hand():
@@ -159,28 +129,6 @@ def test_placebos_by_hand():
     torch.testing.assert_close(maps["blob in the middle"], maps["blob in the middle"].flip(1, 2))
     assert maps["blob in the middle"][0].argmax() in (24, 25, 34, 35)
     assert not torch.equal(maps["noise"][0], maps["noise"][1])
-
-
-def test_a_blob_by_hand():
-    """Pixels are at (0.25, 0.75) of the height and (0.125, 0.375, ...) of the width."""
-    made = blob(2, 4, 0.5, 0.25)
-    assert made[0, 0].item() == pytest.approx(math.exp(-(0.25**2 + 0.125**2) / (2 * 0.2**2)))
-    assert made[1, 3].item() == pytest.approx(math.exp(-(0.25**2 + 0.625**2) / (2 * 0.2**2)))
-    assert blob(1, 1, 0.0, 0.5, 0.5).item() == pytest.approx(math.exp(-0.5))
-
-
-@pytest.mark.parametrize(("width", "box"), [(10, 3), (39, 3), (40, 5), (64, 7)])
-def test_smoothing_by_hand(width, box):
-    point = torch.zeros(1, 25, width)
-    point[0, 12, width // 2] = 1.0
-    once, twice = smoothed(point, 1)[0], smoothed(point)[0]
-    assert int((once > 0).sum()) == box**2
-    assert once.max().item() == pytest.approx(1 / box**2)
-    assert twice[12, width // 2].item() == pytest.approx(1 / box**2)  # box of 1 / box each way
-    assert int((twice[12] > 1e-9).sum()) == min(2 * box - 1, width)
-    corner = torch.zeros(1, 25, width)
-    corner[0, 0, 0] = 1.0  # beyond the border goes on what is at the border
-    assert smoothed(corner, 1)[0, 0, 0].item() == pytest.approx((box // 2 + 1) ** 2 / box**2)
 
 
 OBSERVATIONS = torch.randn(20, 1, 25, 64, generator=torch.Generator().manual_seed(0))

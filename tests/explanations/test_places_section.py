@@ -20,10 +20,8 @@ from tests.five_actions import FIVE
 def test_the_exact_map_is_that_of_rendered_observations(context, monkeypatch):
     small = PlacesSettings(farthest=3.5, sideways=3.0)
     monkeypatch.setattr(places_section, "PlacesSettings", lambda: small)
-    numbers, arrays = places_section.places_section(context)
-    told = numbers["places"]
-    assert told["window"] == {"nearest": 2.5, "farthest": 3.5, "sideways": 3.0}
-    assert set(arrays) == {"places_points", "places_ends", "places_labels"}
+    told = places_section.places_section(context)
+    assert dict(told.window) == {"nearest": 2.5, "farthest": 3.5, "sideways": 3.0}
     found = places_section._exact_map(context, small)
     where = np.random.RandomState(0).uniform((2.5, -3.0), (3.5, 3.0), (100, 2))
     ahead, left = torch.from_numpy(where).T
@@ -41,9 +39,7 @@ def test_reasons_for_no_exact_map(context):
         network = changes.pop("network", None)
         changed = {name: getattr(scenes, name) for name in names} | changes
         given = SimpleNamespace(scenes=SimpleNamespace(**changed), network=network)
-        numbers, arrays = places_section.places_section(given)
-        assert arrays == {}
-        return numbers["places"]["refused"]
+        return places_section.places_section(given).refused
 
     assert "stack of frames" in refused(memory=1)
     assert "does not choose among forward, left, right" in refused(actions=FIVE)
@@ -67,6 +63,6 @@ def test_there_is_no_exact_map_where_a_place_has_several_images(look, faults, mo
     env = DroneEnv(1, appearance=look, transforms=[GrayPixels(), *faults])
     network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,))
     settings = ExplainSettings(frames=40, episodes=6, perplexity=5, seed=3)
-    numbers, _ = places_section.places_section(Context(env, network, settings))
+    found = places_section.places_section(Context(env, network, settings))
     env.close()
-    assert "several images" in numbers["places"]["refused"]
+    assert "several images" in found.refused

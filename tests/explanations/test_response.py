@@ -1,30 +1,30 @@
 """Maps over the place of one target: response, outcome, exact actions; asymmetry."""
 
+import functools
+
 import numpy as np
 import pytest
 import torch
 from torch import nn
 
 from drone_rl.config import TaskSettings
-from drone_rl.envs import DroneEnv, GrayPixels
+from drone_rl.explanations import response
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.response import (
-    OutcomeMap,
-    ResponseMap,
     asymmetry,
+    count_places,
     find_blind,
-    grid_asymmetry,
     outcome_map,
     response_map,
+    section,
     shrink,
-    summarise,
 )
+from drone_rl.explanations.results import OutcomeMap, ResponseMap
 from drone_rl.explanations.scenes import Scenes, place_target
 from drone_rl.policies import MLP
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.continuous_actions import ContinuousActions
 from tests.continuous import SETTINGS
-from tests.second_task import Posts
 
 IDLE, LEFT = [1.0, 0.0, 0.0], [0.1, 0.9, 0.0]
 
@@ -115,11 +115,11 @@ def test_blindness_by_hand():
         oracle=np.array([1, 0]),
         stratum=np.array([0, 1]),
     )
-    rows = summarise(found, outcome, ("left", "ahead", "right"))["rows"]
-    assert rows == [
-        {"height": 0.0, "side": "left", "blind": 0.5, "collected": 0, "places": 1},
-        {"height": 0.0, "side": "ahead", "blind": 0.0, "collected": 1, "places": 1},
-        {"height": 0.0, "side": "right", "blind": 0.5, "collected": 0, "places": 0},
+    rows = count_places(found, outcome, ("left", "ahead", "right"))
+    assert [(r.height, r.side, r.blind, r.collected, r.places) for r in rows] == [
+        (0.0, "left", 0.5, 0, 1),
+        (0.0, "ahead", 0.0, 1, 1),
+        (0.0, "right", 0.5, 0, 0),
     ]
 
 
@@ -131,14 +131,6 @@ def test_a_turn_to_the_needed_side_is_not_blind():
         assert find_blind(actions, probs, probs[0, 0, 0], torch.tensor([1])).item() is is_blind
 
 
-def test_outcomes_of_another_task():
-    env = DroneEnv(1, Posts(), transforms=[GrayPixels()])
-    found = outcome_map(Scenes(env), Forward(), num_lateral=7, num_forward=2)
-    env.close()
-    past = [True, True, False, False, False, True, True]  # 3 to -3 m; touched within 1 m
-    assert found.collected.tolist() == [[past, past]]
-
-
 def sides(bias):
     """A policy that compares the halves of a one-row picture, and prefers right by `bias`."""
     network = MLP((1, 1, 4), 3, hidden=())
@@ -148,15 +140,6 @@ def sides(bias):
         network.layers.logits.weight[Move.RIGHT, 2:] = 1.0
         network.layers.logits.bias.copy_(torch.tensor([0.0, 0.0, bias]))
     return network
-
-
-def test_only_a_biased_policy_differs_from_its_mirror_image():
-    x, episode = torch.randn(40, 1, 1, 4), np.arange(40)
-    fair, biased = (asymmetry(sides(b), x, episode, MOVES) for b in (0.0, 2.0))
-    assert fair["absolute"]["mean"] < 1e-6
-    assert biased["absolute"]["mean"] > 0.1
-    assert biased["signed"]["upper95"] < 0  # right is preferred
-    assert biased["worst"][0]["distance"] >= biased["worst"][1]["distance"]
 
 
 def test_asymmetry_of_frames_by_hand():
@@ -173,30 +156,18 @@ def test_asymmetry_of_frames_by_hand():
     episode = np.arange(10) // 2
     observed = torch.tensor(x, dtype=torch.float32)[:, None, None]
     found = asymmetry(sides(bias), observed, episode, MOVES)
-    assert found["absolute"]["mean"] == pytest.approx(distance.mean(), abs=1e-5)
-    assert found["signed"]["mean"] == pytest.approx((here[:, 1] - there[:, 2]).mean(), abs=1e-5)
-    assert found["signed"]["lower95"] < -0.5  # few episodes tell little, down to -1
-    assert [w["frame"] for w in found["worst"]] == np.argsort(-distance)[:8].tolist()
-    worst = [w["distance"] for w in found["worst"]]
-    assert worst == pytest.approx(sorted(distance, reverse=True)[:8], abs=1e-5)
+    assert found.absolute.mean == pytest.approx(distance.mean(), abs=1e-5)
+    assert found.signed.mean == pytest.approx((here[:, 1] - there[:, 2]).mean(), abs=1e-5)
+    assert found.signed.lower95 < -0.5  # few episodes tell little, down to -1
+    assert [one.frame for one in found.worst] == np.argsort(-distance)[:3].tolist()
+    worst = [one.distance for one in found.worst]
+    assert worst == pytest.approx(sorted(distance, reverse=True)[:3], abs=1e-5)
 
 
-def test_a_policy_that_turns_to_either_side_is_its_mirror_image():
-    turns = [[0.2, 0.8, 0.0], [1.0, 0.0, 0.0], [0.2, 0.0, 0.8]]
-    fair, place = np.tile(turns, (2, 2, 1, 1)), np.array([6.0, 0.0, -6.0])
-    found = ResponseMap(
-        height=np.array([-1.0, 1.0]),
-        forward=np.array([5.0, 9.0]),
-        lateral=place,
-        probabilities=fair,
-        without_target=fair[0, 0, 1],
-        oracle=np.array([1, 0, 2]),
-        stratum=np.array([0, 1, 2]),
-        blind=np.zeros((1, 1, 3), bool),
-    )
-    result = grid_asymmetry(found, MOVES)
-    assert result == {"signed": 0.0, "absolute": 0.0}
-    found.probabilities[1, 0, 2] = [0.5, 0.0, 0.5]  # high up, near, to the right: less sure
-    result = grid_asymmetry(found, MOVES)
-    assert result["signed"] == pytest.approx(0.3 / 12)
-    assert result["absolute"] == pytest.approx(2 * 0.3 / 12)  # the place and its mirror image
+def test_the_asymmetry_of_the_map_is_between_a_place_and_its_mirror_image(context, monkeypatch):
+    patch = functools.partial(monkeypatch.setitem, response.outcome_map.__kwdefaults__)
+    patch("num_lateral", 3), patch("num_forward", 2)
+    found = section(context)
+    here = found.map.probabilities
+    there = here[:, :, ::-1][..., [0, 2, 1]]
+    assert found.asymmetry == pytest.approx(0.5 * np.abs(here - there).sum(-1).mean(), abs=1e-6)

@@ -18,8 +18,6 @@ from drone_rl.explanations.scenes import (
     empty_scene,
     place_target,
 )
-from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.scene import SemanticClass
 from tests.second_dynamics import Turning
 
 
@@ -115,14 +113,3 @@ def test_cubes_elsewhere_are_in_view(scenes):
     columns = seen.any(1).float().mean(0)
     assert (columns > 0.1).all()  # everywhere in the picture
     assert moved.present.all() and state.passed.all()
-
-
-def test_only_the_named_colors_change(scenes):
-    state = place_target(scenes, torch.tensor([6.0]), torch.tensor([2.0]))
-    regions, before = scenes.regions(state), scenes.frames(state)
-    after = scenes.frames(state, Appearance(colors={SemanticClass.GROUND: (0.1, 0.1, 0.1)}))
-    changed = (before != after).any(-1)
-    ground = (regions == Region.GROUND) | (regions == Region.HORIZON)
-    assert changed[regions == Region.GROUND].all()
-    assert not changed[~ground].any()
-    assert torch.equal(scenes.frames(state), before)

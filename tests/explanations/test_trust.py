@@ -9,6 +9,7 @@ import torch
 from drone_rl.explanations import patches, trust
 from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.patches import PatchGrid, placebo_maps
+from drone_rl.explanations.results import Likeness
 from drone_rl.explanations.trust import (
     Trial,
     check_maps,
@@ -60,32 +61,30 @@ def trial():
 
 def test_the_true_map_is_trusted(trial):
     found = check_maps(trial, {"true": weights}, num_methods=5)
-    method = found["methods"]["true"]
-    assert found["trusted"] == "true" and method["failed"] == []
-    assert method["score"]["mean"] > 0.7
-    assert method["random_weights"]["tried"] == 99 and method["random_weights"]["as_good"] == 0
+    method = found.methods["true"]
+    assert found.trusted == "true" and method.failed == ()
+    assert method.score.mean > 0.7
+    assert method.random_weights.tried == 99 and method.random_weights.as_good == 0
     # of the window's four patches, which are equally hot, two are the tenth that moves it most
-    assert (method["pointing"]["hit"], method["pointing"]["chance"]) == (0.5, 2 / 16)
-    assert found["level"] == LEVEL and found["confidence"] == 0.98
-    assert (found["frames"], found["episodes"]) == (120, 40)
-    assert found["placebos"]["ones"]["mean"] == 0.0
+    assert (method.pointing.hit, method.pointing.chance) == (0.5, 2 / 16)
+    assert found.level == LEVEL and found.confidence == 0.98
+    assert (found.frames, found.episodes) == (120, 40)
+    assert found.placebos["ones"].mean == 0.0
 
 
 @pytest.mark.parametrize(
-    ("likeness", "passed"),
+    ("upper", "seeds", "failed"),
     [
-        ({"upper": 0.49, "seeds": [-0.9, 0.49]}, True),
-        ({"upper": 0.49, "seeds": [-0.9, 0.5]}, False),  # with some weights it is alike
-        ({"upper": 0.5, "seeds": [0.1, 0.2]}, False),
-        ({"upper": 0.9, "seeds": [0.1, 0.2]}, False),
-        ({"upper": 0.49, "seeds": [-0.9, 0.9]}, False),
-        ({"upper": None, "seeds": [0.1, 0.2]}, False),  # too few episodes
+        (0.49, (-0.9, 0.49), ()),
+        (0.49, (-0.9, 0.5), ("likeness",)),  # with some weights it is alike
+        (0.5, (0.1, 0.2), ("likeness",)),
+        (None, (0.1, 0.2), ("likeness",)),  # too few episodes
     ],
 )
-def test_likeness_to_shuffled_weights_has_a_limit(likeness, passed):
-    bound = {"lower": 0.1}
-    found = trust._failed({"placebos": {"a": bound}, "pointing": bound, "likeness": likeness})
-    assert found == ([] if passed else ["likeness"])
+def test_likeness_to_shuffled_weights_has_a_limit(trial, monkeypatch, upper, seeds, failed):
+    likeness = Likeness(median=0.0, lower=None, upper=upper, seeds=seeds)
+    monkeypatch.setattr(trust, "_likeness", lambda *args: likeness)
+    assert check_method(trial, weights, 0.2).failed == failed
 
 
 def test_placebos_are_not_trusted(trial):
@@ -93,22 +92,16 @@ def test_placebos_are_not_trusted(trial):
     found = check_maps(
         trial, {k: (lambda n, x, a, m=m: m(n, x, a)[: len(x)]) for k, m in methods.items()}
     )
-    assert found["trusted"] is None
-    for name, method in found["methods"].items():
-        assert {"placebos", "likeness"} <= set(method["failed"]), name
-
-
-def test_the_inverted_true_map_is_not_trusted(trial):
-    found = check_method(trial, lambda n, x, a: 2 - weights(n, x, a), LEVEL)
-    assert {"placebos", "pointing"} <= set(found["failed"])
-    assert found["score"]["upper95"] < 0
+    assert found.trusted is None
+    for name, method in found.methods.items():
+        assert {"placebos", "likeness"} <= set(method.failed), name
 
 
 def test_a_correct_map_that_ignores_the_policy_is_not_trusted(trial):
     true = weights(trial.network, trial.observations, None)
     found = check_method(trial, lambda n, x, a: true[: len(x)], LEVEL)
-    assert found["failed"] == ["likeness"]
-    assert found["likeness"]["median"] == 1.0
+    assert found.failed == ("likeness",)
+    assert found.likeness.median == 1.0
 
 
 def test_noise_that_depends_on_the_weights_is_not_trusted(trial):
@@ -120,35 +113,27 @@ def test_noise_that_depends_on_the_weights_is_not_trusted(trial):
         return true[: len(x)] * (0.5 + noise)
 
     found = check_method(trial, adversarial, LEVEL)
-    assert found["failed"] == ["random weights"]
-    assert found["random_weights"]["as_good"] == 1  # it stops there
-    assert found["random_weights"]["tried"] < 99
+    assert found.failed == ("random weights",)
+    assert found.random_weights.as_good == 1  # it stops there
+    assert found.random_weights.tried < 99
 
 
 def test_a_map_without_heat_is_not_trusted(trial):
     found = check_method(trial, lambda n, x, a: torch.zeros(len(x), *SIZE), LEVEL)
-    assert {"placebos", "pointing", "likeness"} == set(found["failed"])
-    assert found["maps_without_heat"] == 120
+    assert {"placebos", "pointing", "likeness"} == set(found.failed)
+    assert found.maps_without_heat == 120
 
 
 def test_few_episodes_decide_nothing():
     found = check_method(make_trial(window_policy((slice(2, 4), slice(4, 8))), 5), weights, LEVEL)
-    assert not found["trusted"] and found["pointing"]["lower"] is None
+    assert not found.trusted and found.pointing.lower is None
 
 
 def test_nothing_is_trusted_for_a_constant_policy(trial):
     blind = trial[np.zeros(0, np.int64)]
     found = check_maps(dataclasses.replace(blind, frames_without_effect=120), {"true": weights})
-    assert found["trusted"] is None and found["frames_unmoved"] == 120
-    assert found["methods"]["true"]["failed"] == ["nothing moves the policy"]
-
-
-def test_a_thinned_trial(trial):
-    few = trial.thinned()
-    assert few.episode.tolist() == list(range(40))
-    assert torch.equal(few.observations, trial.observations[1::3])  # the middle of each episode
-    assert np.array_equal(few.effects, trial.effects[1::3])
-    assert torch.equal(few.placebos["noise"], trial.placebos["noise"][1::3])
+    assert found.trusted is None and found.frames_unmoved == 120
+    assert found.methods["true"].failed == ("nothing moves the policy",)
 
 
 def test_methods_use_the_network_of_the_call(trial):
@@ -182,4 +167,4 @@ def test_a_trial_of_a_policy_in_the_simulator(world, scenes, dataset):
     )
     assert len(blind.episode) == 0 and blind.frames_without_effect == len(rows)
     found = check_maps(blind, method_maps(Explainer(network, torch.zeros(1, 25, 64))))
-    assert found["trusted"] is None
+    assert found.trusted is None

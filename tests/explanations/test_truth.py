@@ -1,7 +1,5 @@
 """Effects of changes to a scene, and rollouts after them."""
 
-import json
-
 import numpy as np
 import pytest
 import torch
@@ -13,7 +11,6 @@ from drone_rl.explanations.truth import (
     PATIENCE,
     Intervention,
     TargetRollouts,
-    _patches,
     clear_frame,
     followed,
     intervene,
@@ -67,23 +64,6 @@ def test_a_cube_is_moved_to_the_middle_and_never_away_from_it(scenes, lateral, m
     assert state.cubes[0, 0, 1] == 7.0 + lateral
 
 
-def test_a_patch_of_ground_is_a_square_of_about_as_many_pixels():
-    ground = torch.ones(60, 20, 30, dtype=torch.bool)
-    patches = _patches(ground, torch.full((60,), 25), seed=0)
-    for patch in patches:
-        rows, columns = patch.any(1).nonzero()[:, 0], patch.any(0).nonzero()[:, 0]
-        assert patch.sum() == len(rows) * len(columns)  # all of it
-        for found, end in ((rows, 20), (columns, 30)):
-            cut = found[0] == 0 or found[-1] == end - 1  # by the border of the picture
-            assert (3 <= len(found) <= 5) if cut else len(found) == 5
-    assert len({tuple(patch.nonzero()[0].tolist()) for patch in patches}) > 50  # anywhere
-    assert [int(p.sum()) for p in _patches(ground[:2], torch.tensor([1, 0]), 0)] == [1, 0]
-    ground[:, :, 15:] = False
-    patches = _patches(ground, torch.full((60,), 49), seed=0)
-    assert not (patches & ~ground).any() and patches.flatten(1).any(1).all()
-    assert torch.equal(patches, _patches(ground, torch.full((60,), 49), seed=0))
-
-
 class Follower(nn.Module):
     """Turns to where the picture differs from the empty scene, and flies on when in the middle."""
 
@@ -123,25 +103,25 @@ def follower(scenes):
 
 def test_a_policy_that_follows_the_target_reaches_it(scenes, starts, follower):
     found = measure_outcomes(scenes, follower, starts, np.arange(12))
-    assert found["flights"] == 12
-    assert found["collected"]["as it was"]["mean"] > 0.8
-    assert found["collected"]["moved left"]["mean"] > 0.8
-    assert found["follows"]["mean"] > 0.8
-    assert found["collected"]["moved right"]["mean"] > 0.8
+    assert found.flights == 12
+    assert found.collected["as it was"].mean > 0.8
+    assert found.collected["moved left"].mean > 0.8
+    assert found.follows.mean > 0.8
+    assert found.collected["moved right"].mean > 0.8
 
 
 @pytest.mark.parametrize("action", list(Move))
 def test_a_constant_policy_follows_nothing(scenes, starts, action):
     found = measure_outcomes(scenes, Always(action), starts, np.arange(12))
-    assert found["follows"]["mean"] == 0.0
-    assert found["ground_changed"]["mean"] == 0.0
-    assert found["ground_changed"]["upper95"] < 0.5  # twelve rollouts show no more than that
+    assert found.follows.mean == 0.0
+    assert found.ground_changed.mean == 0.0
+    assert found.ground_changed.upper95 < 0.5  # twelve rollouts show no more than that
     # straight on gets what stands ahead; moved by 2 m, half of that leaves the way
     if action is Move.FORWARD:
         ahead = (starts.cubes[:, 0, 1].abs() <= scenes.worlds.task.settings.touch_distance).float()
-        assert found["collected"]["as it was"]["mean"] == pytest.approx(float(ahead.mean()))
+        assert found.collected["as it was"].mean == pytest.approx(float(ahead.mean()))
     else:
-        assert found["collected"]["as it was"]["mean"] < 0.5
+        assert found.collected["as it was"].mean < 0.5
 
 
 @pytest.mark.parametrize("fears_dark", [True, False])
@@ -157,9 +137,9 @@ def test_a_policy_that_responds_to_the_ground_has_another_outcome(scenes, starts
     network.level = float(scenes.observe(starts)[0, 0, -1, 0]) - 0.3
     ahead = place_target(scenes, torch.full((6,), 9.0), torch.zeros(6))
     found = measure_outcomes(scenes, network, ahead, np.arange(6))
-    assert found["ground_changed"]["mean"] == 1.0
-    assert found["collected"]["as it was"]["mean"] == float(fears_dark)
-    assert set(found["collected"]) == {"as it was", "moved left", "moved right"}
+    assert found.ground_changed.mean == 1.0
+    assert found.collected["as it was"].mean == float(fears_dark)
+    assert set(found.collected) == {"as it was", "moved left", "moved right"}
 
 
 def test_rollouts_end_when_the_target_is_reached_or_passed(scenes):
@@ -186,18 +166,13 @@ def test_following_by_hand():
 
 @pytest.mark.slow
 def test_the_section_has_tests_and_changes(context):
-    numbers, arrays = section(context)
-    found = numbers["truth"]
-    json.dumps(numbers)
-    tried = set(found["methods"])
-    assert tried >= {"grad_cam", "saliency"}
-    assert found["trusted"] is None or found["methods"][found["trusted"]]["trusted"]
-    assert arrays["interventions"].shape[0] == len(found["interventions"])
-    assert arrays["interventions"].shape[1:] == context.dataset.frames.shape[1:]
-    assert 0 <= found["shown_frame"] < len(context.dataset)
-    assert found["frames"] + found["frames_unmoved"] == len(context.dataset)
-    assert (arrays["patch_effects"] >= 0).all()
-    assert np.isfinite(arrays["patch_effects"]).all()
+    found = section(context)
+    assert set(found.methods) >= {"grad_cam", "saliency"}
+    assert found.trusted is None or found.methods[found.trusted].trusted
+    assert found.changed.shape == (len(found.interventions), *context.dataset.frames.shape[1:])
+    assert 0 <= found.shown_frame < len(context.dataset)
+    assert found.frames + found.frames_unmoved == len(context.dataset)
+    assert (found.patch_effects >= 0).all() and np.isfinite(found.patch_effects).all()
 
 
 @pytest.mark.parametrize(

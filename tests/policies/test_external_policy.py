@@ -137,15 +137,13 @@ def test_callable_gets_a_reduced_report(network, tmp_path):
     small = {"frames": 40, "episodes": 6, "perplexity": 5}
     with quick(), quick_figures():
         done = drone_rl.explain(policy, folder=tmp_path, progress=silent, **small)
-    numbers = done.numbers["a function"]
-    assert set(numbers["left_out"]) == {"class_models", "embedding"}
-    assert not {"class_model", "tsne"} & set(numbers)
-    assert (numbers["attribution"]["methods"], numbers["attribution"]["layer"]) == (
-        ["occlusion"],
-        None,
-    )
-    assert numbers["truth"]["outcomes"]["flights"] > 0
-    assert numbers["provenance"]["trained"] is None
+    explanation = done.policies["a function"]
+    assert explanation.left_out.keys() == {"class_model", "tsne"}
+    assert explanation.class_model is explanation.tsne is None
+    assert [*explanation.attribution.heat] == ["occlusion"]
+    assert explanation.attribution.layer is None
+    assert explanation.truth.outcomes.flights > 0
+    assert explanation.provenance["trained"] is None
     assert "What is left out, and why" in done.report.read_text()
 
 

@@ -95,7 +95,7 @@ def test_unusable_settings_are_refused(small, change, message):
 
 
 def test_rows(done):
-    _, *sides, anywhere = rows(done.numbers, SHOWN_MOVES.names)
+    _, *sides, anywhere = rows(done.summary, SHOWN_MOVES.names)
     left = done.numbers["sides"]["left"]
     values = [left["share"], *left["actions"], left["unseen"], left["blind"]]
     assert sides[0] == ["on its left", *map(exact_percent, values)]

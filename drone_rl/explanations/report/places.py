@@ -3,105 +3,103 @@
 from collections.abc import Sequence
 from typing import Any
 
-from drone_rl.explanations.report.explanation import Explanation, Figures, Part
-from drone_rl.sim.vocabulary import shown_actions
-from drone_rl.trust.plots import regions
-from drone_rl.utils.text import Claims, Evidence, exact_percent, listed
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path
+from numpy.typing import NDArray
+
+from drone_rl.explanations.report.part import Figures, Part
+from drone_rl.explanations.results import ExactMap, Explanation, NoMap, Outlines
+from drone_rl.sim.vocabulary import ShownActions
+from drone_rl.utils.palette import FAINT, INK, MUTED, css
+from drone_rl.utils.text import percent, render
 
 WHERE = {"left": "on its left", "ahead": "straight ahead", "right": "on its right"}
 
 
-def rows(places: Evidence, names: Sequence[str]) -> list[list[str]]:
-    """Return a map of actions by positions as rows of a table, one for each side, the header first.
-
-    `places` is "places" of an explanation, or `places.json`.
-    """
+def rows(places: ExactMap, names: Sequence[str]) -> list[list[str]]:
+    """Return a map as rows of a table, one for each side, the header first."""
     head = ["one cube", "share of places", *names, "not seen", "blind"]
-    every = {**{n: places[n] for n in ("actions", "unseen", "blind")}, "share": 1.0}
-    by_side = {WHERE[s]: of for s, of in places["sides"].items()} | {"anywhere": every}
-    return [
-        head,
-        *(
-            [where, *map(exact_percent, (of["share"], *of["actions"], of["unseen"], of["blind"]))]
-            for where, of in by_side.items()
-        ),
-    ]
+    by_side = {**{WHERE[side]: of for side, of in places.sides.items()}, "anywhere": places}
+    shares = {w: (of.share, *of.actions, of.unseen, of.blind) for w, of in by_side.items()}
+    return [head, *([where, *(percent(s, 2) for s in of)] for where, of in shares.items())]
 
 
-def say_places(evidence: Evidence) -> Claims:
-    """Say what the exact map shows, or why there is none."""
-    places = evidence["places"]
-    if "refused" in places:
-        return {"places.refused": f"There is no exact map of this policy: {places['refused']}."}
-    names, window, claims = shown_actions(evidence).names, places["window"], Claims()
-    parts, blind = [], []
-    for side, of in places["sides"].items():
-        needed = "forward" if side == "ahead" else side
-        share = of["actions"][names.index(needed)]
-        parts.append(f"{needed} for {exact_percent(share)} of those {WHERE[side]}")
-        if of["blind"]:
-            blind.append(f"{exact_percent(of['blind'])} of those {WHERE[side]}")
-    claims["places.does"] = (
-        f"With one cube {window['nearest']:g} to {window['farthest']:g} m ahead of its camera and "
-        f"up to {window['sideways']:g} m to either side (exact, over all places), it goes "
-        f"{listed(parts)}."
-    )
-    if places["unseen"] > 0:
-        claims["places.unseen"] = (
-            f"At {exact_percent(places['unseen'])} of the places not one pixel shows the cube."
-        )
-    if places["blind"] > 0:
-        claims["places.blind"] = (
-            f"It does not react to {listed(blind)}: a turn is needed, and it goes "
-            f"{names[places['alone']]}, as without a cube. It may react when the cube is nearer."
-        )
-    if places["blind"] == 0 and {"left", "right"} & places["sides"].keys():
-        claims["places.sees"] = (
-            "Wherever a turn is needed, the cube changes its action, or its action without a cube "
-            "is that turn."
-        )
-    return claims | _say_closeness(places)
+def describe(places: ExactMap | NoMap, names: Sequence[str]) -> str:
+    """Return what the exact map shows in words, or why there is none."""
+    return render("drone_rl.explanations.report", "places.j2", map=places, names=names, where=WHERE)
 
 
-def _say_closeness(places: Evidence) -> Claims:
-    left, claims = places["least_gap_left"], Claims()
-    claims["places.gap"] = (
-        f"Its two highest logits come closest, to {places['least_gap']:.2g}, with the cube "
-        f"{places['least_gap_ahead']:.2f} m ahead and {abs(left):.2f} m to the "
-        f"{'left' if left > 0 else 'right'}."
-    )
-    if places["close"] > 0:
-        claims["places.close"] = (
-            f"At {exact_percent(places['close'])} of the places they are no farther apart than "
-            f"{places['logit_gap']:g}, where rounding may decide between the two actions."
-        )
-    if places["in_doubt"] > 0:
-        claims["places.doubt"] = (
-            f"At most {exact_percent(places['in_doubt'])} of the places lie so near to a border "
-            "between two images that the renderer, by rounding, may show the other one."
-        )
-    return claims
-
-
-def draw_places(explanation: Explanation) -> Figures:
+def draw(places: ExactMap | NoMap, explanation: Explanation) -> Figures:
     """Draw the exact map, if there is one."""
-    places = explanation.numbers["places"]
-    if "refused" in places:
-        return {}
-    outlines = {n: explanation.arrays[f"places_{n}"] for n in ("points", "ends", "labels")}
-    return {"places": regions.chart(places, outlines, explanation.actions)}
+    return {} if isinstance(places, NoMap) else {"places": chart(places, explanation.actions)}
 
 
-def _extras(explanation: Explanation) -> dict[str, Any]:
-    places = explanation.numbers["places"]
-    return {} if "refused" in places else {"rows": rows(places, explanation.actions.names)}
+def values(places: ExactMap | NoMap, explanation: Explanation) -> dict[str, Any]:
+    """Return the map in words, and as a table."""
+    names = explanation.actions.names
+    table = [] if isinstance(places, NoMap) else rows(places, names)
+    return {"text": describe(places, names), "rows": table}
 
 
-PART = Part(
-    title="Exact action map of one cube",
-    label="Exact map",
-    needs=("places",),
-    text={"places": say_places},
-    draw=draw_places,
-    extras=_extras,
-)
+def chart(places: ExactMap, actions: ShownActions) -> Figure:
+    """Draw the map as a chart."""
+    window = places.window
+    side, near, far = window.sideways, window.nearest, window.farthest
+    width = 6.0  # inches, legible on a phone
+    figure = Figure(figsize=(width, 1.6 + 0.88 * width * far / (2 * side)), layout="constrained")
+    axis = figure.subplots()
+    for label, outlines in _by_label(places.outlines).items():
+        closed = [np.concatenate([line, line[:1]])[:, ::-1] for line in outlines]
+        path = Path.make_compound_path(*(Path(line, closed=True) for line in closed))
+        is_action = label < len(actions.names)
+        style: dict[str, Any] = (
+            {"facecolor": actions.css(label), "alpha": 0.85}
+            if is_action
+            else {"fill": False, "hatch": "////", "edgecolor": "#ffffff"}
+        )
+        axis.add_patch(PathPatch(path, linewidth=0, **style))
+    _mark(axis, places)
+    axis.set(xlim=(side, -side), ylim=(-0.04 * far, far), aspect="equal")
+    axis.set_xlabel("metres to the left (+) or right (-)")
+    axis.set_ylabel("metres ahead of the camera")
+    axis.axhline(near, color=css(INK), lw=0.5)
+    note = f"not covered: closer than {near:g} m"
+    axis.text(0.97 * side, 0.5 * near, note, va="center", color=css(FAINT), backgroundcolor="white")
+    axis.set_title("Action for one cube at each position")
+    handles = [Patch(color=actions.css(a), label=f"goes {actions.names[a]}") for a in actions.order]
+    if places.unseen:
+        style = {"facecolor": css(MUTED), "edgecolor": "white", "hatch": "////"}
+        handles.append(Patch(**style, label="cube not seen"))
+    handles += axis.get_legend_handles_labels()[0]
+    axis.legend(
+        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.07), ncols=2, frameon=False
+    )
+    return figure
+
+
+def _mark(axis: Axes, places: ExactMap) -> None:
+    """Mark the camera, the limits of flying straight on, and the smallest difference of logits."""
+    touch = places.touch_distance
+    for y in (-touch, touch):
+        label = "beyond: flying straight on misses it" if y < 0 else None
+        axis.axvline(y, color="white", ls=(0, (5, 4)), lw=1.6)
+        axis.axvline(y, color=css(INK), ls=(0, (5, 4)), lw=0.8, label=label)
+    axis.plot(0, 0, "^", color=css(INK), ms=11, clip_on=False, ls="", label="camera, facing up")
+    at = places.least_gap_left, places.least_gap_ahead
+    for color, width, label in (("white", 2, None), (css(INK), 1, "two highest logits closest")):
+        axis.plot(*at, "o", ms=11, mfc="none", mew=width, color=color, ls="", label=label)
+
+
+def _by_label(of: Outlines) -> dict[int, list[NDArray]]:
+    """Outlines by label."""
+    outlines: dict[int, list[NDArray]] = {}
+    parts = np.split(of.points, of.ends[:-1])
+    for label, outline in zip(of.labels.tolist(), parts, strict=True):
+        outlines.setdefault(label, []).append(outline)
+    return dict(sorted(outlines.items()))
+
+
+PART = Part(title="Exact action map of one cube", label="Exact map", draw=draw, values=values)

@@ -48,7 +48,7 @@ def find_trusted(policy: Policy) -> str | None:
         context.seed.value,
     )
     env.close()
-    return trust.check_maps(trial, trust.method_maps(context.explainer))["trusted"]
+    return trust.check_maps(trial, trust.method_maps(context.explainer)).trusted
 
 
 def _work(connection: Connection, policy: Policy, plugins: Sequence[str]) -> None:

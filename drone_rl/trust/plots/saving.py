@@ -28,7 +28,7 @@ def new_chart(width: float = 4.5, height: float = 3.2) -> tuple[Figure, Axes]:
 def save_drawn(drawn: Image.Image | Figure | NDArray, path: Path) -> str:
     """Save an image as PNG, a chart as PNG and SVG, a video as MP4; return it as a data URI.
 
-    The path is without suffix. See `drone_rl.explanations.report.explanation.Media`. Raises a
+    The path is without suffix. See `drone_rl.explanations.report.part.Media`. Raises a
     `ValueError` for a chart that is too large.
     """
     if isinstance(drawn, (Image.Image, Figure)):

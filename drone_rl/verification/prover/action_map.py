@@ -13,7 +13,6 @@ image changes only along these lines:
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import torch
@@ -21,6 +20,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from drone_rl.config.commands import PlacesSettings
+from drone_rl.explanations import results
+from drone_rl.explanations.results import ActionShares, ExactMap, Outlines
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.tasks.common import SIDES
 from drone_rl.utils.errors import InputError
@@ -32,7 +33,6 @@ from drone_rl.verification.prover.cube_images import NOTHING, UNIT, CameraModel,
 RenderFaces = Callable[[NDArray[np.uint8]], Tensor]  # faces to the network's input (N, C, H, W)
 
 NEEDED = (Move.LEFT, Move.FORWARD, Move.RIGHT)  # the action that a cube on each side requires
-UNSEEN, BLIND = "unseen", "blind"
 _DIGITS = 14  # slopes of mirrored rows are rounded differently
 _BATCH = 256  # images per batch; constant, so that sums are reproducible
 
@@ -56,8 +56,8 @@ class ActionMap:
         """Return the actions at positions inside the window. Shape: (N, 2) to (N,)."""
         return self.action[self.arrangement.locate(places)]
 
-    def summary(self, logit_gap: float) -> dict[str, Any]:
-        """Return plain numbers; fractions are of areas. Logits closer than `logit_gap` may tie."""
+    def summary(self, logit_gap: float) -> ExactMap:
+        """Return the map in figures; logits closer than `logit_gap` may tie."""
         areas, total = self.areas, self.areas.sum()
         counts = [np.bincount(self.action, area, len(MOVES)) for area in areas.T]
         needed, action = np.array(NEEDED), self.action[:, None]
@@ -65,47 +65,44 @@ class ActionMap:
         blind, unseen = areas * is_blind, areas * self.is_unseen[:, None]
         closest = int(self.gap.argmin())
         sides = {
-            side: {
-                "share": _share(area.sum(), total),
-                "actions": [_share(c, area.sum()) for c in count],
-                UNSEEN: _share(unseen[:, k].sum(), area.sum()),
-                BLIND: _share(blind[:, k].sum(), area.sum()),
-            }
+            side: ActionShares(
+                share=_share(area.sum(), total),
+                actions=tuple(_share(c, area.sum()) for c in count),
+                unseen=_share(unseen[:, k].sum(), area.sum()),
+                blind=_share(blind[:, k].sum(), area.sum()),
+            )
             for k, (side, area, count) in enumerate(zip(SIDES, areas.T, counts, strict=True))
             if area.sum() > 0
         }
-        return {
-            "window": dataclasses.asdict(self.window),
-            "area": float(total),
-            "cells": len(self.action),
-            "actions": [_share(c, total) for c in np.sum(counts, 0)],
-            "sides": sides,
-            "alone": self.alone,
-            "touch_distance": self.touch_distance,
-            UNSEEN: _share(unseen.sum(), total),
-            BLIND: _share(blind.sum(), total),
-            "least_gap": float(self.gap[closest]),
-            "least_gap_ahead": float(self.places[closest, 0]),
-            "least_gap_left": float(self.places[closest, 1]),
-            "logit_gap": logit_gap,
-            "close": _share(areas[self.gap <= logit_gap].sum(), total),
-            "in_doubt": min(1.0, self.doubtful / float(total)),
-        }
+        return ExactMap(
+            window=results.Window(**dataclasses.asdict(self.window)),
+            area=float(total),
+            cells=len(self.action),
+            actions=tuple(_share(c, total) for c in np.sum(counts, 0)),
+            sides=sides,
+            alone=self.alone,
+            touch_distance=self.touch_distance,
+            unseen=_share(unseen.sum(), total),
+            blind=_share(blind.sum(), total),
+            least_gap=float(self.gap[closest]),
+            least_gap_ahead=float(self.places[closest, 0]),
+            least_gap_left=float(self.places[closest, 1]),
+            logit_gap=logit_gap,
+            close=_share(areas[self.gap <= logit_gap].sum(), total),
+            in_doubt=min(1.0, self.doubtful / float(total)),
+            outlines=self.outlines(),
+        )
 
-    def outlines(self) -> dict[str, NDArray]:
-        """Return closed polygons around regions of equal action, for plots.
-
-        "points" has the corners of all polygons, shape (P, 2); "ends" the end of each polygon among
-        them; "labels" the action of each, or one more than the last action if unseen.
-        """
+    def outlines(self) -> Outlines:
+        """Return closed polygons around regions of equal action, for plots."""
         outlines = self.arrangement.outlines(self.action)
         unseen = self.arrangement.outlines(self.is_unseen.astype(np.int64))
         outlines += [(len(MOVES), polygon) for label, polygon in unseen if label]
-        return {
-            "points": np.concatenate([polygon for _, polygon in outlines]),
-            "ends": np.cumsum([len(polygon) for _, polygon in outlines]),
-            "labels": np.array([label for label, _ in outlines]),
-        }
+        return Outlines(
+            points=np.concatenate([polygon for _, polygon in outlines]),
+            ends=np.cumsum([len(polygon) for _, polygon in outlines]),
+            labels=np.array([label for label, _ in outlines]),
+        )
 
 
 def map_policy(

@@ -1,16 +1,14 @@
-"""Explanations of a small untrained policy, computed once, and small ones made by hand."""
+"""Explanations of a small untrained policy, computed once."""
 
 import json
 import shutil
 
-import numpy as np
 import pytest
 import torch
 
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
 from drone_rl.explanations.explain import explain_policy
 from drone_rl.explanations.report import write_report
-from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import SmallCNN
 from tests.explanations.quick import ALL_SECTIONS, quick, quick_figures
@@ -52,27 +50,3 @@ def explain_twice(root):
     shutil.copytree(root / "a", root / "b")
     numbers = json.loads((root / "b" / "explanation.json").read_text())
     (root / "b" / "explanation.json").write_text(json.dumps({**numbers, "name": "second"}))
-
-
-@pytest.fixture
-def make_explanation():
-    """One of `frames` frames in two flights; more numbers and arrays as given."""
-
-    def build(numbers=None, arrays=None, frames=12, name="a policy"):
-        rng = np.random.default_rng(0)
-        half = frames // 2
-        episode = np.repeat([0, 1], [half, frames - half])
-        step = np.concatenate([np.arange(half), np.arange(frames - half)])
-        data = {
-            "frames": rng.integers(0, 255, (frames, 4, 6, 3), dtype=np.uint8),
-            "actions": np.arange(frames) % 3,
-            "probabilities": rng.dirichlet(np.ones(3), frames),
-            "episode": episode,
-            "step": step,
-            "rewards": (np.arange(frames) == 2).astype(float),
-            "event": (np.arange(frames) == 2).astype(np.int8),
-            "flights/episode": episode,
-        }
-        return Explanation({"name": name, **(numbers or {})}, arrays or {}, data)
-
-    return build

@@ -1,5 +1,7 @@
 """Live heat maps: the tests in another process, and maps of a trusted method."""
 
+from types import SimpleNamespace
+
 import pytest
 import torch
 
@@ -17,7 +19,7 @@ def test_the_tests_are_those_of_the_report(monkeypatch):
 
     def check_maps(trial, methods):
         given.update(trial=trial, methods=methods)
-        return {"trusted": "occlusion"}
+        return SimpleNamespace(trusted="occlusion")
 
     monkeypatch.setattr(trust, "check_maps", check_maps)
     assert find_trusted(drone_rl.load_policy("good")) == "occlusion"

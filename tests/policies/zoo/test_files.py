@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 import torch
 from safetensors.torch import save
-from tests.trust.cards import VERDICT
 
 from drone_rl.policies.zoo import (
     certificate_path,

@@ -11,8 +11,6 @@ from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.sim.actions import Move
 from drone_rl.verification.prover import action_map
 from drone_rl.verification.prover.action_map import (
-    BLIND,
-    UNSEEN,
     doubtful_area,
     find_borders,
     map_actions,
@@ -135,26 +133,26 @@ def test_areas_and_actions(found):
 def test_summary(found):
     """Beyond 3 m to the left: nothing below D - 2 = 2..3 is left out; 6..7 to 10 is not seen."""
     told = found.summary(0.31)
-    assert told["cells"] == 7 and told["area"] == pytest.approx(20)
-    assert told["sides"]["ahead"]["share"] == pytest.approx(0.3)
-    left, ahead = told["sides"]["left"], told["sides"]["ahead"]
-    assert left["actions"] == pytest.approx([3.5 / 7, 3.5 / 7, 0])
-    assert left[UNSEEN] == left[BLIND] == pytest.approx(0.5)
-    assert ahead["actions"] == pytest.approx([5 / 6, 0.5 / 6, 0.5 / 6])
-    assert ahead[BLIND] == 0
-    assert told["actions"] == pytest.approx([0.6, 0.2, 0.2])
-    assert (told[UNSEEN], told[BLIND]) == pytest.approx((0.6, 0.35))
-    assert told["least_gap"] == pytest.approx(0.3)  # right: 0.8 against 0.5
-    assert told["least_gap_left"] < -2
-    assert told["close"] == pytest.approx(0.2)
-    assert found.summary(0.2)["close"] == 0
-    assert 0 < told["in_doubt"] < 1e-4
+    assert told.cells == 7 and told.area == pytest.approx(20)
+    assert told.sides["ahead"].share == pytest.approx(0.3)
+    left, ahead = told.sides["left"], told.sides["ahead"]
+    assert left.actions == pytest.approx([3.5 / 7, 3.5 / 7, 0])
+    assert left.unseen == left.blind == pytest.approx(0.5)
+    assert ahead.actions == pytest.approx([5 / 6, 0.5 / 6, 0.5 / 6])
+    assert ahead.blind == 0
+    assert told.actions == pytest.approx([0.6, 0.2, 0.2])
+    assert (told.unseen, told.blind) == pytest.approx((0.6, 0.35))
+    assert told.least_gap == pytest.approx(0.3)  # right: 0.8 against 0.5
+    assert told.least_gap_left < -2
+    assert told.close == pytest.approx(0.2)
+    assert found.summary(0.2).close == 0
+    assert 0 < told.in_doubt < 1e-4
 
 
 def test_outlines(found):
     ways = found.outlines()
-    assert ways["labels"].tolist().count(1) == 1 and ways["labels"].tolist().count(3) == 3
-    parts = dict(zip(ways["labels"], np.split(ways["points"], ways["ends"][:-1]), strict=True))
+    assert ways.labels.tolist().count(1) == 1 and ways.labels.tolist().count(3) == 3
+    parts = dict(zip(ways.labels, np.split(ways.points, ways.ends[:-1]), strict=True))
     np.testing.assert_allclose(
         sorted(parts[1].tolist()), [[4, 2], [4, 6], [5, 3], [5, 7]], atol=1e-12
     )
