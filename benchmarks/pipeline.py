@@ -5,7 +5,6 @@ import time
 from collections.abc import Callable
 
 import torch
-from torchrl.envs import TransformedEnv
 from torchrl.modules import ProbabilisticActor
 
 from drone_rl.collectors import ThreadedCollector
@@ -37,7 +36,7 @@ def default_collector(
     return collector
 
 
-def default_pipeline(num_envs: int) -> tuple[TransformedEnv, ProbabilisticActor, PolicyNetwork]:
+def default_pipeline(num_envs: int) -> tuple[EnvBase, ProbabilisticActor, PolicyNetwork]:
     """Return an environment with transforms, an actor with an untrained policy, and its network."""
     env = make_env(num_envs)
     shape = tuple(env.observation_spec["pixels"].shape[1:])

@@ -81,7 +81,8 @@ def _verdict(script: Script, episodes: int, seed: int) -> Verdict:
     task = script.settings
     env = _make_env(task, seed)
     policy = ScriptedPolicy(script, torch.Generator().manual_seed(seed))
-    return apply_rule(rollout(policy, env, episodes), _baselines(task, episodes, seed))
+    hashable: Any = task
+    return apply_rule(rollout(policy, env, episodes), _baselines(hashable, episodes, seed))
 
 
 @functools.cache

@@ -104,7 +104,7 @@ class _Learner:
             masks.append(running)
             running = running & ~after["next", "done"][:, 0]
             state = step_mdp(after)
-        rolled: Any = torch.stack(steps, 1)  # pyright: ignore[reportArgumentType]
+        rolled: Any = torch.stack(steps, 1)
         batch = self._returns(rolled[torch.stack(masks, 1)])
         self.table.zero_grad()
         self._loss(batch)["loss_actor"].backward()

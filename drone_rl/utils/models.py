@@ -4,7 +4,7 @@ import re
 import typing
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Self, cast
+from typing import Any, Self
 
 import pydantic
 from pydantic_core import ErrorDetails
@@ -15,15 +15,17 @@ from drone_rl.utils.limits import RESULT_BYTES
 
 
 class _Checked(type(pydantic.BaseModel)):
-    def __call__(cls, *args: Any, **values: Any) -> Any:
-        """Make an instance; errors in nested ones have their place."""
-        try:
-            return super().__call__(*args, **values)
-        except pydantic.ValidationError as error:
-            raise input_error(error, cast(Any, cls)) from None
+    if not typing.TYPE_CHECKING:  # whose return value would hide the class from type checkers
+
+        def __call__(cls, *args: Any, **values: Any) -> Any:
+            """Make an instance; errors in nested ones have their place."""
+            try:
+                return super().__call__(*args, **values)
+            except pydantic.ValidationError as error:
+                raise input_error(error, cls) from None
 
 
-class Model(pydantic.BaseModel, metaclass=_Checked):
+class Model(pydantic.BaseModel, metaclass=_Checked, frozen=True):
     """Base of frozen classes with typed fields; a docstring below a field describes it.
 
     JSON files are read strictly: "3" is no number and 3.0 no whole one.
@@ -33,7 +35,6 @@ class Model(pydantic.BaseModel, metaclass=_Checked):
     """
 
     model_config = pydantic.ConfigDict(
-        frozen=True,
         extra="forbid",
         use_attribute_docstrings=True,
         allow_inf_nan=False,
