@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 
 import torch
+from torchrl.envs import EnvBase
 from torchrl.modules import ProbabilisticActor
 
 from drone_rl.collectors import ThreadedCollector
