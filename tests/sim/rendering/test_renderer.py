@@ -9,18 +9,19 @@ from drone_rl.explanations.scenes import Scenes, place_target
 from drone_rl.sim.rendering import Appearance, Raytracer
 from drone_rl.sim.rendering.mujoco_warp import WarpRenderer
 from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.rendering.view import to_gray
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 
 
 class OneColor:
-    """Render all pixels in the color of the sky; only RGB is supported."""
+    """Render all pixels in the color of the sky, as RGB or gray."""
 
     def __init__(self, scene, *, num_envs, num_shards, device):
         self.scene, self.prepared, self.is_closed = scene, [], False
 
     def prepare(self, view):
-        view.check_modalities(self, {"rgb"})
+        view.check_modalities(self, {"rgb", "gray"})
         self.prepared.append(view)
 
     def render(self, view, poses, appearance=None):
@@ -30,7 +31,8 @@ class OneColor:
             color = appearance.colors.get(SemanticClass.SKY, color)
         pixels = (torch.tensor(color) * 255).to(torch.uint8)
         images = view.new_images(len(poses))
-        images["rgb"][:] = pixels
+        for modality, image in images.items():
+            image[:] = to_gray(pixels) if modality == "gray" else pixels
         return images
 
     def close(self):
@@ -49,7 +51,7 @@ def test_worlds_use_a_custom_renderer():
 def test_unsupported_view_raises_one_line():
     worlds = Worlds(2, renderer=OneColor)
     with pytest.raises(
-        InputError, match="modality='depth' can't be rendered by OneColor; give one of: rgb"
+        InputError, match="modality='depth' can't be rendered by OneColor; give one of: rgb, gray"
     ):
         worlds.render(worlds.state, worlds.view(modality="depth"))
 
