@@ -72,7 +72,7 @@ class Model(pydantic.BaseModel, metaclass=_Checked, frozen=True):
     def replace(self, **changes: Any) -> Self:
         """Return a copy with other values of some fields; see above for errors."""
         fields = {name: getattr(self, name) for name in type(self).model_fields}
-        return type(self)(**{**fields, **changes})
+        return type(self)(**{**fields, **(self.model_extra or {}), **changes})
 
 
 class Stored(Model):
