@@ -85,8 +85,8 @@ class Worlds:
             InputError: An argument is unusable.
         """
         check_device(device)
-        Maybe(Instance(Appearance)).read(appearance, "appearance")
-        self.appearance, self.distractors = appearance, distractors
+        self.appearance = Maybe(Instance(Appearance)).read(appearance, "appearance")
+        self.distractors = distractors
         self._combined: tuple[Appearance, Appearance | None, Appearance] | None = None
         """The last appearance given, the default one, and both combined."""
         self.num_envs = num_envs

@@ -72,7 +72,7 @@ class Model(pydantic.BaseModel, metaclass=_Checked, frozen=True):
     def replace(self, **changes: Any) -> Self:
         """Return a copy with other values of some fields; see above for errors."""
         fields = {name: getattr(self, name) for name in type(self).model_fields}
-        return type(self)(**{**fields, **changes})
+        return type(self)(**{**fields, **(self.model_extra or {}), **changes})
 
 
 class Stored(Model):
@@ -119,12 +119,10 @@ def input_error(
     if details["type"] == "value_error":  # raised by a validator of this project
         text = str(details.get("ctx", {}).get("error", details["msg"]))
         return InputError(f"{place}.{text}" if place else text)
-    _, _, rest = details["msg"].partition(" should ")
-    reason = (
-        f"must {rest.replace(' after validation', '')}"
-        if rest
-        else details["msg"][:1].lower() + details["msg"][1:]
-    )
+    reason = details["msg"][:1].lower() + details["msg"][1:]
+    if rest := details["msg"].partition(" should ")[2]:
+        plain = rest.replace(" after validation", "").replace("a valid tuple", "a list")
+        reason = f"must {plain}"
     if details["type"] == "literal_error":
         reason = re.sub(r"<[\w.]+: ('[^']*')>", r"\1", reason)  # a member of an enum
         reason += did_you_mean(details["input"], re.findall(r"'([^']+)'", reason))

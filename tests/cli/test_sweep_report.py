@@ -28,7 +28,7 @@ def test_judge(sweep, in_process):
     done = in_process("sweep-report", sweep.folder, "judge=true", "episodes=8")
     assert done.returncode == 0, done.stderr
     assert "Verdicts are on the last policies of 1 run, by 8 greedy episodes" in done.stdout
-    assert "1 run not ended yet" in done.stdout
+    assert "1 unfinished" in done.stdout
     summary = json.loads((sweep.folder / "summary.json").read_text())
     assert (summary["judged"], summary["best"]["run"]) == (1, 0)
 

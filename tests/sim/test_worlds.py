@@ -53,7 +53,7 @@ def test_a_reward_whose_sums_may_overflow_is_named(monkeypatch, reward):
     ("given", "message"),
     [
         ({"device": "gpu"}, "^device=gpu is unknown"),
-        ({"appearance": AppearanceSettings()}, "^appearance=.* is no Appearance; give "),
+        ({"appearance": AppearanceSettings()}, "^appearance=.*: it must be .* Appearance"),
         ({"renderer": 42}, "^renderer=42 is no renderer; give one of: raytrace"),
     ],
 )

@@ -6,7 +6,13 @@ import itertools
 import pytest
 import torch
 
-from drone_rl.config import MINIMAL, CameraSettings, PillarsSettings, TaskSettings
+from drone_rl.config import (
+    MINIMAL,
+    BaseTaskSettings,
+    CameraSettings,
+    PillarsSettings,
+    TaskSettings,
+)
 from drone_rl.envs.fault_models import dead_rows, late_frames, noise, out_of_focus
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
@@ -146,9 +152,8 @@ def test_oracle_ignores_distractors():
 def test_task_without_objects():
     assert task_region(PillarsSettings()).size == 1.0
 
-    class Other(PillarsSettings):
+    class Other(BaseTaskSettings):
         name = "other"
-        object_region = None
 
     with pytest.raises(InputError, match="axes=distractors is not for task=other"):
         task_region(Other())

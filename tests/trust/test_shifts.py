@@ -9,7 +9,7 @@ from drone_rl.sim.tasks import CollectCubes
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 
-FEW = {"episodes": 12, "domain_episodes": 20, "strengths": [5], "progress": silent}
+FEW = {"episodes": 12, "domain_episodes": 20, "strengths": [5], "seed": 0, "progress": silent}
 
 
 @pytest.fixture(scope="module")
