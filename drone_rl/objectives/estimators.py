@@ -139,7 +139,7 @@ def _ends_later(done: Tensor) -> Tensor:
 class _Discounted(ReturnEstimator):
     def __init__(self, gamma: float | None = None, **keys: Unpack[ReturnKeys]) -> None:
         super().__init__(**keys)
-        defaults: Any = self.Settings
+        defaults: Any = self.Settings()
         self.gamma: float = defaults.gamma if gamma is None else gamma
         if not 0.0 <= self.gamma <= 1.0:
             raise InputError(f"gamma={gamma} is out of range; give a rate from 0 to 1")

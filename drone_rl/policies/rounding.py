@@ -66,8 +66,10 @@ class RoundingBound:
     def find(cls, network: nn.Module) -> Self | None:
         """Return the bounds of a network, or None if `as_layers` does not support it."""
         layers = as_layers(network)
+        if isinstance(layers, Unsupported):
+            return None
         actions: Any = network.actions
-        return None if isinstance(layers, Unsupported) else cls(layers, actions)
+        return cls(layers, actions)
 
     @torch.no_grad()
     def decide(self, pixels: Tensor) -> Decisions:

@@ -117,12 +117,10 @@ def input_error(error: pydantic.ValidationError, cls: Any = None, where: str = "
     if details["type"] == "value_error":  # raised by a validator of this project
         text = str(details.get("ctx", {}).get("error", details["msg"]))
         return InputError(f"{place}.{text}" if place else text)
-    _, _, rest = details["msg"].partition(" should ")
-    reason = (
-        f"must {rest.replace(' after validation', '')}"
-        if rest
-        else details["msg"][:1].lower() + details["msg"][1:]
-    )
+    reason = details["msg"][:1].lower() + details["msg"][1:]
+    if rest := details["msg"].partition(" should ")[2]:
+        plain = rest.replace(" after validation", "").replace("a valid tuple", "a list")
+        reason = f"must {plain}"
     if details["type"] == "literal_error":
         reason = re.sub(r"<[\w.]+: ('[^']*')>", r"\1", reason)  # a member of an enum
         reason += did_you_mean(details["input"], re.findall(r"'([^']+)'", reason))

@@ -22,7 +22,7 @@ from drone_rl.utils.models import Model
 from drone_rl.utils.schema import as_plain
 
 S = TypeVar("S", bound="Settings")
-_NUMBERS = (int, float, int | None, float | None)
+_STRICT = (bool, int, float, bool | None, int | None, float | None)
 
 
 class Settings(Model):
@@ -46,10 +46,10 @@ class Settings(Model):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
-        """Let numbers without a kind be strict, too: "3" is none, and true is no 1."""
+        """Let types without a kind be strict, too: "3" is no number, and true is no 1."""
         super().__pydantic_init_subclass__(**kwargs)
         for field in cls.model_fields.values():
-            if not field.metadata and field.annotation in _NUMBERS:
+            if not field.metadata and field.annotation in _STRICT:
                 field.metadata.append(pydantic.Strict())
 
     @pydantic.field_validator("*", mode="before")

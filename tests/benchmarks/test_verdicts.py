@@ -28,7 +28,7 @@ PHRASES = {
     "sees 4 m sideways": "with cubes 4 to 6 m to its side: in 221 of 221 episodes",
     "blind on its left": "can't be trusted with cubes on its left",
     "loses one episode in 50": "second cube: in 9 of 400",
-    "straight on in a narrow field": "no better than flying straight on",
+    "straight on in a narrow field": 'no better than the baseline "always forward"',
 }
 """The finding that a reader needs, for some of them."""
 

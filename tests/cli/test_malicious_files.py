@@ -14,7 +14,7 @@ import yaml
 from safetensors.torch import save
 
 from drone_rl.policies.zoo import parse
-from drone_rl.sweeps.manifest import FORMAT
+from drone_rl.sweeps.manifest import Sweep
 from drone_rl.utils.limits import ARRAYS_BYTES, CHECKPOINT_BYTES
 from tests.cli.running import error_line
 
@@ -35,7 +35,11 @@ DESCRIPTION = {
 PROGRESS = {"frames": 1, "episodes": 1, "updates": 1, "seconds": 1.0, "running_reward": 0.5}
 ORIGIN = {"versions": {"torch": "2"}, "git_revision": None}
 SWEEP = {
-    **{"format": FORMAT, "command": "drone-rl train -m seed=0,1", "settings": {}},
+    **{
+        "format": Sweep.model_fields["format"].default,
+        "command": "drone-rl train -m seed=0,1",
+        "settings": {},
+    },
     **{"versions": {}, "git_revision": None, "machine": {}},
     "runs": [{"number": 0, "overrides": ["seed=0"], "folder": "0"}],
 }

@@ -20,15 +20,15 @@ from drone_rl.utils.seeding import Stream
 def test_oracle_collects_all_cubes(settings):
     env = DroneEnv(100, settings, pixels=False, stream=Stream.REPORT)
     summary = summarise(rollout(oracle_policy(settings), env, 100))
-    assert summary["success"]["share"] == 1.0
+    assert summary.success.share == 1.0
 
 
 def test_random_policy_matches_the_original_study():
     env = DroneEnv(500, pixels=False)
     policy = random_policy(MOVES, torch.Generator().manual_seed(0))
     summary = summarise(rollout(policy, env, 500))
-    assert 0.7 < summary["mean_goals"] < 1.0  # 0.84 there
-    assert 125 < summary["mean_length"] < 142  # 133 there
+    assert 0.7 < summary.mean_goals < 1.0  # 0.84 there
+    assert 125 < summary.mean_length < 142  # 133 there
 
 
 def test_more_episodes_than_fit_into_memory_are_refused():

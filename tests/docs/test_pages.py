@@ -79,7 +79,7 @@ def test_every_public_name_is_in_the_reference():
 def test_files_that_it_links_are_there(page):
     for path, heading in re.findall(r"\]\(([^)#:]+)(?:#([^)]+))?\)", page.read_text()):
         target = page.parent / path
-        assert target.exists(), path
+        assert target.exists() or path.endswith(".schema.json"), path  # made with the site
         if heading and "." not in heading:  # those with a dot are made of docstrings
             titles = re.findall(r"^#+ (.+)$", target.read_text(), re.MULTILINE)
             slugs = {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}

@@ -54,8 +54,7 @@ def test_verdict_does_not_depend_on_the_wrapping(network):
 
 def test_in_task_changes_or_replaces_the_task():
     done = drone_rl.judge(left, task={"num_cubes": 1}, **FEW)
-    assert (done.name, done.as_dict()["num_cubes"]) == ("left", 1)
-    assert done.verdict.kind == "poor"
+    assert (done.policy, done.num_cubes, done.kind) == ("left", 1, "poor")
     posts = drone_rl.policy_from(left, task=Posts(), name="aside")
     with posts.flying(2) as (env, actor):
         assert actor(env.reset())["action"].tolist() == [1, 1]

@@ -250,8 +250,8 @@ def test_every_command_runs_it(trained, tmp_path):
     assert shifted.domain.plain.fragile == 0
     sizes = {"frames": 40, "data_episodes": 30, "perplexity": 5}
     explained = drone_rl.explain(policy, folder=tmp_path / "explained", **sizes, **few)
-    (numbers,) = explained.numbers.values()
-    assert "left_out" not in numbers and numbers["dataset"]["remembers"]
+    (results,) = explained.policies.values()
+    assert not results.left_out and results.dataset.remembers
     assert "remembers earlier frames" in explained.report.read_text()
     drone_rl.class_models(policy, steps=2, episodes=2, gallery=False, seed=0)
     film(policy, tmp_path / "film", 1)

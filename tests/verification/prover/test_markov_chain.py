@@ -141,7 +141,7 @@ def test_sampled_episodes_agree(place, monkeypatch):
     share = float(done.success[0])
     assert 0.05 < share < 0.95
     sigma = math.sqrt(share * (1 - share) / flights)
-    assert abs(summarise(flown)["success"]["share"] - share) < 5 * sigma
+    assert abs(summarise(flown).success.share - share) < 5 * sigma
     assert float(flown.length.double().mean()) == pytest.approx(float(done.steps[0]), rel=0.05)
     for reason in CubesEnd:
         p = float(done.reasons[0, reason])
@@ -181,7 +181,8 @@ def bounds_over(name, box, most=1):
 def chances_at(name, placements):
     """Exact chances of success at placements. Shape: (P,)."""
     policy = drone_rl.load_policy(name).in_task(num_cubes=placements.shape[1])
-    return drone_rl.chances(policy, placements.tolist(), progress=silent).outcomes.success
+    found = drone_rl.chances(policy, placements.tolist(), progress=silent)
+    return np.array([placement.success for placement in found.placements])
 
 
 def test_least_mean_by_hand():
