@@ -67,15 +67,15 @@ def make_env(
     Raises:
         InputError: A setting is out of range; the message begins with its name.
     """
-    Maybe(Instance(CameraSettings)).read(camera, "camera")
-    Maybe(Instance(ActionSettings)).read(options.get("actions"), "actions")
+    camera = Maybe(Instance(CameraSettings)).read(camera, "camera")
+    actions = Maybe(Instance(ActionSettings)).read(options.get("actions"), "actions")
     dynamics = options.get("dynamics")
     if isinstance(dynamics, str | dict):
         raise InputError(f"dynamics={shown(dynamics)} is no DynamicsSettings; give one")
     if isinstance(dynamics, DynamicsSettings):
         dynamics.check_air()
     appearance = Maybe(Instance(AppearanceSettings)).read(options.get("appearance"), "appearance")
-    others: Any = {**options, "appearance": appearance}
+    others: Any = {**options, "actions": actions, "appearance": appearance}
     made = [step.make() for step in as_transforms(transforms)] if others.get("pixels", True) else ()
     base = envs.DroneEnv(
         num_envs, task, camera, transforms=made, seed=seed, stream=stream, device=device, **others

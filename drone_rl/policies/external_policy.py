@@ -187,10 +187,10 @@ def policy_from(
     """
     network = _checked_logits(logits, env)
     if camera is not None:
-        Instance(CameraSettings).read(camera, "camera")
-    Instance(DynamicsSettings).read(dynamics, "dynamics")
+        camera = Instance(CameraSettings).read(camera, "camera")
+    dynamics = Instance(DynamicsSettings).read(dynamics, "dynamics")
     dynamics.check_air()
-    Instance(ActionSettings).read(actions, "actions")
+    actions = Instance(ActionSettings).read(actions, "actions")
     if isinstance(task, str):
         task = BaseTaskSettings.read(task, "task")
     before_wrappers = None if transforms is None else as_transforms(transforms)

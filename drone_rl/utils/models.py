@@ -102,9 +102,7 @@ class Seeded(Stored):
         return f"{label}: a policy could have been fitted to these {what}."
 
 
-def input_error(
-    error: pydantic.ValidationError, cls: type[pydantic.BaseModel] | None = None, where: str = ""
-) -> InputError:
+def input_error(error: pydantic.ValidationError, cls: Any = None, where: str = "") -> InputError:
     """Return the first error of pydantic as a user's error, with the place, value and remedy."""
     details = error.errors(include_url=False)[0]
     place = _place(details, where)

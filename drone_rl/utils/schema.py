@@ -64,7 +64,7 @@ class Annotation:
         try:
             return self._adapter.validate_python(as_plain(value))
         except ValidationError as error:
-            raise input_error(error, where=where) from None
+            raise input_error(error, self.hint, where) from None
 
     @functools.cached_property
     def _adapter(self) -> TypeAdapter[Any]:

@@ -21,8 +21,7 @@ def test_specs_of_a_policys_environment():
 
 
 def test_images_are_resized_to_the_network():
-    camera = drone_rl.CameraSettings(width=32, height=13)
-    env = drone_rl.make_env(1, camera=camera)
+    env = drone_rl.make_env(1, camera={"width": 32, "height": 13})
     assert env.reset()["pixels"].shape == (1, 1, 25, 64)
     env.close()
     settings = drone_rl.TrainSettings(camera=drone_rl.CameraSettings(width=128, height=50))
@@ -46,6 +45,7 @@ def test_task_is_selected_by_name():
         ({"task": "pillar"}, "task='pillar': it must be one of"),
         ({"task": 3}, "task=3 is no task"),
         ({"camera": "tiny"}, "camera='tiny'"),
+        ({"camera": {"heigth": 9}}, "camera.heigth is unknown; valid names: .* mean height"),
         ({"dynamics": "simple_flight"}, "dynamics='simple_flight'"),
         ({"actions": "velocity"}, "actions='velocity'"),
         ({"appearance": "smog"}, "appearance='smog': it must be one of"),

@@ -143,7 +143,7 @@ class Drone:
         self.home = self.body.position[0].clone()
         """Starting position, metres. Shape: (3,)."""
         self.worlds, self._obstacles = worlds, obstacles
-        Maybe(Instance(SensorSettings)).read(sensors, "sensors")
+        sensors = Maybe(Instance(SensorSettings)).read(sensors, "sensors")
         self._initial = copy.deepcopy((self.body, worlds.state if worlds else None, sensors))
         self.has_api_control = True
         """Whether commands are accepted; see `enable_api_control`."""

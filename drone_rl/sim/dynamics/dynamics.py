@@ -106,7 +106,7 @@ def make_dynamics(
     without settings. Raises an `InputError` if both dynamics and settings of actions are given, or
     they don't fit each other.
     """
-    Maybe(Instance(ActionSettings)).read(actions, "actions")
+    actions = Maybe(Instance(ActionSettings)).read(actions, "actions")
     if dynamics is not None and not isinstance(dynamics, DynamicsSettings):
         if isinstance(dynamics, type) or not hasattr(dynamics, "step"):
             raise InputError(
