@@ -14,6 +14,8 @@ def test_errors_of_loggers_are_one_line(monkeypatch, error):
         target: ClassVar[str] = "os.path.join"
         is_known: ClassVar[bool] = False
 
+    del Logger.registry["broken"]
+
     def refuse(*args, **kwargs):
         raise error
 

@@ -196,7 +196,7 @@ def test_advantages_equal_torchrls_gae(is_ours):
 
 def test_collector_without_next_observations_raises(monkeypatch, tmp_path):
     """It is user-defined, so the settings cannot detect it."""
-    collector = type("Mine", (Episodes,), {"is_known": False, "target": Episodes.target})
+    collector = type("Mine", (Episodes,), {"is_known": False})
     settings = TINY.replace(collector=collector(num_envs=2))
     with pytest.raises(InputError, match=r"no entry \('next', 'pixels'\).*collector=rollouts$"):
         drone_rl.train(settings, folder=tmp_path, progress=silent)
