@@ -31,9 +31,10 @@ from drone_rl.sim.vocabulary import ShownActions, shown_actions
 from drone_rl.trust.plots import images
 from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.models import Seeded
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.text import listed, seed_line
+from drone_rl.utils.text import listed
 
 _PRINTED: Mapping[str, Any] = {
     "maximize": "probability", "step": "plain", "lr": 1.0, "normalize": "none",
@@ -134,7 +135,7 @@ class ClassModels(TableResult):
                     f"{title}: no image found makes {listed(failed, 'or')} more probable than not; "
                     "the policy or these settings may be the reason, compare gallery=true"
                 )
-        return [*lines, seed_line(self.seed.as_dict())]
+        return [*lines, Seeded(**self.seed.as_dict()).seed_line()]
 
     def figure(self) -> Image.Image:
         """Return the gallery."""

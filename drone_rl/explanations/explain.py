@@ -29,12 +29,11 @@ from drone_rl.trust.verdict import CertificateClaim, FindClaim
 from drone_rl.utils.display import Result, page
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path, new_run_folder, to_file_name
-from drone_rl.utils.models import Model
+from drone_rl.utils.models import Model, Seeded
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.schema import Whole
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.text import seed_line
 from drone_rl.utils.threads import pool_like_caller, torch_threads
 
 Given = str | Path | BasePolicy | Logits  # a policy or something that `as_policy` converts to one
@@ -77,7 +76,8 @@ class Explanations(Result):
             if verdict := explanation.verdict:
                 certainty = "" if verdict.certain else " (not certain)"
                 lines.append(f"{name}: {verdict.kind}{certainty}. {verdict.sentence}")
-        return "\n".join([*lines, f"report: {self.report}", seed_line(self.seed.as_dict())])
+        seed_line = Seeded(**self.seed.as_dict()).seed_line()
+        return "\n".join([*lines, f"report: {self.report}", seed_line])
 
     def _repr_html_(self) -> str:
         return page(self.report.read_text(encoding="utf-8"))

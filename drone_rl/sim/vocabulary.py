@@ -115,13 +115,6 @@ CUBES = TaskVocabulary(**_BUILT_IN["collect_cubes"])
 PILLARS = TaskVocabulary(**_BUILT_IN["pillars"])
 
 
-def terms_of(evidence: Mapping[str, Any]) -> TaskVocabulary:
-    """Return the terms of `verdict.json`, `explanation.json` or a card; raises `InputError`."""
-    if "terms" not in evidence:
-        return CUBES
-    return TaskVocabulary.read(evidence["terms"], "terms")
-
-
 def some_cubes(task: Mapping[str, Any]) -> str:
     """Describe the cubes of a task, from its settings."""
     names = {1: "one cube", 2: "two cubes", 3: "three cubes", 4: "four cubes", 5: "five cubes"}

@@ -27,8 +27,9 @@ from drone_rl.sweeps.summary import (
 from drone_rl.utils.display import content_security_policy, page_environment, static_text
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, last_of, newest, write_atomically
+from drone_rl.utils.models import Seeded
 from drone_rl.utils.readers import read_result
-from drone_rl.utils.text import render, seed_line
+from drone_rl.utils.text import render
 
 if TYPE_CHECKING:
     from drone_rl.utils.seeding import RootSeed
@@ -112,7 +113,7 @@ def judge_sweep(sweep: Sweep, episodes: int, device: str) -> None:
     from drone_rl.utils.seeding import root_seed  # imports torch
 
     seed = root_seed(None)
-    _log.info("%s", seed_line(seed.as_dict()))
+    _log.info("%s", Seeded(**seed.as_dict()).seed_line())
     finished = [run for run in sweep.runs if read_result(run.folder) is not None]
     for number, run in enumerate(finished, start=1):
         name = sweep.name_of(run)

@@ -1,13 +1,8 @@
-"""Text for reports: numbers, lists, and sentences with the condition that permits each.
+"""Text for reports: numbers, lists, and templates whose sentences stand below conditions."""
 
-A claim whose evidence is missing or contradicts it is not written. Evidence is plain data, as in
-the JSON files, so that a test can change the evidence and see the sentence change or disappear.
-"""
-
-import dataclasses
 import functools
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -79,42 +74,6 @@ def ordinal(number: int) -> str:
     return f"{place}{'th' if is_teen else _ENDINGS.get(place % 10, 'th')}"
 
 
-Evidence = Mapping[str, Any]
-"""Plain numbers, texts, lists and mappings."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Sentence:
-    """One claim."""
-
-    name: str
-    """Section and claim, such as "loops.none"."""
-    condition: str
-    """The condition in English, for readers of the code or the page."""
-    may: Callable[[Evidence], bool]
-    """Whether the condition holds."""
-    text: Callable[[Evidence], str]
-    """The claim; called only if the condition holds."""
-
-
-Claims = dict[str, str]
-"""Permitted sentences by name, such as "loops.none"."""
-Paragraph = Sequence[Sentence] | Callable[[Evidence], Claims]
-"""Sentences with their conditions, or a function that returns the permitted ones."""
-
-
-def say(paragraph: Paragraph, evidence: Evidence) -> str:
-    """Return the permitted sentences as one paragraph."""
-    return " ".join(said(paragraph, evidence).values())
-
-
-def said(paragraph: Paragraph, evidence: Evidence) -> Claims:
-    """Return the permitted sentences by name."""
-    if isinstance(paragraph, Sequence):
-        return {s.name: s.text(evidence) for s in paragraph if s.may(evidence)}
-    return paragraph(evidence)
-
-
 def percent(share: float, digits: int = 1) -> str:
     """Return a rate in percent with so many decimals; 0% and 100% only if it is exactly 0 or 1."""
     if share in (0, 1):
@@ -129,32 +88,17 @@ exact_percent = functools.partial(percent, digits=2)
 """Returns a known fraction in percent with two decimals."""
 
 
-def interval(figure: "Share | Mean | Mapping[str, Any]") -> str:
+def interval(figure: "Share | Mean") -> str:
     """Return the 95% confidence interval of a rate."""
-    ends = figure if isinstance(figure, Mapping) else dict(figure)
+    ends = dict(figure)
     return f"{percent(ends['lower95'])} to {percent(ends['upper95'])}"
 
 
-def rate(figure: "Share | Mean | Mapping[str, Any]", label: str = "95% CI ") -> str:
+def rate(figure: "Share | Mean", label: str = "95% CI ") -> str:
     """Return a rate with its 95% confidence interval, which the label precedes.
 
     A rate of None is "not offered".
     """
-    of = figure if isinstance(figure, Mapping) else dict(figure)
+    of = dict(figure)
     share = of["share"] if "share" in of else of["mean"]
     return "not offered" if share is None else f"{percent(share)} ({label}{interval(figure)})"
-
-
-SEED_KEYS = ("seed", "seed_is_fixed")
-"""Entries of every result that states a claim."""
-
-
-def is_fixed(evidence: Evidence) -> bool:
-    """Return whether the seed was known before the analysis; true if that is not recorded."""
-    return bool(evidence.get("seed_is_fixed", True))
-
-
-def seed_line(evidence: Evidence, what: str = "environments") -> str:
-    """Return the seed of a result and its origin; `what` is sampled from its streams."""
-    seed, kind = evidence.get("seed"), "fixed" if is_fixed(evidence) else "fresh"
-    return f"{what}: seed {'not recorded' if seed is None else seed} ({kind})"

@@ -3,14 +3,13 @@
 import pytest
 
 from drone_rl.sim import actions
-from drone_rl.sim.vocabulary import CUBES, MOST, SHOWN_MOVES, shown_actions, terms_of
+from drone_rl.sim.vocabulary import CUBES, MOST, SHOWN_MOVES, TaskVocabulary, shown_actions
 from drone_rl.utils.errors import InputError
 
 
-def test_vocabulary_round_trip_and_default():
-    assert terms_of({}) == CUBES
+def test_vocabulary_round_trip():
     other = CUBES.replace(goal="post", sides={"near": "close by"})
-    assert terms_of({"terms": other.as_dict()}) == other
+    assert TaskVocabulary.read(other.as_dict()) == other
 
 
 @pytest.mark.parametrize(
@@ -36,7 +35,7 @@ def test_descriptions_of_failures(by, value, said):
 )  # fmt: skip
 def test_invalid_vocabulary_raises(change):
     with pytest.raises(InputError, match="terms"):
-        terms_of({"terms": {**CUBES.as_dict(), **change}})
+        TaskVocabulary.read({**CUBES.as_dict(), **change}, "terms")
 
 
 def test_moves_are_the_default_display():

@@ -1,17 +1,8 @@
 import pytest
 
+from drone_rl.utils.intervals import Share
 from drone_rl.utils.models import Seeded
-from drone_rl.utils.text import (
-    Sentence,
-    listed,
-    ordinal,
-    percent,
-    plural,
-    rate,
-    said,
-    say,
-    seed_line,
-)
+from drone_rl.utils.text import listed, ordinal, percent, plural, rate
 
 
 def test_lists_and_counts():
@@ -40,21 +31,11 @@ def test_percentages_are_never_rounded_to_none_or_all():
     ],
 )
 def test_rates_with_intervals(share, lower, upper, text):
-    assert rate({"share": share, "lower95": lower, "upper95": upper}) == text
-
-
-MANY = Sentence("loops.many", "a loop", lambda e: e["loops"] > 0, lambda e: f"{e['loops']} loops.")
-NONE = Sentence("loops.never", "none", lambda e: e["loops"] == 0, lambda e: "No loop.")
-
-
-def test_sentences_have_conditions():
-    assert say([MANY, NONE], {"loops": 3}) == "3 loops."
-    assert said([MANY, NONE], {"loops": 0}) == {"loops.never": "No loop."}
-    assert say(lambda e: {"loops.a": "A.", "loops.b": "B."}, {}) == "A. B."
+    assert rate(Share(share=share, lower95=lower, upper95=upper, successes=0, trials=0)) == text
 
 
 def test_seeds_are_reported():
-    assert seed_line({"seed": 9, "seed_is_fixed": False}) == "environments: seed 9 (fresh)"
+    assert Seeded(seed=9, seed_is_fixed=False).seed_line() == "environments: seed 9 (fresh)"
     fixed = Seeded(seed=5)
     assert fixed.seed_line("placements") == "placements: seed 5 (fixed)"
     assert fixed.seed_warning().startswith("Fixed seed 5: a policy could have been fitted")
