@@ -226,6 +226,7 @@ class Observer:
         """
         self.worlds, self.appearance = worlds, appearance
         self.faults = faults or Pipeline()
+        self._to_rgb = RgbPixels()
         self.transforms = tuple(t for t in transforms if is_of_pixels(t))
         first = next(iter(self.transforms), None)
         self._has_bytes = type(first) not in (GrayPixels, RgbPixels)
@@ -263,7 +264,7 @@ class Observer:
         if self.view.modalities == ("gray",):
             images = images[:, None]
         elif self.faults.stages or not self._has_bytes:
-            images = RgbPixels()._apply_transform(images)
+            images = self._to_rgb._apply_transform(images)
         images = self.faults(images, rows, starts)
         if self.faults.stages and self._has_bytes:
             images = (images * 255).round().to(torch.uint8).movedim(-3, -1)
