@@ -34,8 +34,7 @@ def _environment(package: str) -> "jinja2.Environment":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    filters = (percent, interval, rate, listed, plural, count, setting)
-    environment.filters |= {function.__name__: function for function in filters}
+    environment.filters |= FILTERS
     return environment
 
 
@@ -102,3 +101,7 @@ def rate(figure: "Share | Mean", label: str = "95% CI ") -> str:
     of = dict(figure)
     share = of["share"] if "share" in of else of["mean"]
     return "not offered" if share is None else f"{percent(share)} ({label}{interval(figure)})"
+
+
+FILTERS = {f.__name__: f for f in (percent, interval, rate, listed, plural, count, setting)}
+"""Filters of templates, also of pages."""

@@ -24,7 +24,7 @@ from drone_rl.trust.plots.saving import save_drawn
 from drone_rl.utils.display import content_security_policy, page_environment, static_text
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import newest, to_file_name
-from drone_rl.utils.text import listed, percent, plural, rate
+from drone_rl.utils.text import FILTERS
 
 PARTS: dict[str, Part] = {
     "verdict": behavior.VERDICT_PART,
@@ -150,13 +150,10 @@ def _environment() -> jinja2.Environment:
     """Return the templates of this page, compiled once."""
     environment = page_environment("drone_rl.explanations.report")
     environment.filters |= {
+        **FILTERS,
         "axis": NAMES.__getitem__,
         "json": functools.partial(json.dumps, indent=1),
-        "listed": listed,
         "method": METHOD_NAMES.__getitem__,
-        "percent": percent,
-        "plural": plural,
-        "rate": rate,
     }
     return environment
 
