@@ -238,7 +238,7 @@ def _class_models(settings: FigureSettings, policy: Policy) -> _Drawn:
     )
     header, values = models.rows()
     probabilities = dict(zip(header[1:], map(float, values[1:]), strict=True))
-    return models.image(), caption, {"probabilities": probabilities}
+    return models.figure(), caption, {"probabilities": probabilities}
 
 
 def _attributions(settings: FigureSettings, policy: Policy) -> _Drawn:
