@@ -174,7 +174,7 @@ def _embeddings(settings: FigureSettings, *policies: Policy) -> _Drawn:
         layer, actions = feature_layer(network), scenes.actions
         assert layer is not None
         points, faithful = embed(
-            data.features[layer],
+            data.arrays[f"features/{layer}"],
             perplexity=min(_PERPLEXITY, (len(data) - 1) // 3),
             seed=legacy_seed(settings.seed),
             kernel=settings.kernel,
