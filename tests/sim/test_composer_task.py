@@ -11,7 +11,6 @@ from torchrl.envs.utils import check_env_specs
 from benchmarks import speed
 from drone_rl.config import ActionSettings, PillarsSettings, TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.sim import entities
 from drone_rl.sim.actions import Move
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.dynamics import Kinematic, Quadrotor
@@ -170,13 +169,6 @@ def test_distractors_without_an_appearance_are_out_of_sight():
     env.reset()
     env.step(0)
     assert env.physics.data.mocap_pos[-2:, 2].tolist() == [-HIDDEN_DEPTH] * 2
-
-
-def test_five_cameras_with_airsims_names(env):
-    model = env.task.drone.mjcf_model
-    names = [spec.name for spec in entities.DRONE_CAMERAS]
-    assert names == ["front_center", "front_right", "front_left", "bottom_center", "back_center"]
-    assert all(model.find("camera", name) is not None for name in names)
 
 
 class Lost(CollectCubes):
