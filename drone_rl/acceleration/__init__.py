@@ -4,7 +4,7 @@
 implementation, or the reasons why there is none.
 """
 
-from drone_rl.acceleration.activations import ActivationRecorder as ActivationRecorder
 from drone_rl.acceleration.fused_episodes import FusedEpisodes as FusedEpisodes
+from drone_rl.acceleration.fused_network import ActivationRecorder as ActivationRecorder
 from drone_rl.acceleration.fused_network import FusedNetwork as FusedNetwork
 from drone_rl.acceleration.packed_layers import Reasons as Reasons
