@@ -23,6 +23,7 @@ from drone_rl.policies.networks import require_finite
 from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
 from drone_rl.sim.rendering.raytrace.renderer import Raytracer
 from drone_rl.sim.rendering.raytrace.structs_kernel import Images
+from drone_rl.sim.tasks import State
 
 _MAX_STEPS = 64
 """Steps of one launch of the kernel; most episodes end within them."""
@@ -109,21 +110,20 @@ class FusedEpisodes:
         network = PackedNetwork(actor.network, first_pixel)
         return cls(env, actor, keeps_inputs, network, rules, num_threads)
 
-    def run(self, num_envs: int) -> TensorDictBase | None:
-        """Run an episode in each of the first environments, which have just started.
+    def run(self, started: State) -> TensorDictBase | None:
+        """Run episodes to their ends, from states of k environments at their starts.
 
         Returns:
-            A batch as `EpisodeCollector`'s, whose traj_ids are 0 to `num_envs` - 1; None if actions
-            are chosen in another way than by sampling or greedily.
+            A batch as `EpisodeCollector`'s, whose traj_ids are 0 to k - 1; None if actions are
+            chosen in another way than by sampling or greedily.
         """
         if self._actor.exploration not in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC):
             return None
         load_kernels(self._kernel.module).result()
-        state: Any = self._env.worlds.state
-        self._rules.begin(state)
+        self._rules.begin(started)
         self.activations.recording = None
         self._network.pack()
-        env_of_step, logged = self._run(num_envs)
+        env_of_step, logged = self._run(len(started))
         logged["action"] = logged["action"].long()
         outcome = self._env.outcome(logged.pop("end_reason").long(), logged.pop("reward"))
         batch = TensorDict({}, [len(env_of_step)])

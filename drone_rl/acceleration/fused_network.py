@@ -1,7 +1,7 @@
 """Fused forward and backward pass of a small network."""
 
 import math
-from typing import Any, Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self, TypeVar
 
 import torch
 import warp as wp
@@ -23,6 +23,7 @@ from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
 
 MAX_WEIGHTS = 2**20
 """Larger networks do not fit into a core's cache, and torch is as fast."""
+N = TypeVar("N", bound=nn.Module)
 Wrt = Literal["weights", "pixels"]
 """What gradients are computed with respect to."""
 
@@ -141,6 +142,21 @@ class FusedNetwork(ImageNetwork):
         flat = pixels.reshape(-1, math.prod(self.in_shape)).contiguous()
         parameters = self._engine.packed.parameters if self._wrt == "weights" else ()
         return _Logits.apply(self._engine, flat, *parameters).reshape(*pixels.shape[:-3], -1)
+
+
+def with_fused_passes(
+    network: N,
+    num_threads: int = 1,
+    *,
+    wrt: Wrt = "weights",
+    activations: ActivationRecorder | None = None,
+) -> N | FusedNetwork:
+    """Return the `FusedNetwork` of a network if the kernel supports it, else the network itself.
+
+    See `FusedNetwork.try_create` for the arguments.
+    """
+    fused = FusedNetwork.try_create(network, num_threads, wrt=wrt, activations=activations)
+    return network if isinstance(fused, Reasons) else fused
 
 
 class _Outputs(NamedTuple):
