@@ -9,7 +9,7 @@ from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
-from drone_rl.collectors.batched_collector import BatchedCollector, BatchOptions
+from drone_rl.collectors.collector import BatchedCollector, BatchOptions
 from drone_rl.envs.drone_env import Entries
 from drone_rl.envs.rollout import Step, steps
 from drone_rl.utils.errors import InputError
