@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from drone_rl.collectors.speedups import accelerated_gradients
+from drone_rl.acceleration import with_fused_passes
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.results import BestModels, ClassModel, ImageStatistics
 from drone_rl.explanations.settings import ClassModelSettings
@@ -106,7 +106,7 @@ def optimize(
     if settings.initial == "constant":
         start = torch.full_like(start, statistics.mean)
     action = torch.arange(num_actions).repeat_interleave(settings.starts)
-    quick = accelerated_gradients(network, wrt="pixels")
+    quick = with_fused_passes(network, wrt="pixels")
     ascent = _Ascent(quick, action, statistics, settings, generator)
     climb = ascent.pixels if settings.parameterisation == "pixel" else ascent.fourier
     reached = climb(start.repeat(num_actions, 1, 1, 1))
