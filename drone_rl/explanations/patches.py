@@ -53,9 +53,9 @@ class PatchGrid:
 
     def means(self, maps: Tensor) -> NDArray:
         """Return the mean heat of each patch. Shape: (T, h, w) to (T, count), float64."""
-        inside = maps[:, self.top :, self.left :].double()
+        inside = maps[:, None, self.top :, self.left :].double()
         heat = functional.avg_pool2d(inside, (self.height, self.width))
-        return heat[:, : self.rows, : self.columns].flatten(1).cpu().numpy()
+        return heat[:, 0, : self.rows, : self.columns].flatten(1).cpu().numpy()
 
 
 def make_grid(height: int, width: int, patches: int = PATCHES) -> PatchGrid:
