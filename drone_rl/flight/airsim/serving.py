@@ -5,11 +5,10 @@ import contextlib
 import logging
 import threading
 from pathlib import Path
-from typing import Self, Unpack
+from typing import Any, Self
 
 from drone_rl.config.commands import ServeSettings
 from drone_rl.config.configuration import from_arguments
-from drone_rl.config.options import ServeOptions
 from drone_rl.flight.airsim.server import AirsimServer
 from drone_rl.flight.airsim.settings_file import AirsimSettings, parse_settings, read_settings
 from drone_rl.flight.airsim.simulation import Simulation
@@ -87,7 +86,7 @@ def serve(
     settings: str | Path | AirsimSettings | None = None,
     *,
     recordings: str | Path | None = None,
-    **changes: Unpack[ServeOptions],
+    **changes: Any,
 ) -> RunningServer:
     """Start a server for AirSim's clients in a thread of this process.
 

@@ -17,11 +17,10 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol, Self, Unpack
+from typing import Any, Protocol, Self
 
 from drone_rl.config.commands import FlySettings
 from drone_rl.config.configuration import from_arguments
-from drone_rl.config.options import FlyOptions
 from drone_rl.flight.fly_page.flight import Flight
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.utils.errors import InputError, extra
@@ -321,7 +320,7 @@ def fly(
     settings: FlySettings | None = None,
     *,
     outputs: str | Path = "outputs",
-    **changes: Unpack[FlyOptions],
+    **changes: Any,
 ) -> FlyPage:
     """Start a page to fly from, in threads of this process.
 
