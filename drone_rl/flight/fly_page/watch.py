@@ -78,17 +78,12 @@ class Watched:
         simulation, stage = self._simulation, self._simulation.stage
         vehicle = simulation.find("")
         places = (to_world(stage.object_pose(name).position) for name in stage.movable)
-        x, y, _ = vehicle.settings.wind
         return {
             "time": round(simulation.time, 3),
             "episode": vehicle.epoch,
             "camera": self._camera,
             **pose_of(vehicle.body),
             "objects": [None if math.isnan(place[0]) else place for place in places],
-            "settings": {
-                "wind": round(math.hypot(x, y), 2),
-                "wind_from": math.degrees(math.atan2(y, 0.0 - x)) % 360.0,
-            },
             "texts": {
                 "flyer": f"A program flies {vehicle.name}",
                 "note": "Time is paused." if simulation.is_paused else "",
