@@ -5,13 +5,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, cast, overload
 
-from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
 from drone_rl.config import AppearanceSettings, DynamicsSettings, TaskSettings
 from drone_rl.config.commands import HeldOutSettings, JudgeSettings
 from drone_rl.config.configuration import Changes, as_changes, from_arguments
 from drone_rl.envs import DroneEnv
+from drone_rl.envs.rollout import Agent
 from drone_rl.policies.baselines import make_baseline
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
@@ -282,7 +282,7 @@ def _baseline(
     dynamics: DynamicsSettings,
     settings: HeldOutSettings,
     seed: RootSeed,
-) -> Iterator[tuple[EnvBase, TensorDictModuleBase]]:
+) -> Iterator[tuple[EnvBase, Agent]]:
     """Environments without images, and a baseline."""
     env = DroneEnv(
         settings.batch_size,
@@ -295,6 +295,6 @@ def _baseline(
     )
     generator = torch_generator(seed.value, Stream.ACTIONS, device=env.device)
     try:
-        yield env, make_baseline(name, task, generator, env.worlds.dynamics.actions)
+        yield env, make_baseline(name, env.worlds.task, env.worlds.dynamics.actions, generator)
     finally:
         env.close()
