@@ -15,7 +15,7 @@ from torchrl.envs import EnvBase
 
 from drone_rl.envs import base_env
 from drone_rl.envs.drone_env import Entries
-from drone_rl.envs.rollout import ActorAgent, Agent, Step
+from drone_rl.envs.rollout import Agent, Step, as_agent
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.threads import set_torch_threads
 
@@ -59,7 +59,7 @@ class BatchedCollector(BaseCollector):
         self.total_frames = total_frames
         self.frames = 0
         self.episodes = 0
-        self._agent: Agent = ActorAgent(actor) if isinstance(actor, TensorDictModuleBase) else actor
+        self._agent = as_agent(actor)
         self._info = tuple(name for name in info if name != "end_reason")
         if unknown := [name for name in self._info if name not in self.base_env.worlds.entries]:
             raise InputError(

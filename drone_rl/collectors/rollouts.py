@@ -82,6 +82,7 @@ class RolloutCollector(BatchedCollector):
         self._count = self._count + 1
         return {
             **step.act.entries,
+            "action": step.act.action,
             **self._outcome(step),
             **{("next", name): value for name, value in step.following.inputs.items()},
             ("next", "episode_reward"): self._reward,

@@ -12,7 +12,7 @@ from torchrl.collectors import BaseCollector
 from drone_rl.collectors import EpisodeCollector, RolloutCollector, ThreadedCollector
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.policies.baselines import oracle_policy
+from drone_rl.policies.baselines import OracleAgent
 from tests.collectors.test_episodes import SHORT
 
 TASK = TaskSettings(num_cubes=1, first_distance=3.0, step_limit=12, front_margin=3.0)
@@ -27,9 +27,7 @@ def make(request):
     """Return a factory of collectors of each kind, without rendering."""
 
     def build(actor=None, **kwargs):
-        return request.param(
-            DroneEnv(3, TASK, pixels=False), actor or oracle_policy(TASK), **kwargs
-        )
+        return request.param(DroneEnv(3, TASK, pixels=False), actor or OracleAgent(), **kwargs)
 
     return build
 
@@ -51,12 +49,12 @@ def test_stops_at_total_frames(make):
 
 
 def test_set_seed_seeds_the_environments(make):
-    collector = make()
-    first = collector.collect()["info", "cube_positions"]
+    collector = make(info=("cube_positions",))
+    first = collector.collect()["next", "info", "cube_positions"]
     assert collector.set_seed(0, static_seed=True) == 0
-    assert torch.equal(collector.collect()["info", "cube_positions"], first)
+    assert torch.equal(collector.collect()["next", "info", "cube_positions"], first)
     assert collector.set_seed(7) != 7  # the seed for the next collector
-    assert not torch.equal(collector.collect()["info", "cube_positions"][0], first[0])
+    assert not torch.equal(collector.collect()["next", "info", "cube_positions"][0], first[0])
 
 
 def test_update_weights_accepts_actor_state_dict_or_tensordict(make):
