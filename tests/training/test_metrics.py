@@ -89,13 +89,3 @@ def test_lengths_use_the_step_count():
     assert batch_metrics(batch) == {"train/reward": 1.5, "train/length": 4.5}
     batch["next", "done"][:] = False
     assert all(value != value for value in batch_metrics(batch).values())  # NaN
-
-
-def test_end_reason_is_read_at_the_last_frame():
-    batch = make_batch([[0, 1], [1, 1, 0], [0]])
-    reasons = torch.tensor([4, 1, 4, 4, 2, 3])[:, None]
-    batch["next", "info"] = TensorDict({"end_reason": reasons}, [6])
-    metrics = batch_metrics(batch, CubesEnd)
-    assert [metrics[f"end/{end.name.lower()}"] for end in CubesEnd if end] == pytest.approx(
-        [1 / 3] * 3 + [0, 0]
-    )
