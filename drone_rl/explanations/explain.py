@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 from torchrl.envs import EnvBase
 
@@ -15,7 +15,7 @@ from drone_rl.explanations import attribution, behavior, class_models, embedding
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.results import Explanation
-from drone_rl.explanations.settings import ExplainOptions, ExplainSettings
+from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
@@ -93,7 +93,7 @@ def explain(
     progress: Progress | None = None,
     more_sections: Mapping[str, Section] | None = None,
     find_claim: FindClaim | None = None,
-    **changes: Unpack[ExplainOptions],
+    **changes: Any,
 ) -> Explanations:
     """Explain what policies respond to and whether they can be trusted.
 

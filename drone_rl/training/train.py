@@ -10,7 +10,7 @@ import logging
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, Self, Unpack
+from typing import Any, NamedTuple, Self
 
 import torch
 from torchrl.envs import EnvBase
@@ -18,7 +18,6 @@ from torchrl.envs import EnvBase
 from drone_rl.acceleration import ActivationRecorder, with_fused_passes
 from drone_rl.collectors import EpisodeCollector, ThreadedCollector
 from drone_rl.config.learning import Episodes, Ray, Reinforce
-from drone_rl.config.options import TrainOptions
 from drone_rl.config.registry import implements, modules_of
 from drone_rl.config.training import TrainSettings
 from drone_rl.objectives import ReinforceLoss
@@ -52,7 +51,7 @@ def train(
     callbacks: Sequence[Callback] = (),
     progress: Progress | None = None,
     judge: Judge | None = None,
-    **changes: Unpack[TrainOptions],
+    **changes: Any,
 ) -> Training:
     """Train one policy, or resume its training.
 

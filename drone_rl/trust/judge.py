@@ -3,14 +3,13 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Unpack, cast, overload
+from typing import Any, cast, overload
 
 from torchrl.envs import EnvBase
 
 from drone_rl.config import AppearanceSettings, DynamicsSettings, TaskSettings
 from drone_rl.config.commands import HeldOutSettings, JudgeSettings
 from drone_rl.config.configuration import Changes, as_changes, from_arguments
-from drone_rl.config.options import JudgeOptions
 from drone_rl.envs import DroneEnv
 from drone_rl.envs.rollout import Agent
 from drone_rl.policies.baselines import make_baseline
@@ -95,43 +94,26 @@ class Judgements(TableResult, tuple[Judgement, ...]):
         return rows
 
 
-class JudgeArguments(JudgeOptions, total=False):
-    """Arguments of `judge`: those of `judge_one`."""
-
-    task: Mapping[str, Any] | None
-    dynamics: Mapping[str, Any] | None
-    appearance: AppearanceSettings | str | None
-    certificate: str | Path | None
-    shifts: str | Path | None
-    require_domain: str | Path | None
-    outputs: str | Path
-    progress: Progress | None
-    drawn_seed: RootSeed | None
-    find_claim: FindClaim | None
-
-
 Given = str | Path | BasePolicy | Logits
 """A policy, or something that `as_policy` converts to one."""
 
 
 @overload
-def judge(
-    policy: Given, settings: JudgeSettings | None = None, **options: Unpack[JudgeArguments]
-) -> Judgement: ...
+def judge(policy: Given, settings: JudgeSettings | None = None, **options: Any) -> Judgement: ...
 
 
 @overload
 def judge(
     policy: Sequence[Given],
     settings: JudgeSettings | None = None,
-    **options: Unpack[JudgeArguments],
+    **options: Any,
 ) -> Judgements: ...
 
 
 def judge(
     policy: Given | Sequence[Given],
     settings: JudgeSettings | None = None,
-    **options: Unpack[JudgeArguments],
+    **options: Any,
 ) -> Judgement | Judgements:
     """Judge one policy, or a list or tuple of policies in the same environments.
 
@@ -172,7 +154,7 @@ def judge_one(
     progress: Progress | None = None,
     drawn_seed: RootSeed | None = None,
     find_claim: FindClaim | None = None,
-    **changes: Unpack[JudgeOptions],
+    **changes: Any,
 ) -> Judgement:
     """Judge the kind of a policy, see `drone_rl.trust.rule`, and whether it is certain.
 

@@ -7,13 +7,12 @@ import time
 from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
 
 from drone_rl.config.commands import ProveSettings
 from drone_rl.config.configuration import as_changes, from_arguments
-from drone_rl.config.options import ProveOptions
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import fingerprint
 from drone_rl.utils.display import TableResult
@@ -100,7 +99,7 @@ def prove(
     task: Mapping[str, Any] | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
-    **changes: Unpack[ProveOptions],
+    **changes: Any,
 ) -> Proof:
     """Verify a greedy policy exhaustively over all cube placements.
 
