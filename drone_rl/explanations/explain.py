@@ -23,9 +23,10 @@ from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.vocabulary import shown_actions
 from drone_rl.trust.coverage import find_domain
 from drone_rl.trust.recorded import record_verdict
+from drone_rl.trust.results import Proof
 from drone_rl.trust.rounding_sensitivity import require_function
 from drone_rl.trust.shifts_results import SavedShifts
-from drone_rl.trust.verdict import CertificateClaim, FindClaim
+from drone_rl.trust.verdict import FindClaim
 from drone_rl.utils.display import Result, page
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path, new_run_folder, to_file_name
@@ -173,7 +174,7 @@ def explain_policy(
     provenance: dict[str, Any],
     progress: Callable[[str], None] = lambda _: None,
     sections: Mapping[str, Section] | None = None,
-    claim: CertificateClaim | None = None,
+    claim: Proof | None = None,
     measured: SavedShifts | None = None,
     unlike: Mapping[str, Any] | None = None,
     seed: RootSeed | None = None,
