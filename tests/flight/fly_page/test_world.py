@@ -1,7 +1,5 @@
 """The world of the page: rules, observations, wind, light, and changes of who flies."""
 
-from pathlib import Path
-
 import pytest
 import torch
 
@@ -9,9 +7,8 @@ import drone_rl
 from drone_rl.config.commands import CAMERAS
 from drone_rl.config.networks import Lstm, SmallCnn
 from drone_rl.config.transforms import Gray, Stack
-from drone_rl.policies.policy import Policy
-from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.dynamics import FlightState, Quadrotor
+from tests.untrained import untrained
 
 FORWARD = torch.tensor([0])
 
@@ -97,17 +94,6 @@ def test_the_observation_is_that_of_the_policys_environment(make_world):
     assert world.see() is seen  # computed once for each state
     world.step(FORWARD)
     assert world.see() is not seen
-
-
-def untrained(network, *transforms):
-    """Return a policy with random weights."""
-    policy = drone_rl.load_policy("good")
-    description = PolicyDescription(
-        policy.task, policy.description.camera, transforms or (Gray(),), network
-    )
-    weights = description.build_network(torch.Generator().manual_seed(0)).state_dict()
-    state = {**policy.state, "policy": weights, "description": description.as_dict()}
-    return Policy("untrained", Path("none"), description, state)
 
 
 def test_stacked_frames_are_those_of_the_last_actions(make_world):
