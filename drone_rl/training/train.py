@@ -10,14 +10,13 @@ import functools
 import logging
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 import torch
 
 from drone_rl.acceleration import with_fused_passes
 from drone_rl.collectors import EpisodeCollector, ThreadedCollector
 from drone_rl.config.learning import Episodes, Reinforce
-from drone_rl.config.options import TrainOptions
 from drone_rl.config.registry import implements, modules_of
 from drone_rl.config.training import TrainSettings
 from drone_rl.objectives import ReinforceLoss
@@ -50,7 +49,7 @@ def train(
     callbacks: Sequence[Callback] = (),
     progress: Progress | None = None,
     judge: Judge | None = None,
-    **changes: Unpack[TrainOptions],
+    **changes: Any,
 ) -> Training:
     """Train one policy, or resume its training.
 
