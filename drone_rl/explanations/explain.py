@@ -70,8 +70,8 @@ class Explanations(Result):
         lines = []
         for name, explanation in self.policies.items():
             if verdict := explanation.verdict:
-                certainty = "" if verdict.certain else " (not certain)"
-                lines.append(f"{name}: {verdict.kind}{certainty}. {verdict.sentence}")
+                findings = (finding.text for finding in explanation.findings)
+                lines += [f"{name}: {verdict.line}", *findings]
         seed_line = Seeded(**self.seed.as_dict()).seed_line()
         return "\n".join([*lines, f"report: {self.report}", seed_line])
 

@@ -87,8 +87,10 @@ def test_the_result_prints_verdict_and_report(tmp_path):
     of_x = explanation("good", certain=False)
     shown = Explanations(tmp_path, tmp_path / "report.html", {"x": of_x}, SEED)
     first, *rest = str(shown).splitlines()
-    assert first.startswith("x: good (not certain). This policy looks good")
-    assert rest == [f"report: {tmp_path / 'report.html'}", "environments: seed 6 (fresh)"]
+    assert first.startswith("x: good (not certain): This policy looks good")
+    assert rest[0].startswith("It fails in 40.0% of episodes, most with cubes on its left")
+    assert rest[1].startswith("With sampled actions it collects every cube in 40.0%")
+    assert rest[-2:] == [f"report: {tmp_path / 'report.html'}", "environments: seed 6 (fresh)"]
     assert shown._repr_html_().startswith(
         '<iframe sandbox="allow-scripts" srcdoc="&lt;h1&gt;trusted?'
     )
