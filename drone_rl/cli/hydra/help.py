@@ -16,6 +16,7 @@ from drone_rl.cli.hydra.mistakes import choices, composed, flattened, similar
 from drone_rl.config import TASKS
 from drone_rl.config.configuration import Changes
 from drone_rl.config.parts import Named, Parts
+from drone_rl.sweeps.manifest import path_argument
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import (
     Settings,
@@ -28,7 +29,7 @@ from drone_rl.utils.settings import (
 
 _WIDTH = 100
 _LONGEST_VALUE = 60
-_PLUGINS = "Modules that register parts of your own: networks, transforms and so on."
+_PLUGINS = "Modules and Python files with parts of your own: networks, transforms and so on."
 _RUN_FOLDER = "Folder of this command's files; a new one under outputs/ by default."
 
 
@@ -95,7 +96,7 @@ def next_steps(name: str, policy: str, folder: Path, plugins: Sequence[str] = ()
     quoted = {"policy": shlex.quote(policy), "folder": shlex.quote(str(folder))}
     files = re.compile(r"\{folder\}/([\w.]+)")
     if plugins:
-        override = f"plugins=[{','.join(dict.fromkeys(plugins))}]"
+        override = f"plugins=[{','.join(path_argument(Path(plugin)) for plugin in plugins)}]"
         quoted["policy"] += f" {shlex.quote(override)}"
     possible = [
         line
