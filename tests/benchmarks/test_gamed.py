@@ -52,5 +52,5 @@ def test_a_certificate_of_many_boxes_is_not_proved(monkeypatch, tmp_path):
     (tmp_path / "certificate.json").write_text(json.dumps(stated))
     how = {"certificate": tmp_path, "certificate_flights": 0, "episodes": 1, "progress": silent}
     assert drone_rl.judge(one_sided, seed=3, **how).status("proved") == 16
-    with pytest.raises(InputError, match="a proof finds 63.8% of them"):
+    with pytest.raises(InputError, match=r"a proof finds 63\.8% of them"):
         drone_rl.judge(one_sided, require="proved", **how)
