@@ -2,7 +2,7 @@
 
 import logging
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import drone_rl
 from drone_rl.cli.settings import CommandSettings, RolloutCommandSettings, finish
@@ -15,11 +15,12 @@ from drone_rl.config.commands import (
     JudgeSettings,
     ShiftSettings,
 )
+from drone_rl.config.values import NumEpisodes, Seed
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.models import Seeded
 from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.progress import log, silent
-from drone_rl.utils.schema import FileName, OneOf, Whole
+from drone_rl.utils.schema import FileName, Whole
 
 _log = logging.getLogger(__name__)
 
@@ -74,14 +75,14 @@ class PlayCommand(AppearanceCommandSettings, DeviceSettings):
     A recording, format=rerun, needs pip install -e '.[rerun]'.
     """
 
-    episodes: Annotated[int, Whole(1, unit="episodes")] = 3
+    episodes: NumEpisodes = 3
     """Episodes to record, each in files of its own."""
-    format: Annotated[str, OneOf(("video", "rerun"))] = "video"
+    format: Literal["video", "rerun"] = "video"
     """video: an MP4 and a GIF file; or rerun: a recording of cameras, poses, action probabilities
     and heat maps on one timeline, for the viewer of Rerun."""
     greedy: bool = True
     """Whether to take the most probable action instead of sampling."""
-    seed: Annotated[int, Whole(0)] = 0
+    seed: Seed = 0
     """Root of the environments' random streams."""
     viewer: bool = False
     """Whether to open dm_control's viewer, which needs a display, instead of recording."""
@@ -127,7 +128,7 @@ class VerdictCommand(AppearanceCommandSettings, JudgeSettings):
     certificate: str | None = None
     """Certificate file to quote; null takes the one next to the policy, if it matches:
     certificate.json in the folder of a run, NAME.certificate.json next to NAME.safetensors."""
-    require: Annotated[str, OneOf(("good", "proved"))] | None = None
+    require: Literal["good", "proved"] | None = None
     """good or null: exit status 0 only if the policy is certainly good, otherwise one per kind.
     proved: 0 only if a certificate proves success from every placement and rollouts re-checked it,
     otherwise 16."""
@@ -199,7 +200,7 @@ class ExportCommand(CommandSettings, HeldOutSettings):
     """Policy: a .pt or .safetensors file, folder of a run, latest, or name of a shipped policy."""
     name: Annotated[str, FileName()] = "policy"
     """Name of the files, without extension."""
-    format: Annotated[str, OneOf(("safetensors", "onnx"))] = "safetensors"
+    format: Literal["safetensors", "onnx"] = "safetensors"
     """safetensors with model card, or onnx: a model from RGB image to action probabilities."""
     command: Annotated[str, COMMAND] | None = None
     """Training command for the card or the ONNX metadata; null takes that of the policy's run."""

@@ -6,6 +6,7 @@ Each file of conf/dynamics describes one drone by these settings.
 import math
 from typing import Annotated
 
+from drone_rl.config.values import Fraction
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import OneOf, Real, Several, Whole
 from drone_rl.utils.settings import Settings
@@ -65,7 +66,7 @@ class DynamicsSettings(Settings):
     """Time constant of a rotor's first-order response, in seconds; 0 for none."""
     drag_area: Annotated[Triple, Several(Real(0.0, 100.0), 3, 3)] = (0.00538, 0.00611, 0.02989)
     """Half the drag coefficient times the area that faces each axis, in square metres."""
-    restitution: Annotated[float, Real(0.0, 1.0)] = 0.55
+    restitution: Fraction = 0.55
     """Coefficient of restitution of a contact."""
     friction: Annotated[float, Real(0.0, 10.0)] = 0.5
     """Coefficient of friction of a contact."""

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar
 
 from drone_rl.config.parts import Named
+from drone_rl.config.values import Steps
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Several, Whole
 
@@ -93,7 +94,7 @@ class TaskSettings(BaseTaskSettings):
     """z at which the drone starts and, in computer-vision mode, stays."""
     step_length: Length = 1.0
     """Length of one move."""
-    step_limit: Annotated[int, Whole(1, 100_000, "steps")] = 300
+    step_limit: Steps = 300
     """Steps after which an episode is truncated."""
     front_margin: Length = 11.0
     """How far behind the last cube the front boundary stands."""
@@ -205,7 +206,7 @@ class PillarsSettings(BaseTaskSettings):
     """z at which the drone starts and, in computer-vision mode, stays."""
     step_length: Length = 1.0
     """Length of one move."""
-    step_limit: Annotated[int, Whole(1, 100_000, "steps")] = 120
+    step_limit: Steps = 120
     """Steps after which an episode is truncated."""
 
     @property
