@@ -16,7 +16,6 @@ from drone_rl.config.commands import (
     ShiftSettings,
 )
 from drone_rl.config.values import NumEpisodes, Seed
-from drone_rl.utils.errors import InputError
 from drone_rl.utils.models import Seeded
 from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.progress import log, silent
@@ -90,10 +89,7 @@ class PlayCommand(AppearanceCommandSettings, DeviceSettings):
     def check(self) -> None:
         """Reject a format of files for the viewer, which writes none."""
         if self.viewer and self.format != "video":
-            raise InputError(
-                f"format={self.format} is for recordings, which viewer=true does not make; leave "
-                "one of them out"
-            )
+            self.refuse("format", "is for recordings, which viewer=true does not make; omit one")
 
     def ends_alone(self) -> bool:
         """See `CommandSettings`."""
@@ -214,13 +210,10 @@ class ExportCommand(CommandSettings, HeldOutSettings):
         """Reject extensions, and files for the model card with an ONNX model, which has none."""
         stem, _, extension = self.name.rpartition(".")
         if extension in ("safetensors", "onnx", "pt"):
-            raise InputError(f"name={self.name} has an extension; give name={stem or 'policy'}")
+            self.refuse("name", f"has an extension; give name={stem or 'policy'}")
         for name in ("certificate", "shifts"):
             if self.format == "onnx" and getattr(self, name) is not None:
-                raise InputError(
-                    f"{name} applies only to the model card, which format=onnx does not write; "
-                    "leave it out or give format=safetensors"
-                )
+                self.refuse(name, "is for a model card, which format=onnx does not write; omit it")
 
     def run(self, folder: Path) -> tuple[int, str]:
         """Export one policy; return the exit status and the file's path."""

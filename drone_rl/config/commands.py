@@ -7,7 +7,6 @@ from drone_rl.config.camera import DeviceSettings, RendererSettings
 from drone_rl.config.parts import Parts
 from drone_rl.config.transforms import MOST_TRANSFORMS, Transform
 from drone_rl.config.values import Fraction, NumEnvs, NumEpisodes, OpenFraction, Seed
-from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Listed, Maybe, OneOf, Real, Several, Whole
 from drone_rl.utils.settings import Settings
 
@@ -88,7 +87,7 @@ class BodiesSettings(JudgeSettings):
         """Refuse duplicate bodies."""
         super().check()
         if len({*self.bodies}) < len(self.bodies):
-            raise InputError(f"bodies={[*self.bodies]} has one twice; give each once")
+            self.refuse("bodies", "has one twice; give each once")
 
 
 MODES = ("constant", "drifting", "onset")
@@ -120,14 +119,11 @@ class ShiftSettings(DeviceSettings):
     def check(self) -> None:
         """Refuse strengths that don't rise, duplicate modes, and modes without the constant one."""
         if [*self.strengths] != sorted({*self.strengths}):
-            raise InputError(f"strengths={[*self.strengths]} don't rise; give each once, in order")
+            self.refuse("strengths", "don't rise; give each once, in order")
         if len({*self.modes}) < len(self.modes):
-            raise InputError(f"modes={[*self.modes]} has one twice; give each once")
+            self.refuse("modes", "has one twice; give each once")
         if MODES[0] not in self.modes:
-            raise InputError(
-                f"modes={[*self.modes]} leaves out constant, with which all others are compared; "
-                "add it"
-            )
+            self.refuse("modes", "leaves out constant, the reference of all others; add it")
 
 
 class GymnasiumSettings(DeviceSettings):
@@ -236,9 +232,7 @@ class PlacesSettings(RendererSettings):
     def check(self) -> None:
         """Refuse a window without places."""
         if self.nearest >= self.farthest:
-            raise InputError(
-                f"nearest={self.nearest} leaves no place before farthest={self.farthest}; give less"
-            )
+            self.refuse("nearest", f"leaves no place before farthest={self.farthest}; give less")
 
 
 class ProvableSettings(Settings):

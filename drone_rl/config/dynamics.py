@@ -117,17 +117,12 @@ class DynamicsSettings(Settings):
         """Refuse impossible inertia, and a thrust that is too small to control the drone."""
         largest, others = max(self.inertia), sum(self.inertia) - max(self.inertia)
         if largest > others * (1.0 + 1e-9):
-            raise InputError(
-                f"inertia={list(self.inertia)} is that of no body: {largest:g} is more than the "
-                f"other two together; give at most {_rounded(others, up=False):g}"
-            )
-        weight, most = self.mass * GRAVITY, 4.0 * self.rotor_thrust
-        if most < _HEADROOM * weight:
-            raise InputError(
-                f"rotor_thrust={self.rotor_thrust:g} is too small to control the drone: four "
-                f"rotors give {most:.4g} N, needed are {_HEADROOM} times its weight, "
-                f"{_HEADROOM * weight:.4g} N; give at least {_rounded(_HEADROOM * weight / 4):g}"
-            )
+            most = f"at most {0.999 * others:.4g}"
+            self.refuse("inertia", f"is of no body: one exceeds the other two; give {most}")
+        least = _HEADROOM * self.mass * GRAVITY / 4.0
+        if self.rotor_thrust < least:
+            remedy = f"give at least {1.001 * least:.4g}"
+            self.refuse("rotor_thrust", f"can't carry and control mass={self.mass}; {remedy}")
 
     def check_air(self) -> None:
         """Raise an `InputError` for wind or gusts without effect, in computer-vision mode."""
@@ -137,15 +132,6 @@ class DynamicsSettings(Settings):
                 f"dynamics.{name}={value} moves nothing in computer-vision mode; give "
                 'dynamics=quadrotor, too (in Python mode="simple_flight")'
             )
-
-
-def _rounded(bound: float, *, up: bool = True) -> float:
-    """Round a positive bound to three digits, to the side that satisfies it."""
-    digits = 2 - math.floor(math.log10(bound))
-    if digits > 300:  # 10 to that power may be no float
-        return bound
-    scale = 10.0**digits
-    return (math.ceil if up else math.floor)(bound * scale) / scale
 
 
 COMPUTER_VISION = DynamicsSettings()

@@ -131,10 +131,7 @@ class TrainSettings(Settings):
     def check(self) -> None:
         """Refuse parts that don't work together."""
         if self.renderer != "raytrace" and not self.appearance.is_minimal:
-            raise InputError(
-                f"renderer={self.renderer} supports only appearance=minimal; give "
-                "renderer=raytrace or appearance=minimal"
-            )
+            self.refuse("renderer", "supports only appearance=minimal; give renderer=raytrace")
         self.dynamics.check_air()
         check_appearance(self.appearance, self.camera, self.task.object_region, self.task.name)
         needs, objective = self.objective.needs, self.objective.name

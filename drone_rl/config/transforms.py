@@ -192,7 +192,7 @@ class DeadRows(Fault, target="dead_rows"):
     def check(self) -> None:
         """Reject duplicate rows."""
         if len(set(self.rows)) < len(self.rows):
-            raise InputError(f"rows={list(self.rows)} names a row twice; name each once")
+            self.refuse("rows", "names a row twice; name each once")
 
     def _transformed(self, frame: Frame) -> Frame:
         with prefixed_errors(f"transforms.{self.name}"):
@@ -202,14 +202,10 @@ class DeadRows(Fault, target="dead_rows"):
     def check_height(self, height: int) -> None:
         """Raise an `InputError` if an image of this height has too few rows."""
         if max(self.rows, default=0) >= height:
-            raise InputError(
-                f"rows={list(self.rows)}: the image has {height} rows; give at most {height - 1}"
-            )
-        if self.count + len(self.rows) > height:
-            raise InputError(
-                f"count={self.count}: the image has {height} rows, of which {len(self.rows)} are "
-                f"always dead; give at most {height - len(self.rows)}"
-            )
+            self.refuse("rows", f"are beyond the image's {height} rows; give at most {height - 1}")
+        most = height - len(self.rows)
+        if self.count > most:
+            self.refuse("count", f"exceeds the image's other rows; give at most {most}")
 
 
 class FrozenFrames(Fault, target="frozen_frames"):
