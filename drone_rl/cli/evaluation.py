@@ -220,12 +220,7 @@ class ExportCommand(CommandSettings, HeldOutSettings):
         from drone_rl.sweeps.rows import choice_in_sweep
         from drone_rl.trust.export import export
         from drone_rl.trust.onnx_export import export_onnx
-        from drone_rl.trust.recorded import (
-            describe,
-            read_verdicts,
-            record_verdict,
-            recorded_verdict,
-        )
+        from drone_rl.trust.recorded import record_verdict
         from drone_rl.utils.seeding import root_seed  # imports torch
         from drone_rl.verification.claim import find_claim
 
@@ -234,18 +229,15 @@ class ExportCommand(CommandSettings, HeldOutSettings):
         recorded_command, choice = choice_in_sweep(policy.path) or (None, None)
         command = self.command or recorded_command
         if self.format == "onnx":
-            seed = root_seed(self.seed)
             _log.info("compares the model with PyTorch in the policy's episodes")
+            seed = root_seed(self.seed)
             exported = export_onnx(policy, target, command=command, seed=seed.value)
             difference = f"{exported.difference:.1e} in {exported.frames:,} images"
-            _log.info("written: %s, which differs from PyTorch by at most %s", target, difference)
-            recorded = recorded_verdict(policy, read_verdicts(self.paths.outputs))
-            kind, success = ("not judged", "") if recorded is None else describe(recorded)
-            print(f"recorded verdict: {' '.join(filter(None, (kind, success)))}")
+            print(f"differs from PyTorch by at most {difference}")
             seeded = Seeded(**seed.as_dict())
         else:
             _log.info("judges the policy in %s episodes for the model card", f"{self.episodes:,}")
-            verdict = export(
+            seeded = export(
                 policy,
                 target,
                 self,
@@ -256,9 +248,7 @@ class ExportCommand(CommandSettings, HeldOutSettings):
                 outputs=self.paths.outputs,
                 find_claim=find_claim,
             )
-            _log.info("written: %s and %s", target, target.with_suffix(".md").name)
-            record_verdict(folder, policy, verdict)
-            print(verdict.line)
-            seeded = verdict
-        _log.info("%s", seeded.seed_line())
+            record_verdict(folder, policy, seeded)
+            print(seeded.line)
+        _log.info("written: %s; %s", target, seeded.seed_line())
         return 0, str(target)

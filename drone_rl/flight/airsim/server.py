@@ -16,6 +16,7 @@ from drone_rl.flight.airsim.calls import Calls, remark
 from drone_rl.flight.airsim.lockstep import SLICE, Lockstep
 from drone_rl.flight.airsim.methods import UnknownMethodError
 from drone_rl.flight.airsim.simulation import Simulation, Wait
+from drone_rl.flight.server_thread import listening
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import shown
 
@@ -239,15 +240,8 @@ class AirsimServer:
         Raises:
             InputError: The port is in use, or the address is not this machine's.
         """
-        try:
+        with listening(host, port):
             self._server = await asyncio.start_server(self._connect, host, port)
-        except OSError as error:
-            raise InputError(
-                f"port {port} of {host} can't be opened ({error.strerror}); give another port or "
-                "address, or stop the server that has it"
-            ) from error
-        except UnicodeError as error:  # of a host that can't be a name in a network
-            raise InputError(f"address={shown(host)} is no address; give 127.0.0.1") from error
 
     async def serve(self) -> None:
         """Advance simulated time until cancelled."""
