@@ -17,8 +17,8 @@ from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frame
 from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import ImageNetwork, make_actor
+from drone_rl.trust.results import Proof
 from drone_rl.trust.shifts_results import SavedShifts
-from drone_rl.trust.verdict import CertificateClaim
 from drone_rl.utils.limits import FILM_BYTES, FILM_STEPS
 from drone_rl.utils.seeding import RootSeed, Stream, torch_generator, with_seed
 
@@ -41,12 +41,17 @@ class Context:
         env: EnvBase,
         network: ImageNetwork,
         settings: ExplainSettings,
-        claim: CertificateClaim | None = None,
+        claim: Proof | None = None,
         measured: SavedShifts | None = None,
         unlike: Mapping[str, Any] | None = None,
         seed: RootSeed | None = None,
     ) -> None:
-        """See `explain`; raise InputError if a setting does not fit the policy."""
+        """Prepare the analysis of a policy; raise InputError if a setting does not fit it.
+
+        The environments are held out, have not been stepped, and have the policy's transforms; the
+        network is on the CPU. The verdict quotes `claim`, `measured` and `unlike`. The seed is the
+        settings' by default.
+        """
         self.env, self.network, self.claim = env, network, claim
         self.remembers = network.is_recurrent
         """Whether the policy remembers earlier frames in rollouts; of single frames, each counts as

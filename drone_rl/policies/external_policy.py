@@ -164,6 +164,10 @@ def policy_from(
 ) -> ExternalPolicy:
     """Return a third-party policy to judge, evaluate and explain.
 
+    A verdict on a callable presumes that it does not look at the program that judges it: Python
+    code can read the simulator's state and count its calls. What comes from strangers can be judged
+    as a policy file (`drone_rl.load_policy`), which holds weights and no code.
+
     A torch module is copied and set to evaluation mode; all explanations support it. Fewer
     explanations support other torch functions, and still fewer support other callables. The policy
     takes a few steps, in which its logits must not depend on the batch and, of a model of

@@ -20,15 +20,17 @@ from drone_rl.policies.zoo import fingerprint, parse
 from drone_rl.trust.baselines import BASELINES
 from drone_rl.trust.coverage import compare_with_required, find_domain, recheck_domain
 from drone_rl.trust.evaluate import held_out_environments
-from drone_rl.trust.results import Verdict
+from drone_rl.trust.findings import Finding
+from drone_rl.trust.results import Proof, Verdict
 from drone_rl.trust.rule import Rule
-from drone_rl.trust.shifts_results import Coverage, SavedShifts
-from drone_rl.trust.verdict import CertificateClaim, FindClaim, judge_policy
+from drone_rl.trust.shifts_results import Coverage, SavedShifts, find
+from drone_rl.trust.verdict import FindClaim, judge_policy
 from drone_rl.utils.display import Result, TableResult, paragraph
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import NOT_COVERED, PROOF_MISSING
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import Provenance, provenance
+from drone_rl.utils.schema import Maybe, OneOf
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator, with_seed
 from drone_rl.utils.text import rate
 
@@ -44,8 +46,8 @@ class Judgement(Result, Verdict, Provenance):
     """The given file or that next to the policy, even if the verdict does not quote it."""
     shifts: str | None = None
     """File of its robustness evaluation, if there is one."""
-    domain: str | None = None
-    """The operating domain as text, if it was measured."""
+    findings: tuple[Finding, ...] = ()
+    """What its success depends on, the largest effect first."""
     required_domain: Coverage | None = None
     """The required operating domain compared with its own, if one is required."""
 
@@ -58,8 +60,8 @@ class Judgement(Result, Verdict, Provenance):
         """Return the exit code of `drone-rl verdict`.
 
         Args:
-            require: "proved" for a re-checked proof of every placement, "good" or None for the
-                verdict's own code; a required domain has to be covered, too.
+            require: "proved" for a proof of every placement that was computed here (see `judge`),
+                "good" or None for the verdict's own code; a required domain has to be covered, too.
         """
         if require == "proved" and not self.is_proved:
             return PROOF_MISSING
@@ -72,9 +74,10 @@ class Judgement(Result, Verdict, Provenance):
         self.replace(**provenance()).write_json(path)
 
     def __str__(self) -> str:
-        """Return the verdict, the operating domain, what it does not cover, and the seed."""
-        required = "" if self.required_domain is None else str(self.required_domain)
-        return "\n".join(filter(None, (self.line, self.domain, required, self.seed_line())))
+        """Return the verdict, its findings, what a required domain lacks, and the seed."""
+        required = [] if self.required_domain is None else [str(self.required_domain)]
+        texts = [finding.text for finding in self.findings]
+        return "\n".join([self.line, *texts, *required, self.seed_line()])
 
     def _repr_html_(self) -> str:
         return "".join(map(paragraph, str(self).splitlines()))
@@ -154,6 +157,7 @@ def judge_one(
     progress: Progress | None = None,
     drawn_seed: RootSeed | None = None,
     find_claim: FindClaim | None = None,
+    require: str | None = None,
     **changes: Any,
 ) -> Judgement:
     """Judge the kind of a policy, see `drone_rl.trust.rule`, and whether it is certain.
@@ -175,6 +179,8 @@ def judge_one(
         drawn_seed: Seed of a larger analysis of which this is a part.
         find_claim: Finds and checks certificates; by default none is quoted. `drone_rl.judge`
             passes `drone_rl.verification.claim.find_claim`.
+        require: "proved" computes the proof again if a certificate states success from every
+            placement (minutes); without this no policy counts as proved, since files can be forged.
         changes: Settings to change, as in `judge("good", episodes=1000)`.
 
     Raises:
@@ -183,13 +189,14 @@ def judge_one(
     settings = from_arguments(JudgeSettings, settings, changes, judge_one)
     settings, seed = with_seed(settings, drawn_seed)
     progress = as_progress(progress)
+    require = Maybe(OneOf(("good", "proved"))).read(require, "require")
     changed = {"task": task, "dynamics": dynamics, "appearance": appearance}
     loaded = _loaded(policy, outputs, changed)
     progress("policy and baselines", 0, 1)
     name = str(policy) if loaded is None or isinstance(policy, str | Path) else loaded.name
     if isinstance(loaded, Policy) and policy == "latest":  # which changes with the next run
         name = str(loaded.path)
-    claim: CertificateClaim | None = None
+    claim: Proof | None = None
     measured: SavedShifts | None = None
     coverage: Coverage | None = None
     if loaded is None:
@@ -213,7 +220,15 @@ def judge_one(
         where = {"device": settings.device, "renderer": settings.renderer}
         flights = settings.certificate_flights
         if find_claim is not None:
-            claim = find_claim(loaded, certificate, flights=flights, seed=seed, **where)
+            claim = find_claim(
+                loaded,
+                certificate,
+                flights=flights,
+                prove_again=require == "proved",
+                seed=seed,
+                progress=progress,
+                **where,
+            )
         worlds = held_out_environments(loaded, settings, seed)
     with worlds as (env, actor):
         verdict = judge_policy(
@@ -233,9 +248,9 @@ def judge_one(
         **dict(verdict),
         policy=name,
         weights=identify(loaded),
-        certificate=None if claim is None else str(claim.path),
+        certificate=None if claim is None else claim.path,
         shifts=None if measured is None else measured.path,
-        domain=None if measured is None else measured.text(verdict, brief=True),
+        findings=find(verdict, measured),
         required_domain=coverage,
     )
 

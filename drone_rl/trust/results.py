@@ -5,13 +5,12 @@ from typing import Any
 import pydantic
 
 from drone_rl.sim.vocabulary import CUBES, TaskVocabulary
+from drone_rl.trust.findings import Finding
 from drone_rl.trust.rule import Quantity, VerdictKind
 from drone_rl.utils.intervals import Mean, Share
 from drone_rl.utils.models import Seeded, Stored
 from drone_rl.utils.text import render
 
-MAX_WRONG = 0.01
-"""Largest fraction of placements with a wrong statement in a proof, with 95% confidence."""
 FREQUENT = 0.02
 """Fraction of episodes above which the text mentions an end."""
 MAX_FRAGILE = 0.02
@@ -135,9 +134,14 @@ class Rounding(Stored):
         )
 
 
-class Proof(Stored):
-    """What a certificate of the policy states, or why a verdict does not quote it."""
+class Proof(Seeded):
+    """What a certificate of the policy states and how it was checked, or why it is refused.
 
+    The seed is that of the placements of the episodes that checked it.
+    """
+
+    path: str = ""
+    """The file."""
     refused: str | None = None
     """The reason; None if it is quoted."""
     every: bool = False
@@ -150,20 +154,17 @@ class Proof(Stored):
     finished: bool = True
     """Whether the proof was not stopped early."""
     checked: int = 0
-    """Rollouts that re-checked it."""
+    """Episodes that checked it, all of which ended as it states."""
     wrong_at_most: float | None = None
     """Upper bound on the fraction of placements with a wrong statement, with 95% confidence; None
-    without rollouts."""
-    seed: int | None = None
-    """Of the rollouts' placements."""
-    seed_is_fixed: bool = True
-    agreeing: int = 0
-    """The verdict's own episodes with a stated end."""
+    without episodes."""
+    computed: bool = False
+    """Whether the proof of success from every placement was computed again by this program."""
 
     @property
-    def is_enough(self) -> bool:
-        """Whether enough rollouts re-checked it."""
-        return self.wrong_at_most is not None and self.wrong_at_most <= MAX_WRONG
+    def status(self) -> str:
+        """How far the certificate is to be believed, as text."""
+        return render("drone_rl.trust", "certificate.j2", p=self)
 
 
 class Difference(Stored):
@@ -184,7 +185,7 @@ class Verdict(Seeded):
     rule: str = ""
     """The rule as text."""
     error_rate: float
-    """Largest probability of a certain and wrong verdict."""
+    """Largest fraction of cases in which the rule gives a certain and wrong verdict."""
     good_share: float
     """Fraction of the oracle's success rate that a good policy exceeds."""
     terms: TaskVocabulary = CUBES
@@ -219,14 +220,25 @@ class Verdict(Seeded):
         return render("drone_rl.trust", "verdict.j2", v=self)
 
     @property
+    def own_findings(self) -> list[Finding]:
+        """What the episodes of the verdict show."""
+        success, drawing = self.greedy.success.share, self.drawing
+        effects = {
+            "failures.j2": 0.0 if success is None else 1.0 - success,
+            "sampled.j2": abs(drawing.mean or 0.0) if drawing else 0.0,
+        }
+        texts = {name: render("drone_rl.trust", name, v=self) for name in effects}
+        return [Finding(text=texts[name], effect=effects[name]) for name in effects if texts[name]]
+
+    @property
     def quoted(self) -> Proof | None:
         """The certificate if it is not refused."""
         return None if self.proof is None or self.proof.refused else self.proof
 
     @property
     def is_proved(self) -> bool:
-        """Whether a re-checked certificate states success from every placement."""
-        return self.quoted is not None and self.quoted.every and self.quoted.is_enough
+        """Whether success from every placement was proved here, not only read from a file."""
+        return self.quoted is not None and self.quoted.computed
 
     @property
     def is_open_by_rounding(self) -> bool:

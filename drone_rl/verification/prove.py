@@ -45,6 +45,8 @@ class Proof(TableResult):
     """What is proved."""
     folder: Path | None = None
     """The folder of the certificate."""
+    is_computed: bool = True
+    """Whether it was computed, not only read from a file."""
 
     @property
     def success(self) -> float:
@@ -63,8 +65,8 @@ class Proof(TableResult):
 
     @property
     def is_proved(self) -> bool:
-        """Whether the policy succeeds from every placement."""
-        return self.certificate.is_proved
+        """Whether it was computed that the policy succeeds from every placement."""
+        return self.is_computed and self.certificate.is_full_success
 
     def losing(self) -> np.ndarray:
         """Return the boxes of certain failure. Shape: (N, num_cubes, 2), metres."""
@@ -88,7 +90,7 @@ class Proof(TableResult):
 
     def notes(self) -> list[str]:
         """Return the statement about all placements."""
-        return [render("drone_rl.verification", "proof.j2", proof=self.certificate)]
+        return [render("drone_rl.verification", "proof.j2", of=self, proof=self.certificate)]
 
 
 def prove(
@@ -191,4 +193,4 @@ def load_proof(path: str | Path) -> Proof:
         InputError: There is none, or it is damaged or too large.
     """
     path = certificate_file(path)
-    return Proof(read_certificate(path), path.parent)
+    return Proof(read_certificate(path), path.parent, is_computed=False)
