@@ -100,7 +100,7 @@ def _row(path: Path, name: str, verdicts: Sequence[tuple[float, Any]]) -> list[s
     if path.suffix == ".pt":
         origin = time.strftime("%Y-%m-%d %H:%M", time.localtime(path.stat().st_mtime))
     else:
-        origin = f"revision {str(policy.state['provenance']['git_revision'])[:7]}"
+        origin = f"revision {str(policy.state.provenance.git_revision)[:7]}"
     verdict = recorded_verdict(policy, verdicts)
     figures = ("not judged", "") if verdict is None else describe(verdict)
     return [name, policy.task.name, *figures, origin]

@@ -27,7 +27,7 @@ from drone_rl.config.parts import Part
 from drone_rl.config.transforms import Frame, Transform
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.plugins import described, errors_of, place_of
-from drone_rl.utils.schema import Flag, Kind, Real, Several, Text, Whole
+from drone_rl.utils.schema import Annotation, Flag, Real, Several, Text, Whole
 from drone_rl.utils.settings import Settings
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -62,7 +62,7 @@ _BASES: dict[type[Part], _Base] = {
 }
 _KEYS = {"in_keys", "out_keys"}
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,60}")
-_KINDS: dict[Any, Kind] = {
+_KINDS: dict[Any, Annotation] = {
     int: Whole(-(2**63), 2**63 - 1),
     float: Real(-math.inf),
     bool: Flag(),

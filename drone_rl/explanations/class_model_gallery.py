@@ -27,7 +27,7 @@ from drone_rl.explanations.settings import (
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
-from drone_rl.sim.vocabulary import ShownActions, shown_actions
+from drone_rl.sim.vocabulary import ShownActions
 from drone_rl.trust.plots import images
 from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
@@ -111,7 +111,7 @@ class ClassModels(TableResult):
         """Write `class_models.png`, `class_models.json`, and all images as `class_models.npz`."""
         self.image().save(folder / "class_models.png")
         written = {
-            "policy": self.policy.origin["policy"],
+            "policy": self.policy.source,
             **self.seed.as_dict(),
             "statistics": self.statistics.model_dump(),
             "settings": {
@@ -180,7 +180,7 @@ def class_models(
         subject,
         {t: visualise(network, statistics, one, seed=seed.value) for t, one in tried.items()},
         statistics,
-        shown_actions({"actions": network.actions.as_dict()}),
+        network.actions.shown,
         channels,
         seed,
     )

@@ -17,7 +17,7 @@ from drone_rl.policies.baselines import make_baseline
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy, Policy
-from drone_rl.policies.zoo import fingerprint, parse
+from drone_rl.policies.zoo import fingerprint
 from drone_rl.trust.baselines import BASELINES
 from drone_rl.trust.coverage import compare_with_required, find_domain, recheck_domain
 from drone_rl.trust.evaluate import held_out_environments
@@ -279,9 +279,9 @@ def identify(policy: BasePolicy | None) -> str | None:
     """Return the hash of a policy's weights, None if its conditions are not those of training."""
     if not isinstance(policy, Policy):
         return None
-    if policy.description.as_dict() != parse(policy.state["description"]).as_dict():
+    if policy.description != policy.state.description:
         return None
-    return fingerprint(policy.state["policy"])
+    return fingerprint(policy.state.weights)
 
 
 def _loaded(policy: Any, outputs: str | Path, changed: Mapping[str, Any]) -> BasePolicy | None:

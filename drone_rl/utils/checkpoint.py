@@ -17,7 +17,7 @@ from drone_rl.utils.limits import CHECKPOINT_BYTES
 from drone_rl.utils.schema import as_mapping, shown
 
 FORMAT = "drone_rl checkpoint"
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
 _ZIP = b"PK"
 """First bytes of a checkpoint, which is a ZIP archive."""
 _FORMATS = {

@@ -109,14 +109,16 @@ def input_error(error: pydantic.ValidationError, cls: Any = None, where: str = "
     if details["type"] == "extra_forbidden":
         names = _names(cls, details["loc"][:-1])
         meant = did_you_mean(details["loc"][-1], names)
-        return InputError(f"{place} is unknown; valid names: {', '.join(names) or '-'}{meant}")
+        valid = f"valid names: {', '.join(names)}{meant}" if names else "leave it out"
+        return InputError(f"{place} is unknown; {valid}")
     if details["type"] == "json_invalid":
         return InputError(f"{place} is damaged: {details['msg']}; write the file again")
     if details["type"] == "missing":
         return InputError(f"{place} is missing; give it")
     if details["type"] == "value_error":  # raised by a validator of this project
         text = str(details.get("ctx", {}).get("error", details["msg"]))
-        return InputError(f"{place}.{text}" if place else text)
+        is_inside = re.match(r"[\w.\[\]]+(=| is (unknown|missing))", text)
+        return InputError(f"{place}{'.' if is_inside else ': '}{text}" if place else text)
     reason = details["msg"][:1].lower() + details["msg"][1:]
     if rest := details["msg"].partition(" should ")[2]:
         plain = rest.replace(" after validation", "").replace("a valid tuple", "a list")

@@ -73,7 +73,7 @@ class Check(Result):
     def lines(self) -> list[str]:
         """Return the result, the statements, and each finding in one line."""
         stated, seed = self.certificate, Seeded(**self.seed.as_dict())
-        task = self.policy.state["description"]["task"]
+        task = self.policy.state.description.task.parameters.values()
         changed = [f"{n}={v}" for n, v in self.policy.task.values().items() if task.get(n) != v]
         return [
             f"{'accepted' if self.accepted else 'refused'}: {self.path}, of policy "
@@ -130,7 +130,7 @@ def check(
             f"{', '.join(policy_names())}; give policy= its file"
         )
     policy = load_policy(stated.policy.name if policy is None else policy, outputs=outputs)
-    weights = policy.state["policy"]
+    weights = policy.state.weights
     required = policy.in_task(**as_changes(task, "task")).task if task else None
     check_same_policy(stated, policy.description, weights, required)
     policy = dataclasses.replace(policy, description=stated.policy.description)

@@ -148,7 +148,7 @@ def _ends_as_stated(stated: Certificate, greedy: CompleteEpisodes) -> list[bool]
 def _read_and_check(
     policy: Policy, path: Path, flights: int, seed: RootSeed, device: str, renderer: str
 ) -> Claim:
-    weights = policy.state["policy"]
+    weights = policy.state.weights
     certificate = read_validated(path, policy.description, weights)
     if not flights:
         return Claim(path, certificate)

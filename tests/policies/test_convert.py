@@ -50,8 +50,8 @@ def test_a_converted_policy_acts_alike(tmp_path):
     assert converted == tmp_path / "mine_converted.safetensors"
     one, other = drone_rl.load_policy(converted), drone_rl.load_policy("good")
     assert one.description == other.description
-    assert one.state["progress"] == other.state["progress"]
-    weights, expected = one.state["policy"], other.state["policy"]
+    assert one.state.progress == other.state.progress
+    weights, expected = one.state.weights, other.state.weights
     assert all(torch.equal(weights[name], expected[name]) for name in expected)
     images = torch.randint(0, 256, (50, 25, 64, 3), dtype=torch.uint8)
     assert torch.equal(one.act_batch(images), other.act_batch(images))
@@ -71,7 +71,7 @@ def test_checkpoints_are_converted_with_their_settings(tmp_path):
     state = load_checkpoint(convert_policy(path, tmp_path / "new.pt"))
     assert settings_of(state["config"]) == settings_of(present["config"])
     assert {"optimizer", "policy"} <= state.keys()
-    assert drone_rl.load_policy(tmp_path / "new.pt").state["progress"]["updates"] > 0
+    assert drone_rl.load_policy(tmp_path / "new.pt").state.progress.updates > 0
 
 
 def test_files_are_not_replaced_and_present_ones_not_converted(tmp_path):

@@ -13,18 +13,18 @@ from drone_rl.config.commands import CAMERAS
 from drone_rl.flight.airsim.messages import to_world
 from drone_rl.flight.airsim.serving import RunningServer
 from drone_rl.flight.airsim.simulation import Simulation
-from drone_rl.flight.fly_page.flight import JPEG_QUALITY, packed, pose_of
+from drone_rl.flight.fly_page.flight import JPEG_QUALITY, message_model, packed, pose_of
 from drone_rl.flight.fly_page.server import FlyPage
 from drone_rl.flight.fly_page.world import HEIGHT, WIDTH
 from drone_rl.flight.image_types import ImageType, encode
 from drone_rl.sim.entities import CHASE
 from drone_rl.trust.video import render_chase
-from drone_rl.utils.schema import OneOf, Record, as_mapping
+from drone_rl.utils.schema import OneOf
 
 _FRAMES_PER_SECOND = 20
 _PATIENCE_S = 5.0
 """Seconds to wait for a frame."""
-_MESSAGE = Record({"type": OneOf(("camera",)), "camera": OneOf(CAMERAS)})
+_MESSAGE = message_model(type=OneOf(("camera",)), camera=OneOf(CAMERAS))
 
 
 class Watched:
@@ -40,7 +40,8 @@ class Watched:
 
     def handle(self, message: Any) -> None:
         """Do what a browser's message says; an `InputError` if it is not a choice of a camera."""
-        self._camera = _MESSAGE.read(as_mapping(message, "message"), "message")["camera"]
+        chosen: Any = _MESSAGE.read(message, "message")
+        self._camera = chosen.camera
 
     def advance(self, seconds: float) -> None:
         """Do nothing: the program that is watched lets time pass."""

@@ -10,7 +10,7 @@ from drone_rl.config.commands import CAMERAS
 from drone_rl.config.networks import SmallCnn
 from drone_rl.config.transforms import Gray, Stack
 from drone_rl.policies.policy import Policy
-from drone_rl.policies.zoo import PolicyDescription
+from drone_rl.policies.zoo import describe
 from drone_rl.sim.dynamics import FlightState, Quadrotor
 
 FORWARD = torch.tensor([0])
@@ -102,11 +102,10 @@ def test_the_observation_is_that_of_the_policys_environment(make_world):
 def test_stacked_frames_are_those_of_the_last_actions(make_world):
     transforms = (Gray(), Stack(N=2))
     policy = drone_rl.load_policy("good")
-    description = PolicyDescription(
-        policy.task, policy.description.camera, transforms, SmallCnn(channels=(2,), hidden=(4,))
-    )
+    network = SmallCnn(channels=(2,), hidden=(4,))
+    description = describe(drone_rl.TrainSettings(transforms=transforms, network=network))
     weights = description.build_network(torch.Generator().manual_seed(0)).state_dict()
-    state = {**policy.state, "policy": weights, "description": description.as_dict()}
+    state = policy.state.replace(weights=weights, description=description)
     world = make_world(Policy("stacked", Path("none"), description, state))
     first = world.see().observation
     assert torch.equal(first[0, 0], first[0, 1])
@@ -159,7 +158,7 @@ def test_wind_blows_from_its_direction(make_world):
     assert world.flight_dynamics.wind == pytest.approx((-5.0, 0.0, 0.0))
     world.set_wind(4.0, 90.0)  # from the right, to the left
     assert world.worlds.dynamics.settings.wind == pytest.approx((0.0, 4.0, 0.0), abs=1e-12)
-    assert world.conditions[2].wind == pytest.approx((0.0, 4.0, 0.0), abs=1e-12)
+    assert world.conditions["dynamics"].wind == pytest.approx((0.0, 4.0, 0.0), abs=1e-12)
 
 
 def test_the_policys_own_wind_is_the_first_one(make_world):
@@ -199,4 +198,4 @@ def test_an_action_lasts_as_long_as_its_move_takes(make_world, policy, speed, se
 @pytest.mark.parametrize("wind", [(0.0, 5.0, 0.0), (3.0, 1.0, 0.5), (0.1, -0.7, 0.0)])
 def test_demonstrations_note_the_exact_wind_of_the_policy(make_world, wind):
     policy = drone_rl.load_policy("flight").in_dynamics(wind=wind)
-    assert make_world(policy).conditions[2] == policy.dynamics
+    assert make_world(policy).conditions["dynamics"] == policy.dynamics
