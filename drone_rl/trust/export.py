@@ -5,7 +5,7 @@ import hashlib
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 from safetensors import SafetensorError
 
@@ -27,9 +27,6 @@ from drone_rl.utils.provenance import Provenance
 from drone_rl.utils.schema import Instance
 from drone_rl.utils.seeding import with_seed
 from drone_rl.utils.text import render
-
-_COMMAND = Instance(Annotated[str | None, COMMAND])
-
 
 def export(
     policy: Policy,
@@ -63,7 +60,8 @@ def export(
         InputError: The policy can't be written, or a given file is unusable.
     """
     settings, seed = with_seed(settings)
-    command = _COMMAND.read(command or recorded_command(policy.path, policy.state), "command")
+    command = command or recorded_command(policy.path, policy.state)
+    command = None if command is None else COMMAND.read(command, "command")
     chosen = Instance(Choice | None).read(chosen, "chosen") or policy.state.chosen
     claim = None if find_claim is None else find_claim(policy, certificate, seed=seed)
     claim = None if claim is None or claim.refused else claim  # cards quote no refused certificate

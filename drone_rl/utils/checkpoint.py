@@ -65,8 +65,8 @@ def load_checkpoint(path: str | Path) -> dict[str, Any]:
     if type(version) is not int or version != FORMAT_VERSION:
         raise InputError(
             f"checkpoint {path} has format version {shown(version)}, this program reads "
-            f"{FORMAT_VERSION}; start the training again, or convert the policy of an older "
-            f"version with drone-rl convert {path}"
+            f"{FORMAT_VERSION}; convert one of an older version, or the folder of its run, with "
+            f"drone-rl convert {path}"
         )
     return state
 

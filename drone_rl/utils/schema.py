@@ -286,12 +286,12 @@ class Listed(Annotation):
 PlainData = TypeAliasType(
     "PlainData",
     None
-    | bool
-    | int
-    | Annotated[float, AllowInfNan(False)]
+    | Annotated[bool, Strict()]
+    | Annotated[int, Strict()]
+    | Annotated[float, Strict(), AllowInfNan(False)]
     | Annotated[str, Text()]
-    | list["PlainData"]
-    | dict[Annotated[str, Text()], "PlainData"],
+    | Annotated[list["PlainData"], Strict()]
+    | Annotated[dict[Annotated[str, Text()], "PlainData"], Strict()],
 )
 """Values of plain data."""
 

@@ -47,7 +47,7 @@ def test_moves_are_the_default_display():
     ("change", "message"),
     [
         ({"names": ["a", "a", "b"]}, "give 3 different names, and the index of each once"),
-        ({"order": [0, 1, 1]}, "order=.*0, 1, 1.* or a name is invalid"),
+        ({"order": [0, 1, 1]}, r"order=\[0,1,1\] or a name is invalid"),
         ({"arrows": [[0, 1]]}, "an arrow and a color"),
         ({"colors": [[0, 0, 256]] * 3}, "must be"),
         ({"colors": "red"}, "must"),

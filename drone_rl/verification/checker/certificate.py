@@ -217,7 +217,10 @@ def read_certificate(path: Path) -> Certificate:
     Raises:
         InputError: The file is missing, too large, damaged or not a certificate.
     """
-    return Certificate.read_json(path, CERTIFICATE_BYTES)
+    try:
+        return Certificate.read_json(path, CERTIFICATE_BYTES)
+    except InputError as error:
+        raise InputError(f"certificate {path} can't be used: {error}") from None
 
 
 def check_same_policy(

@@ -15,7 +15,7 @@ from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.trust.onnx_export import agreement
 from drone_rl.utils.errors import InputError
 from tests.continuous import SETTINGS
-from tests.policies.zoo.test_description import with_image
+from tests.policies.zoo.test_description import DEFAULT, with_image
 
 GRAY, STANDARD = {"name": "gray"}, {"name": "standardize", "mean": 0.53, "std": 0.21}
 BLIND = [{"name": "episode_reward"}, {"name": "step_count"}]
