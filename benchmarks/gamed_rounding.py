@@ -115,7 +115,9 @@ def _grown(name: str, value: Tensor, channels: int, hidden: int) -> Tensor:
     return grown
 
 
-def write(folder: Path, name: str, described: PolicyDescription, weights: dict[str, Tensor]) -> Path:
+def write(
+    folder: Path, name: str, described: PolicyDescription, weights: dict[str, Tensor]
+) -> Path:
     """Write a policy file as `drone-rl export` does, with the metadata of "good"."""
     path = folder / f"{name}.safetensors"
     policy = load_policy("good").state.replace(description=described, weights=weights)

@@ -117,7 +117,9 @@ def shipped(absent: Tensor) -> dict[str, ImageNetwork]:
     for name in policy_names():
         exported = read_policy(policy_path(name))
         description = exported.description
-        is_of_moves = description.actions.settings.kind == "moves"  # else outputs are not three logits
+        is_of_moves = (
+            description.actions.settings.kind == "moves"
+        )  # else outputs are not three logits
         if description.input.shape != tuple(absent.shape) or not is_of_moves:
             continue
         parameters = exported.weights

@@ -193,9 +193,7 @@ class ActionSettings(Settings):
             return (
                 Axis(name="forward", unit="m/s", low=0.0, high=self.forward_speed),
                 Axis(name="left", unit="m/s", low=-self.sideways_speed, high=self.sideways_speed),
-                Axis(
-                    name="turn left", unit="degrees/s", low=-self.yaw_rate, high=self.yaw_rate
-                ),
+                Axis(name="turn left", unit="degrees/s", low=-self.yaw_rate, high=self.yaw_rate),
             )
         moves = (
             Axis(name="forward", unit="moves", low=0.0, high=1.0, step=1.0),

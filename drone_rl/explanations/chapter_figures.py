@@ -5,7 +5,7 @@ import io
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, TypedDict, Unpack
+from typing import Annotated, Any
 
 import numpy as np
 import torch
@@ -90,22 +90,12 @@ class ChapterFigure(Result):
         return picture(self.image)
 
 
-class FigureOptions(TypedDict, total=False):
-    """Fields of `FigureSettings` except the number of the figure."""
-
-    frames: int | None
-    episodes: int | None
-    tint: str
-    kernel: str
-    seed: int
-
-
 def reproduce(
     figure: int,
     settings: FigureSettings | None = None,
     *,
     outputs: str | Path = "outputs",
-    **changes: Unpack[FigureOptions],
+    **changes: Any,
 ) -> ChapterFigure:
     """Make a figure of the chapter again, with shipped policies and the chapter's set-up.
 
@@ -174,7 +164,7 @@ def _embeddings(settings: FigureSettings, *policies: Policy) -> _Drawn:
         layer, actions = feature_layer(network), scenes.actions
         assert layer is not None
         points, faithful = embed(
-            data.features[layer],
+            data.arrays[f"features/{layer}"],
             perplexity=min(_PERPLEXITY, (len(data) - 1) // 3),
             seed=legacy_seed(settings.seed),
             kernel=settings.kernel,
@@ -238,7 +228,7 @@ def _class_models(settings: FigureSettings, policy: Policy) -> _Drawn:
     )
     header, values = models.rows()
     probabilities = dict(zip(header[1:], map(float, values[1:]), strict=True))
-    return models.image(), caption, {"probabilities": probabilities}
+    return models.figure(), caption, {"probabilities": probabilities}
 
 
 def _attributions(settings: FigureSettings, policy: Policy) -> _Drawn:

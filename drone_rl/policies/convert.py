@@ -72,7 +72,9 @@ def convert(path: Path, output: Path | None = None) -> list[Path]:
         InputError: A file is unusable, none has a former layout, or the output exists.
     """
     if not path.exists() or path == Path():
-        raise InputError(f"file={path} does not exist; give a file, or the folder of a run or sweep")
+        raise InputError(
+            f"file={path} does not exist; give a file, or the folder of a run or sweep"
+        )
     if not path.is_dir():
         output = output or path.with_stem(f"{path.stem}_converted")
         if output.exists() or output.suffix != path.suffix:

@@ -22,8 +22,15 @@ from drone_rl.config import (
     TaskSettings,
 )
 from drone_rl.config.configuration import Changes, as_changes
-from drone_rl.config.options import DynamicsOptions, TaskOptions
-from drone_rl.config.transforms import Frame, Gray, Rgb, Standardize, Transform, as_transforms
+from drone_rl.config.transforms import (
+    Fault,
+    Frame,
+    Gray,
+    Rgb,
+    Standardize,
+    Transform,
+    as_transforms,
+)
 from drone_rl.policies import ExternalNetwork
 from drone_rl.policies.environment import EnvOptions, make_env
 from drone_rl.policies.external_network import Function, Logits
@@ -70,7 +77,7 @@ class ExternalPolicy(BasePolicy):
         """Its name."""
         return self.name
 
-    def in_task(self, **changes: Unpack[TaskOptions]) -> "ExternalPolicy":
+    def in_task(self, **changes: Any) -> "ExternalPolicy":
         """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`."""
         if not isinstance(self.task, Settings):
             if changes:
@@ -83,7 +90,7 @@ class ExternalPolicy(BasePolicy):
         with prefixed_errors("task"):
             return dataclasses.replace(self, task=self.task.replace(**changed))
 
-    def in_dynamics(self, **changes: Unpack[DynamicsOptions]) -> "ExternalPolicy":
+    def in_dynamics(self, **changes: Any) -> "ExternalPolicy":
         """Return the same policy with other dynamics, such as `in_dynamics(wind=(5, 0, 0))`."""
         changed = Changes(DynamicsSettings).read(changes, "dynamics")
         with prefixed_errors("dynamics"):
@@ -157,6 +164,10 @@ def policy_from(
 ) -> ExternalPolicy:
     """Return a third-party policy to judge, evaluate and explain.
 
+    A verdict on a callable presumes that it does not look at the program that judges it: Python
+    code can read the simulator's state and count its calls. What comes from strangers can be judged
+    as a policy file (`drone_rl.load_policy`), which holds weights and no code.
+
     A torch module is copied and set to evaluation mode; all explanations support it. Fewer
     explanations support other torch functions, and still fewer support other callables. The policy
     takes a few steps, in which its logits must not depend on the batch and, of a model of
@@ -215,12 +226,14 @@ def policy_from(
         appearance=trained_in,
     )
     policy.make_network()  # raises errors early
+    clean = tuple(step for step in policy.transforms if not isinstance(step, Fault))
+    checked = dataclasses.replace(policy, transforms=clean)
     if observations is None:
-        check_on_episodes(policy)
+        check_on_episodes(checked)
     else:
         model: Any = network
         predict = functools.partial(model.predict, transforms=before_wrappers)
-        check_on_episodes(policy, predict, observations.names)
+        check_on_episodes(checked, predict, observations.names)
     return policy
 
 

@@ -22,7 +22,6 @@ from drone_rl.config import (
     DynamicsSettings,
 )
 from drone_rl.config.configuration import Changes
-from drone_rl.config.options import DynamicsOptions, TaskOptions
 from drone_rl.envs import Pipeline
 from drone_rl.policies import ImageNetwork, RecurrentNetwork, make_actor
 from drone_rl.policies.environment import EnvOptions
@@ -104,7 +103,7 @@ class BasePolicy(abc.ABC):
         """Its file, or else its name."""
 
     @abc.abstractmethod
-    def in_task(self, **changes: Unpack[TaskOptions]) -> Self:
+    def in_task(self, **changes: Any) -> Self:
         """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`.
 
         Raises:
@@ -112,7 +111,7 @@ class BasePolicy(abc.ABC):
         """
 
     @abc.abstractmethod
-    def in_dynamics(self, **changes: Unpack[DynamicsOptions]) -> Self:
+    def in_dynamics(self, **changes: Any) -> Self:
         """Return the same policy with other dynamics: `policy.in_dynamics(mode="simple_flight")`.
 
         Raises:
@@ -232,14 +231,14 @@ class Policy(BasePolicy):
         """Its file."""
         return str(self.path)
 
-    def in_task(self, **changes: Unpack[TaskOptions]) -> "Policy":
+    def in_task(self, **changes: Any) -> "Policy":
         """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`."""
         changed = Changes(type(self.task)).read(changes, "task")
         with prefixed_errors("task"):
             task = TaskDescription.of(self.task.replace(**changed))
         return self._described(task=task)
 
-    def in_dynamics(self, **changes: Unpack[DynamicsOptions]) -> "Policy":
+    def in_dynamics(self, **changes: Any) -> "Policy":
         """Return the same policy with other dynamics, as in `in_dynamics(mode="simple_flight")`."""
         changed = Changes(DynamicsSettings).read(changes, "dynamics")
         with prefixed_errors("dynamics"):

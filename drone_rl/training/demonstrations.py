@@ -10,7 +10,7 @@ import io
 import re
 from contextlib import closing
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, Unpack
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import torch
@@ -24,11 +24,10 @@ from drone_rl.config import (
     DynamicsSettings,
 )
 from drone_rl.config.configuration import from_arguments
-from drone_rl.config.options import UnseededTrainOptions
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.envs.rollout import ActorAgent, Recording
-from drone_rl.policies.baselines import oracle_policy
+from drone_rl.envs.rollout import Recording
+from drone_rl.policies.baselines import make_baseline
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import make_dynamics
 from drone_rl.sim.tasks import as_task
@@ -262,7 +261,7 @@ def record_oracle(
     *,
     flights: int = 30,
     seed: int = 0,
-    **changes: Unpack[UnseededTrainOptions],
+    **changes: Any,
 ) -> list[Path]:
     """Record flights of the task's oracle, which acts by the true state.
 
@@ -297,7 +296,8 @@ def record_oracle(
         appearance=settings.appearance,
     )
     with closing(env):
-        oracle = ActorAgent(oracle_policy(settings.task, env.worlds.dynamics.actions))
+        worlds, actions = env.worlds, env.worlds.dynamics.actions
+        oracle = make_baseline("oracle", worlds.task, actions, torch.Generator())
         batch: Any = rollout(Recording(oracle), env, flights, keep=None).steps
     conditions, paths = FlightConditions.of(settings), []
     for number in range(flights):

@@ -156,9 +156,7 @@ class RunFolder:
                 self.open(self.path, resume=False)
             yield
 
-    def prepare(
-        self, settings: TrainSettings, state: Checkpoint | None
-    ) -> list[Demonstration]:
+    def prepare(self, settings: TrainSettings, state: Checkpoint | None) -> list[Demonstration]:
         """Check the checkpoint's settings; return the demonstrations that a new run clones, if any.
 
         Raises:

@@ -8,16 +8,15 @@ script of the same components. A critic and Ray workers are in `variants.py`, fi
 import contextlib
 import functools
 import logging
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 import torch
 
+from drone_rl.acceleration import with_fused_passes
 from drone_rl.collectors import EpisodeCollector, ThreadedCollector
-from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.config.learning import Episodes, Reinforce
-from drone_rl.config.options import TrainOptions
 from drone_rl.config.registry import implements, modules_of
 from drone_rl.config.training import TrainSettings
 from drone_rl.objectives import ReinforceLoss
@@ -50,7 +49,7 @@ def train(
     callbacks: Sequence[Callback] = (),
     progress: Progress | None = None,
     judge: Judge | None = None,
-    **changes: Unpack[TrainOptions],
+    **changes: Any,
 ) -> Training:
     """Train one policy, or resume its training.
 
@@ -205,7 +204,7 @@ def reinforce_learner(
     """Make the learner without a critic; its loss has the last two settings."""
     limits, network, actor = settings.trainer, parts.network, parts.collector.actor
     may_fuse = limits.compiled and not network.is_recurrent
-    fused = functools.partial(accelerated_gradients, activations=parts.activations)
+    fused = functools.partial(with_fused_passes, activations=parts.activations)
     learning = fused(network, limits.num_threads) if may_fuse else network
     is_fused = learning is not network  # its kernel has `limits.num_threads` threads
     if is_fused:

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 import yaml
 from matplotlib.figure import Figure
@@ -13,15 +13,13 @@ from matplotlib.figure import Figure
 from drone_rl.config import MINIMAL, BaseTaskSettings
 from drone_rl.config.commands import ShiftSettings
 from drone_rl.config.configuration import from_arguments
-from drone_rl.config.options import ShiftOptions
 from drone_rl.envs import base_env, worlds_of
-from drone_rl.policies.baselines import check_baselines
+from drone_rl.policies.baselines import OracleAgent, check_baselines
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.zoo import fingerprint
 from drone_rl.sim.tasks import as_task
-from drone_rl.trust.agents import OracleAgent
 from drone_rl.trust.axes import Axis, check_axes, find_axes
 from drone_rl.trust.charts import chart, strips
 from drone_rl.trust.domain import Prober
@@ -73,7 +71,7 @@ def shifts(
     dynamics: Mapping[str, Any] | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
-    **changes: Unpack[ShiftOptions],
+    **changes: Any,
 ) -> Shifts:
     """Evaluate a policy under perturbations, one axis at a time and all combined.
 
@@ -149,7 +147,7 @@ def _domain(
     """Search the operating domain."""
     ranges: dict[str, Range] = {}
     with closing(PairedEvaluator(subject, settings.domain_episodes, seed.value)) as evaluator:
-        oracle = evaluator.run(Condition(), agent=OracleAgent(only_visible=False)).episodes
+        oracle = evaluator.run(Condition(), agent=OracleAgent()).episodes
         prober = Prober(evaluator, oracle, settings.good_share, settings.possible_share)
         for axis in axes:
             report(f"range of {axis.name}")

@@ -120,7 +120,7 @@ def input_error(error: pydantic.ValidationError, cls: Any = None, where: str = "
         return InputError(f"{place} is missing; give it")
     if details["type"] == "value_error":  # raised by a validator of this project
         text = str(details.get("ctx", {}).get("error", details["msg"]))
-        is_inside = re.match(r"[\w.\[\]]+(=| is (unknown|missing))", text)
+        is_inside = re.match(r"(?!it\b)[\w.\[\]]+(=| (is|are|must) )", text)
         return InputError(f"{place}{'.' if is_inside else ': '}{text}" if place else text)
     reason = details["msg"][:1].lower() + details["msg"][1:]
     if rest := details["msg"].partition(" should ")[2]:

@@ -5,7 +5,7 @@ import io
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Self, Unpack
+from typing import Any, Self
 
 import numpy as np
 import torch
@@ -17,8 +17,8 @@ from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ProvableSettings, ProveSettings
 from drone_rl.config.configuration import check_same_config, from_arguments
-from drone_rl.config.options import TrainOptions
 from drone_rl.config.training import TrainSettings
+from drone_rl.envs.rollout import Agent
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import Checkpoint, describe, read_checkpoint
 from drone_rl.sim.tasks import FailureReplayTask
@@ -186,7 +186,7 @@ def train_until_proved(
     resume: bool = False,
     callbacks: Sequence[Callback] = (),
     progress: Progress | None = None,
-    **changes: Unpack[TrainOptions],
+    **changes: Any,
 ) -> Training:
     """Train as usual, then in rounds, until the policy succeeds from every placement.
 
@@ -242,7 +242,7 @@ def train_until_proved(
 
 
 def find_failures(
-    env: EnvBase, actor: TensorDictModuleBase, num_episodes: int, enough: int
+    env: EnvBase, actor: TensorDictModuleBase | Agent, num_episodes: int, enough: int
 ) -> tuple[NDArray[np.float64], int]:
     """Search for cube placements from which a greedy policy misses a cube.
 

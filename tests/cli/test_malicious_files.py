@@ -145,9 +145,7 @@ POLICIES = {
     "not_finite.safetensors": lambda: with_part(
         task={"name": "collect_cubes", "parameters": {"spacing": float("nan")}}
     ),
-    "huge_image.safetensors": lambda: with_part(
-        inputs={"pixels": {**IMAGE, "size": [4096, 4096]}}
-    ),
+    "huge_image.safetensors": lambda: with_part(inputs={"pixels": {**IMAGE, "size": [4096, 4096]}}),
     "huge_network.safetensors": lambda: with_part(
         network={**DESCRIPTION["network"], "hidden": [10**9]}
     ),

@@ -92,7 +92,8 @@ def shifts_of(policy, *, axes=("blur", "dead_rows"), weights=None):
     return Robustness(
         policy=policy.name,
         network=NetworkIdentity(
-            weights=weights or fingerprint(policy.state.weights), description=policy.description.model_dump(mode="json")
+            weights=weights or fingerprint(policy.state.weights),
+            description=policy.description.model_dump(mode="json"),
         ),
         settings=ShiftSettings(seed=0),
         seed=0,

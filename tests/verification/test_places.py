@@ -8,9 +8,9 @@ import pytest
 import torch
 
 import drone_rl
+from drone_rl.config.networks import Mlp
 from drone_rl.explanations.report.places import rows
 from drone_rl.explanations.scenes import Scenes, place_target
-from drone_rl.config.networks import Mlp
 from drone_rl.policies.policy import Policy
 from drone_rl.policies.zoo.description import IMAGE
 from drone_rl.sim.vocabulary import SHOWN_MOVES
@@ -28,7 +28,12 @@ def small():
     description = good.description.replace(inputs={IMAGE: image}, network=Mlp(hidden=(8,)))
     network = description.build_network(torch.Generator().manual_seed(3))
     weights = {name: 20 * value for name, value in network.state_dict().items()}
-    return Policy("small", good.path, description, good.state.replace(description=description, weights=weights))
+    return Policy(
+        "small",
+        good.path,
+        description,
+        good.state.replace(description=description, weights=weights),
+    )
 
 
 @pytest.fixture(scope="module")

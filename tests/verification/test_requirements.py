@@ -1,7 +1,5 @@
 """Which policies verification refuses."""
 
-import dataclasses
-
 import pytest
 import torch
 

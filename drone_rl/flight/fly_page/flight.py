@@ -27,28 +27,31 @@ from drone_rl.sim.tasks import CollectCubes
 from drone_rl.trust.plots.images import heated, shown_picture
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.models import Model
-from drone_rl.utils.schema import Annotation, Flag, OneOf, Real, Several, as_mapping
-
-def message_model(**fields: Annotation) -> type[Model]:
-    """Return the model of a message with fields of these kinds."""
-    of: Any = {name: Annotated[Any, kind] for name, kind in fields.items()}
-    return pydantic.create_model("Message", __base__=Model, **of)
-
+from drone_rl.utils.schema import OneOf, Real, Several, as_mapping
 
 LIMITS = {"speed": (0.5, 10.0), "wind": (0.0, 12.0), "wind_from": (0.0, 360.0), "light": (0.2, 2.0)}
 """Lowest and highest values of the sliders: m/s, m/s, degrees, factor."""
-_MESSAGES: Mapping[str, type[Model]] = {
-    "hold": message_model(controls=Several(OneOf(CONTROLS), 0, len(CONTROLS))),
-    "sticks": message_model(values=Several(Real(-1.0, 1.0), 4, 4)),
-    "pilot": message_model(pilot=OneOf(("person", "policy"))),
-    "mode": message_model(mode=OneOf(FLY_MODES)),
-    "camera": message_model(camera=OneOf(CAMERAS)),
-    "set": message_model(name=OneOf(tuple(LIMITS)), value=Real(-1e6, 1e6)),
-    "record": message_model(on=Flag()),
-    "saliency": message_model(on=Flag()),
-    "reset": message_model(),
-    "take_off": message_model(),
-    "land": message_model(),
+Camera = Annotated[str, OneOf(CAMERAS)]
+
+
+def message(**fields: Any) -> type[Model]:
+    """Return the kind of a browser's messages with these fields, each of a type."""
+    kinds: dict[str, Any] = {name: (kind, ...) for name, kind in fields.items()}
+    return pydantic.create_model("Message", __base__=Model, **kinds)
+
+
+_MESSAGES = {
+    "hold": message(controls=tuple[Annotated[str, OneOf(CONTROLS)], ...]),
+    "sticks": message(values=Annotated[Axes, Several(Real(-1.0, 1.0), 4, 4)]),
+    "pilot": message(pilot=Annotated[str, OneOf(("person", "policy"))]),
+    "mode": message(mode=Annotated[str, OneOf(FLY_MODES)]),
+    "camera": message(camera=Camera),
+    "set": message(name=Annotated[str, OneOf(tuple(LIMITS))], value=float),
+    "record": message(on=bool),
+    "saliency": message(on=bool),
+    "reset": message(),
+    "take_off": message(),
+    "land": message(),
 }
 """Fields of each type of message, which are the arguments of a method of `Flight`."""
 _PAUSE = 2.0

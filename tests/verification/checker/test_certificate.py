@@ -29,7 +29,7 @@ def test_read_certificate(one_sided, write):
     assert won.share == pytest.approx(0.6375, abs=2e-6)
     assert won.boxes.shape == (1, 1, 2) and won.boxes.dtype == np.float64
     assert (found.policy.name, found.task.lateral_bound) == ("right_and_forward", 6.0)
-    assert (found.success, found.lost) == (won.share, lost.share) and not found.is_proved
+    assert (found.success, found.lost) == (won.share, lost.share) and not found.is_full_success
     assert [len(boxes) for boxes in found.groups] == [1, 1, 1]
     assert str(won) == "all_cubes, cubes collected: 1"
     assert str(lost) == "front_boundary, cubes collected: none"
@@ -63,9 +63,21 @@ def test_check_same_policy_and_task(parsed, policy):
         (["format"], "drone_rl policy", "format='drone_rl policy'"),
         (["format_version"], 2, "format_version=2"),
         (["certain"], True, "certain is unknown"),
-        (["policy", "description", "task", "parameters", "vertical_bound"], 1.0, r"vertical_bound=1\.0"),
-        (["policy", "description", "task", "parameters", "lateral_bound"], 0.0, r"lateral_bound=0\.0"),
-        (["policy", "description", "task", "parameters", "num_cubes"], 9, "num_cubes=9 is out of range"),
+        (
+            ["policy", "description", "task", "parameters", "vertical_bound"],
+            1.0,
+            r"vertical_bound=1\.0",
+        ),
+        (
+            ["policy", "description", "task", "parameters", "lateral_bound"],
+            0.0,
+            r"lateral_bound=0\.0",
+        ),
+        (
+            ["policy", "description", "task", "parameters", "num_cubes"],
+            9,
+            "num_cubes=9 is out of range",
+        ),
         (["outcomes", 0, "end"], "running", "end='running'"),
         (["outcomes", 0, "collected"], [True, True], "must have 1 cubes"),
         (["outcomes", 0, "share"], 1.5, r"outcomes\[0\]\.share=1\.5"),
