@@ -51,7 +51,7 @@ _FOLDERS = 100
 """Most levels of folders to search."""
 
 
-class _Present(InputError):
+class _PresentError(InputError):
     """A file that has the present layout."""
 
 
@@ -102,7 +102,7 @@ def _convert_in_place(path: Path) -> bool:
     new = path.with_stem(f"{path.stem}_converted")
     try:
         _convert_file(path, new)
-    except _Present:
+    except _PresentError:
         return False
     path.rename(path.with_stem(f"{path.stem}_former"))
     new.rename(path)
@@ -110,7 +110,7 @@ def _convert_in_place(path: Path) -> bool:
 
 
 def _convert_file(path: Path, output: Path) -> None:
-    """Write the converted file; raise `_Present` if there is nothing to do."""
+    """Write the converted file; raise `_PresentError` if there is nothing to do."""
     try:
         if path.suffix == ".safetensors":
             _write(output, _converted_export(read_exported_bytes(path)))
@@ -119,8 +119,8 @@ def _convert_file(path: Path, output: Path) -> None:
         else:
             state = _converted_state(checkpoint.read_any_version(path))
             checkpoint.save_checkpoint(output, state)
-    except _Present:
-        raise _Present(f"{path} has the present layout; use it as it is") from None
+    except _PresentError:
+        raise _PresentError(f"{path} has the present layout; use it as it is") from None
     except InputError as error:
         raise InputError(
             f"{path} can't be converted ({error}); files from before version 0.1 must be made again"
@@ -130,7 +130,7 @@ def _convert_file(path: Path, output: Path) -> None:
 def _converted_export(content: bytes) -> bytes:
     metadata = metadata_of(content)
     if "policy" in metadata:
-        raise _Present
+        raise _PresentError
     description, about = (
         as_mapping(parse_json(str(metadata.get(name)), f"its {name}"), f"its {name}")
         for name in ("description", "about")
@@ -160,7 +160,7 @@ def _converted_result(path: Path) -> bytes:
 def _converted_description(former: Mapping[str, Any]) -> PolicyDescription:
     """Return the description that was laid out as version 2."""
     if former.get("format_version") == FORMAT_VERSION:
-        raise _Present
+        raise _PresentError
     try:
         task, camera = dict(former["task"]), former["camera"]
         image = {
@@ -183,7 +183,7 @@ def _converted_description(former: Mapping[str, Any]) -> PolicyDescription:
 
 def _converted_state(state: Mapping[str, Any]) -> dict[str, Any]:
     if state.get("format_version") == checkpoint.FORMAT_VERSION:
-        raise _Present
+        raise _PresentError
     present = {
         _with_present_names(name): value for name, value in state.items() if name != "policy"
     }

@@ -285,13 +285,13 @@ class Listed(Annotation):
 
 PlainData = TypeAliasType(
     "PlainData",
-    None
-    | Annotated[bool, Strict()]
+    Annotated[bool, Strict()]
     | Annotated[int, Strict()]
     | Annotated[float, Strict(), AllowInfNan(False)]
     | Annotated[str, Text()]
     | Annotated[list["PlainData"], Strict()]
-    | Annotated[dict[Annotated[str, Text()], "PlainData"], Strict()],
+    | Annotated[dict[Annotated[str, Text()], "PlainData"], Strict()]
+    | None,
 )
 """Values of plain data."""
 

@@ -6,6 +6,7 @@ from drone_rl.trust.results import Verdict
 from drone_rl.trust.shifts_results import Robustness, SavedShifts, inward
 from tests.evidence import PROOF, SAVED_SHIFTS, SHIFTS, VERDICT, changed
 
+NOISY = {"inputs": {"pixels": {"transforms": [{"name": "noise"}]}}}
 KINDS = {"verdict": (Verdict, VERDICT), "shifts": (Robustness, SHIFTS)}
 TRIVIAL = {"baselines.forward.success.share": 0.95}
 WIND = {"unlike": {"wind": {"own": [0.0, 0.0, 0.0], "flown": [5.0, 0.0, 0.0]}}}
@@ -79,7 +80,7 @@ CLAIMS = [
      {"together.refused": "too dark"}),
     ("shifts", "Tested within each range", {}, {"domain": None}),
     ("shifts", "Without the camera faults of its training (noise)",
-     {"network": {"weights": "", "description": {"transforms": [{"name": "noise"}]}}},
+     {"network": {"weights": "", "description": NOISY}},
      {"network": None}),
     ("shifts", "Fixed seed 0", {}, {"seed_is_fixed": False}),
 ]  # fmt: skip

@@ -205,7 +205,7 @@ def test_image_shape_is_predicted(camera, transforms, shape):
         ("task.parameters.spacing", float("nan"), "spacing=nan"),
         ("task.parameters.wind", 1.0, "task.parameters.wind is unknown"),
         ("task.parameters.vertical_bound", 3.0, "fly into the floor"),
-        ("task.scene", {"name": "house.xml"}, "task: scene is not supported"),
+        ("task.scene", {"name": "house.xml"}, "task.scene is not supported"),
         ("task.code", {"name": "a", "hash": "0" * 63}, "task.code.hash"),
         ("inputs", {}, "inputs=.* at least 1 item"),
         ("inputs", {"depth": DEFAULT["inputs"]["pixels"]}, "inputs.depth='depth'"),

@@ -94,7 +94,7 @@ def _steps(policy, total, high):
 
 def of_every_place(policy, end="all_cubes", undecided=False):
     """State the same end everywhere, or only where the first cube's y is below 3."""
-    task = policy.description.task
+    task = policy.task
     bound, cubes = task.lateral_bound, task.num_cubes
     stated, left = [[[-bound, bound]] * cubes], []
     if undecided:

@@ -57,6 +57,9 @@ def test_check_same_policy_and_task(parsed, policy):
         check_same_policy(parsed, policy.description, weights, policy.task)
 
 
+PARAMETERS = ["policy", "description", "task", "parameters"]
+
+
 @pytest.mark.parametrize(
     ("keys", "value", "message"),
     [
@@ -64,17 +67,17 @@ def test_check_same_policy_and_task(parsed, policy):
         (["format_version"], 2, "format_version=2"),
         (["certain"], True, "certain is unknown"),
         (
-            ["policy", "description", "task", "parameters", "vertical_bound"],
+            [*PARAMETERS, "vertical_bound"],
             1.0,
             r"vertical_bound=1\.0",
         ),
         (
-            ["policy", "description", "task", "parameters", "lateral_bound"],
+            [*PARAMETERS, "lateral_bound"],
             0.0,
             r"lateral_bound=0\.0",
         ),
         (
-            ["policy", "description", "task", "parameters", "num_cubes"],
+            [*PARAMETERS, "num_cubes"],
             9,
             "num_cubes=9 is out of range",
         ),
