@@ -19,7 +19,7 @@ MUTABLE = {
     "trust.domain:End",
     "policies.zoo.files:TrainingProgress",
     "sweeps.figures:Layout",
-    "training.learners:ActorCriticLearner",
+    "training.actor_critic:ActorCriticLearner",
     "training.learners:GradientLearner",
     "training.learners:ReinforceLearner",
     "training.trainer:Trainer",

@@ -84,6 +84,9 @@ def register_transform(
 ) -> Callable[[F], F]:
     """Decorate a class derived from TorchRL's `Transform` to register it as an image transform.
 
+    Its `_apply_transform` is called with each batch of images. What remembers something of each
+    environment derives from `drone_rl.envs.CameraFault`.
+
     `output` maps the input's `Frame` and the settings to the output's `Frame`. By default, the
     shape is that of two transformed images. See `register_network` for errors.
     """
@@ -104,7 +107,7 @@ def register_learner(name: str) -> Callable[[F], F]:
     """Decorate a class or function to register it as a learner, selected by `objective=NAME`.
 
     It is called as `factory(settings, components, **own)`, with the settings of the training run
-    and the result of `drone_rl.training.components.make_collector`, and returns a
+    and the result of `drone_rl.training.train.make_collector`, and returns a
     `drone_rl.training.learners.Learner`. See `register_network` for errors.
     """
     return _decorator(Objective, name, 2)
@@ -115,7 +118,7 @@ def register_collector(name: str) -> Callable[[F], F]:
 
     It is called as `factory(settings, replay, **own)`, with the settings of the training run and
     the task that replays failures (None for the task of the settings), and returns a
-    `drone_rl.training.components.Components`. See `register_network` for errors.
+    `drone_rl.training.train.Components`. See `register_network` for errors.
     """
     return _decorator(Collector, name, 2)
 

@@ -102,6 +102,11 @@ class BasePolicy(abc.ABC):
     def source(self) -> str:
         """Its file, or else its name."""
 
+    @property
+    def trained(self) -> dict[str, Any] | None:
+        """How it was trained, as plain values; None if unknown."""
+        return None
+
     @abc.abstractmethod
     def in_task(self, **changes: Any) -> Self:
         """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`.
@@ -230,6 +235,12 @@ class Policy(BasePolicy):
     def source(self) -> str:
         """Its file."""
         return str(self.path)
+
+    @property
+    def trained(self) -> dict[str, Any]:
+        """Description, progress, provenance and command of the training."""
+        names = {"description", "progress", "provenance", "command"}
+        return self.state.model_dump(mode="json", include=names)
 
     def in_task(self, **changes: Any) -> "Policy":
         """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`."""

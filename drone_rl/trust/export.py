@@ -16,8 +16,9 @@ from drone_rl.policies.zoo.files import Choice, SavedPolicy
 from drone_rl.sim.tasks import as_task
 from drone_rl.trust.coverage import find_domain
 from drone_rl.trust.evaluate import held_out_environments
+from drone_rl.trust.findings import untested
 from drone_rl.trust.results import Verdict
-from drone_rl.trust.shifts_results import SavedShifts, not_evaluated
+from drone_rl.trust.shifts_results import SavedShifts, find
 from drone_rl.trust.verdict import FindClaim, judge_policy
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_bytes, write_all_atomically
@@ -163,10 +164,11 @@ class Card:
         measured, verdict = self.shifts, self.verdict
         if measured is not None and measured.why_not(verdict):
             measured = None
+        findings = find(verdict, measured)
         columns = {
             "most probable actions": verdict.greedy,
             "sampled actions": verdict.sampled,
-            f"best blind baseline ({verdict.best_baseline})": (
+            f"best random or constant actions ({verdict.best_baseline})": (
                 verdict.baselines[verdict.best_baseline]
             ),
             "oracle": verdict.baselines["oracle"],
@@ -177,6 +179,7 @@ class Card:
             c=self,
             measured=measured,
             columns={name: of for name, of in columns.items() if of is not None},
-            unknown=not_evaluated(measured and measured.shifts),
+            findings=findings,
+            unknown=untested(findings),
             scenes=as_task(self.policy.description.task.parameters).vocabulary.tested,
         )

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from drone_rl.verification.checker.certificate import Region
 from drone_rl.verification.checker.sampling import (
     ANYWHERE,
     BORDER,
@@ -119,16 +118,3 @@ def test_outcomes_share_the_placements_inside_boxes(parsed):
     inside = placements.outcome[placements.why == INSIDE]
     assert len(placements.points) == 160
     assert np.bincount(inside).tolist() == [10, 10]  # an eighth of all
-
-
-def test_sample_placements_by_seed(parsed):
-    one, other, third = (sample_placements(parsed, 50, np.random.default_rng(s)) for s in (1, 1, 2))
-    assert (one.points == other.points).all() and not (one.points == third.points).all()
-
-
-def test_sample_placements_without_outcomes(parsed):
-    whole = np.array([[[-6.0, 6.0]]])
-    nothing = parsed.replace(outcomes=(), undecided=Region(share=1.0, boxes=whole))
-    placements = sample_placements(nothing, 10, np.random.default_rng(0))
-    assert placements.outcome.tolist() == [0] * 10
-    assert set(placements.why) == {ANYWHERE}
