@@ -406,11 +406,6 @@ class SavedShifts(Stored):
             )
         return None
 
-    def text(self, verdict: Verdict) -> str:
-        """Return what a report quotes, or why it quotes nothing."""
-        why = self.why_not(verdict)
-        return render("drone_rl.trust", "quoted_shifts.j2", of=self, why=why)
-
     def finding(self, verdict: Verdict) -> Finding:
         """Return the evaluation in a line, or why a verdict does not quote it."""
         why, shifts, effect = self.why_not(verdict), self.shifts, 0.0

@@ -88,7 +88,7 @@ def test_verdict_with_a_required_domain(good, tmp_path):
     done = drone_rl.judge(good, episodes=5, sampled=False, **told)
     (line,) = (one.text for one in done.findings if one.section == "shifts")
     assert done.required_domain.is_covered and "ood with blur of up to 1 pixels" in line
-    assert f"See {path}, dated 1970-01-01 0" in line
+    assert f"see {path}, dated 1970-01-01 0" in line
     assert "re-checked by 30 episodes at each of 3 strengths" in str(done)
     assert len(str(done).splitlines()) == 5  # verdict, two findings, required domain, seed
     assert line in str(done) and line in done._repr_html_()

@@ -96,7 +96,7 @@ def test_card_quotes_and_copies_a_robustness_evaluation(tmp_path, name, is_good)
         assert beside.read_bytes() == made.read_bytes()
         again = drone_rl.load_policy(tmp_path / "mine.safetensors")
         assert find_domain(again).path == str(beside)
-        assert "See mine.shifts.json, dated" in card  # and no path of this machine
+        assert "see mine.shifts.json, dated" in card  # and no path of this machine
 
 
 def test_command_of_a_resumed_run(checkpoint):
