@@ -230,7 +230,7 @@ def test_signal_ends_a_loop_of_trainings(tmp_path, number, statuses):
     assert [path.name for path in tmp_path.iterdir()] == ["run0"]
     state = drone_rl.load_policy(tmp_path / "run0").state.progress
     rows = (tmp_path / "run0" / "metrics.csv").read_text().splitlines()
-    assert state["updates"] == len(rows) - 1
+    assert state.updates == len(rows) - 1
 
 
 def test_a_finished_run_is_not_replaced(tmp_path):
