@@ -52,10 +52,12 @@ def plot_curves(folders: Iterable[str | Path], x: str = "frames") -> Figure:
     groups: dict[str, list[RunCurves]] = {}
     for folder in folders:
         files = sorted(Path(folder).glob("**/metrics.csv"))
-        if not files:
-            raise InputError(f"{folder} contains no metrics.csv; give folders of runs or sweeps")
-        for file in files:
-            run = read_run(file.parent, x)
+        runs = [run for file in files if len((run := read_run(file.parent, x)).x)]
+        if not runs:
+            raise InputError(
+                f"{folder} contains no metrics.csv of updates; give folders of runs or sweeps"
+            )
+        for run in runs:
             groups.setdefault(run.settings, []).append(run)
     return _draw([*groups.values()], x)
 

@@ -48,8 +48,9 @@ def test_success_is_that_of_the_last_hundred_episodes():
 
 
 def test_folders_without_curves_are_refused(tmp_path):
-    with pytest.raises(InputError, match=r"contains no metrics.csv; give folders"):
+    write_run(tmp_path / "begun", 0, (), 1)
+    with pytest.raises(InputError, match=r"contains no metrics.csv of updates; give folders"):
         plot_curves([tmp_path])
-    write_run(tmp_path, 0, ("many",), 1)
+    write_run(tmp_path / "damaged", 0, ("many",), 1)
     with pytest.raises(InputError, match=r"^runs=.* failed in metrics.csv or run.yaml .*'many'"):
         plot_curves([tmp_path])
