@@ -159,6 +159,13 @@ class Actions(abc.ABC):
         """Return the full-speed action of a part, by name. Shape: the entry's."""
 
     @abc.abstractmethod
+    def speeds_of(self, action: Tensor) -> Tensor:
+        """Return the commanded speeds: forward, left, up and turning left, 1 is the greatest.
+
+        Shapes: (*), then the entry's, to (*, 4), float32.
+        """
+
+    @abc.abstractmethod
     def sample(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
         """Sample uniformly, on the generator's device. Shape: `shape`, then the entry's."""
 
@@ -213,6 +220,11 @@ class DiscreteActions(Actions):
         """Return the number of the action."""
         return torch.tensor(self.names.index(name))
 
+    def speeds_of(self, action: Tensor) -> Tensor:
+        """See `Actions`."""
+        table = torch.tensor([SPEEDS[name] for name in self.names], device=action.device)
+        return table[action]
+
     def sample(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
         """Sample numbers."""
         return torch.randint(len(self), shape, generator=generator, device=generator.device)
@@ -233,6 +245,16 @@ class DiscreteActions(Actions):
 def listed(names: tuple[str, ...]) -> str:
     """Return names with their numbers, for descriptions."""
     return ", ".join(f"{number} {name}" for number, name in enumerate(names))
+
+
+SPEEDS = {
+    "forward": (1.0, 0.0, 0.0, 0.0),
+    "left": (0.0, 1.0, 0.0, 0.0),
+    "right": (0.0, -1.0, 0.0, 0.0),
+    "up": (0.0, 0.0, 1.0, 0.0),
+    "down": (0.0, 0.0, -1.0, 0.0),
+}
+"""Speeds of each discrete action by name, see `Actions.speeds_of`."""
 
 
 class Move(enum.IntEnum):
