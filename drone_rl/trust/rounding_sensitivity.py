@@ -11,6 +11,7 @@ from torchrl.envs import EnvBase
 
 from drone_rl.collectors.complete_episodes import CompleteEpisodes, rollout
 from drone_rl.envs import base_env, worlds_of
+from drone_rl.envs.rollout import Agent
 from drone_rl.policies import ImageNetwork, make_actor
 from drone_rl.policies.external_policy import ExternalPolicy
 from drone_rl.policies.networks import require_finite
@@ -60,7 +61,7 @@ def require_function(
 
 def check_rounding(
     env: EnvBase,
-    actor: TensorDictModuleBase,
+    actor: TensorDictModuleBase | Agent,
     episodes: int,
     greedy: CompleteEpisodes,
 ) -> Rounding | None:

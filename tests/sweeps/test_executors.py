@@ -186,6 +186,16 @@ def test_a_run_that_another_process_works_on_is_waited_for(make_runs):
     assert not (run.folder / "starts").exists()
 
 
+def test_a_process_that_came_too_late_is_no_failure(make_runs):
+    (run,) = make_runs("fail=true")
+    process = RunProcess(run)
+    assert process.poll() is None
+    result = {"reason": "solved", "running_reward": 2.0}
+    (run.folder / "result.json").write_text(json.dumps(result))  # by an earlier sweep's process
+    assert process.wait() == 0
+    assert read_failure(run) is None
+
+
 @pytest.mark.parametrize(
     ("program", "error"),
     [

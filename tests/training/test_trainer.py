@@ -45,48 +45,6 @@ def test_seed_determines_parameters_bit_for_bit(make_trainer):
     assert not torch.equal(parameters(first), parameters(other))
 
 
-def test_resumed_run_equals_an_uninterrupted_one_bit_for_bit(make_trainer, tmp_path):
-    whole = make_trainer(total_frames=400)
-    run(whole)
-    half = make_trainer(total_frames=150, callbacks=[CheckpointCallback(tmp_path)])
-    run(half)
-    torch.rand(17)  # changes the global random state
-    resumed = make_trainer(seed=5, total_frames=400)
-    resumed.load_state_dict(load_checkpoint(tmp_path / "last.pt"))
-    assert resumed.progress.updates == half.progress.updates
-    run(resumed)
-    assert torch.equal(parameters(resumed), parameters(whole))
-    assert resumed.progress.frames == whole.progress.frames
-    assert resumed.progress.running_reward == whole.progress.running_reward
-    lr = [t.learner.optimizer.param_groups[0]["lr"] for t in (resumed, whole)]
-    assert lr[0] == lr[1]
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_signal_saves_and_stops_after_the_update(make_trainer, tmp_path, number):
-    before = signal.getsignal(number)
-    kill = At(3, lambda _: signal.raise_signal(number))
-    trainer = make_trainer(callbacks=[kill, CheckpointCallback(tmp_path)])
-    assert run(trainer) == number.name
-    assert trainer.progress.updates == 3
-    assert load_checkpoint(tmp_path / "last.pt")["progress"]["updates"] == 3
-    assert signal.getsignal(number) == before
-
-
-def test_signal_during_confirmation_stops_after_it(make_trainer):
-    """It stops even if the confirmation succeeds, so the signal is reported."""
-    calls = []
-
-    def confirm(update):
-        calls.append(update)
-        signal.raise_signal(signal.SIGTERM)
-        return True
-
-    trainer = make_trainer(target=-1e6, confirm=confirm)
-    assert run(trainer) == "SIGTERM"
-    assert calls == [0]
-
-
 class Terminated(BaseException):
     """Raised by the handler of SIGTERM that the caller of a training had set."""
 
@@ -289,13 +247,3 @@ def test_lengths_use_the_step_count():
     assert batch_metrics(batch) == {"train/reward": 1.5, "train/length": 4.5}
     batch["next", "done"][:] = False
     assert all(value != value for value in batch_metrics(batch).values())  # NaN
-
-
-def test_end_reason_is_read_at_the_last_frame():
-    batch = make_batch([[0, 1], [1, 1, 0], [0]])
-    reasons = torch.tensor([4, 1, 4, 4, 2, 3])[:, None]
-    batch["next", "info"] = TensorDict({"end_reason": reasons}, [6])
-    metrics = batch_metrics(batch, CubesEnd)
-    assert [metrics[f"end/{end.name.lower()}"] for end in CubesEnd if end] == pytest.approx(
-        [1 / 3] * 3 + [0, 0]
-    )
