@@ -2,16 +2,20 @@
 
 import enum
 import functools
+import re
+from collections.abc import Iterable
 from typing import Any
 
 import warp as wp
 
 from drone_rl.sim.dynamics.moves_kernel import Fleet, camera_attitude, fly_move, is_flying, is_lost
 from drone_rl.sim.dynamics.state import VELOCITY
+from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, PoseArrays
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.terms.step_kernel import Motion, Step, World, observe
 from drone_rl.sim.terms.terms import Term
+from drone_rl.utils.errors import InputError
 
 _OPTIONS = {"enable_backward": False, "fuse_fp": False}
 wp.set_module_options(_OPTIONS)
@@ -193,6 +197,31 @@ class Rules:
             return float(advance(envs.world, env, motion))
 
         self.step_all, self.move = step_all, move
+        self._terms = (*rewards, *ends, success)
+
+    @functools.cache  # noqa: B019 (rules are kept for ever, see `make_rules`)
+    def load(self) -> None:
+        """Compile the kernel of single steps, or load it, once.
+
+        Raises:
+            InputError: Warp can't compile a term; the message has its line and the reason.
+        """
+        start_warp("cpu")
+        try:
+            wp.load_module(self.step_all.module, device="cpu")
+        except Exception as error:
+            raise InputError(_compile_error(str(error), self._terms)) from error
+
+
+def _compile_error(text: str, terms: Iterable[Term]) -> str:
+    """Return one line about the innermost line of code that Warp's message names."""
+    places = re.findall(r'parsing function "(.*?)" at (.*?):(\d+)', text)
+    reason = text.splitlines()[-1].lstrip(";") if text else "no reason given"
+    if not places:
+        names = ", ".join(term.name for term in terms)
+        return f"the terms {names} can't be compiled by Warp ({reason}); correct them"
+    function, file, line = places[-1]
+    return f"line {line} of {file}: {function} can't be compiled by Warp ({reason}); correct it"
 
 
 @wp.func

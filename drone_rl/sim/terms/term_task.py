@@ -5,7 +5,7 @@ import enum
 import functools
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import torch
@@ -177,7 +177,8 @@ class TermTask(Task[ObjectState]):
         return of.apart == 0 or all(np.linalg.norm(gap.clip(0)) >= of.apart for gap in gaps)
 
     def start(self, sampled: Tensor, body: BodyState) -> ObjectState:
-        """Return initial states; see `sample`."""
+        """Return initial states; see `sample`. Raises an `InputError` if a term does not compile."""
+        self.rules.load()
         count, objects = len(sampled), len(self.each)
         half = 0.5 * sampled[:, 3]
         zero = torch.zeros_like(half)
@@ -234,7 +235,18 @@ class TermTask(Task[ObjectState]):
         ]
         wp.launch(self.rules.step_all, len(state), inputs=inputs, device="cpu")
         new.steps, new.end_reason = steps.long(), ends.long()
+        if not bool(rewards.isfinite().all()):
+            self._name_unusable(new.paid)
         return new, rewards
+
+    def _name_unusable(self, paid: Tensor) -> NoReturn:
+        """Raise an `InputError` that names the reward terms whose values are not finite."""
+        is_unusable = ~paid.isfinite().all(0)
+        named = ", ".join(t.name for t, bad in zip(self._rewards, is_unusable, strict=True) if bad)
+        raise InputError(
+            f"task={self.name}: the reward terms {named} have values that are not finite; correct "
+            "their functions, such as a division by 0 or a logarithm of it"
+        )
 
     @staticmethod
     def _has_time(body: BodyState) -> bool:
