@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 import yaml
 from matplotlib.figure import Figure
@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 from drone_rl.config import MINIMAL, BaseTaskSettings
 from drone_rl.config.commands import ShiftSettings
 from drone_rl.config.configuration import from_arguments
-from drone_rl.config.options import ShiftOptions
 from drone_rl.envs import base_env, worlds_of
 from drone_rl.policies.baselines import OracleAgent, check_baselines
 from drone_rl.policies.external_network import Logits
@@ -72,7 +71,7 @@ def shifts(
     dynamics: Mapping[str, Any] | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
-    **changes: Unpack[ShiftOptions],
+    **changes: Any,
 ) -> Shifts:
     """Evaluate a policy under perturbations, one axis at a time and all combined.
 

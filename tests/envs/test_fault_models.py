@@ -33,13 +33,6 @@ def test_blur_replicates_the_border():
     torch.testing.assert_close(fault_models.blur(image, 0.5).flatten(), torch.tensor(expected))
 
 
-def test_blur_does_not_depend_on_batch_size():
-    images = torch.rand(7, 2, 9, 11, generator=torch.Generator().manual_seed(0))
-    together = fault_models.blur(images, 1.3)
-    for i in range(7):
-        assert torch.equal(fault_models.blur(images[i : i + 1], 1.3)[0], together[i])
-
-
 def fixed_source(*values):
     """Return a random source that always gives the same values."""
     return lambda *shape, normal=False: torch.tensor(values)

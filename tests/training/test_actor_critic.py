@@ -15,7 +15,7 @@ from drone_rl.config import TaskSettings
 from drone_rl.config.learning import A2c, Episodes, Ppo, Rollouts, Sgd
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.config.transforms import EpisodeReward, Gray, Stack
-from drone_rl.training.components import make_collector
+from drone_rl.training.train import make_collector
 from drone_rl.utils.checkpoint import load_checkpoint, save_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
