@@ -138,7 +138,9 @@ def sweep(
 
 
 @wp.kernel
-def _query(objects: Objects, points: wp.array2d[wp.vec3d], role: int, found: wp.array2d[Nearest]) -> None:
+def _query(
+    objects: Objects, points: wp.array2d[wp.vec3d], role: int, found: wp.array2d[Nearest]
+) -> None:
     """Answer queries, a thread for each point of each environment."""
     env, i = wp.tid()
     found[env, i] = nearest(objects, env, points[env, i], role)

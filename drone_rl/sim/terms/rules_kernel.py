@@ -1,6 +1,5 @@
 """The rules of a task of terms as kernels: one definition for single steps and whole episodes."""
 
-import enum
 import functools
 import re
 from collections.abc import Iterable
@@ -21,21 +20,8 @@ _OPTIONS = {"enable_backward": False, "fuse_fp": False}
 wp.set_module_options(_OPTIONS)
 
 
-class FixedEnd(enum.IntEnum):
-    """Ends of every task; the task's own terms follow."""
-
-    RUNNING = 0
-    SUCCESS = 1
-    STEP_LIMIT = 2
-    LOST_CONTROL = 3
-
-
-FIRST_END = wp.constant(len(FixedEnd))
-_SUCCESS = wp.constant(int(FixedEnd.SUCCESS))
-_STEP_LIMIT = wp.constant(int(FixedEnd.STEP_LIMIT))
-_LOST_CONTROL = wp.constant(int(FixedEnd.LOST_CONTROL))
-MOST_PARAMETERS = 4
-"""Largest number of parameters of a term."""
+RUNNING, SUCCESS = 0, 1
+"""Ends of every task; the task's own follow, and then `STEP_LIMIT` and `LOST_CONTROL`."""
 
 
 @wp.struct
@@ -55,7 +41,7 @@ class Episodes:
     end_reasons: wp.array[int]
 
 
-def bound(term: Term, first: int) -> Any:
+def bound(term: Term, first: int) -> Any:  # noqa: C901 (functions that Warp compiles)
     """Return a term as a Warp function of a step and all parameters; its own begin at `first`."""
     function = wp.func(term.function)
     count = len(term.parameters)
@@ -63,31 +49,31 @@ def bound(term: Term, first: int) -> Any:
     if count == 0:
 
         @wp.func
-        def call(step: Step, p: wp.array[float]):
+        def call(step: Step, p: wp.array[float]):  # noqa: ANN202 (a number or a truth value)
             return function(step)
 
     elif count == 1:
 
         @wp.func
-        def call(step: Step, p: wp.array[float]):
+        def call(step: Step, p: wp.array[float]):  # noqa: ANN202 (a number or a truth value)
             return function(step, p[first])
 
     elif count == 2:
 
         @wp.func
-        def call(step: Step, p: wp.array[float]):
+        def call(step: Step, p: wp.array[float]):  # noqa: ANN202 (a number or a truth value)
             return function(step, p[first], p[first + 1])
 
     elif count == 3:
 
         @wp.func
-        def call(step: Step, p: wp.array[float]):
+        def call(step: Step, p: wp.array[float]):  # noqa: ANN202 (a number or a truth value)
             return function(step, p[first], p[first + 1], p[first + 2])
 
     else:
 
         @wp.func
-        def call(step: Step, p: wp.array[float]):
+        def call(step: Step, p: wp.array[float]):  # noqa: ANN202 (a number or a truth value)
             return function(step, p[first], p[first + 1], p[first + 2], p[first + 3])
 
     return call
@@ -137,16 +123,20 @@ def make_rules(rewards: tuple[Term, ...], ends: tuple[Term, ...], success: Term)
 class Rules:
     """Kernel of single steps, and functions for the fused episode kernel; see `make_rules`."""
 
-    def __init__(self, rewards: tuple[Term, ...], ends: tuple[Term, ...], success: Term) -> None:
+    def __init__(  # noqa: C901 (functions that Warp compiles)
+        self, rewards: tuple[Term, ...], ends: tuple[Term, ...], success: Term
+    ) -> None:
         """Fold the terms into one function."""
         first, pay, find = 0, _no_reward, _no_end
         for number, term in enumerate(rewards):
             pay = _added(pay, bound(term, first), number)
             first += len(term.parameters)
         for number, term in enumerate(ends):
-            find = _checked(find, bound(term, first), int(FIRST_END) + number)
+            find = _checked(find, bound(term, first), SUCCESS + 1 + number)
             first += len(term.parameters)
-        find = _checked(find, bound(success, first), int(_SUCCESS))
+        find = _checked(find, bound(success, first), SUCCESS)
+        step_limit = SUCCESS + 1 + len(ends)
+        lost_control = step_limit + 1
 
         @wp.func
         def advance(world: World, env: int, motion: Motion) -> wp.float64:
@@ -155,9 +145,9 @@ class Rules:
             reward = pay(world, env, step)
             end = int(find(world, step))
             if end == 0 and world.steps[env] >= world.step_limit:
-                end = _STEP_LIMIT
+                end = step_limit
             if motion.is_lost:
-                end = _LOST_CONTROL
+                end = lost_control
             world.end_reasons[env] = end
             return reward
 

@@ -1,12 +1,11 @@
 """Settings of a task of terms: objects, starts, bounds, rewards, ends and success."""
 
-import math
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 from pydantic import BeforeValidator
 
 from drone_rl.config.task import BaseTaskSettings, Color, ObjectRegion
-from drone_rl.sim.terms.terms import ENDS, REWARDS, SUCCESSES, Number, Terms, TermSettings
+from drone_rl.sim.terms.terms import ENDS, REWARDS, SUCCESSES, Terms, TermSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import OneOf, Real, Several, Span, Whole
 from drone_rl.utils.settings import Settings
@@ -54,7 +53,7 @@ class ObjectSettings(Settings):
     def check(self) -> None:
         """Reject shapes that their sizes contradict."""
         x, y, z = self.size
-        if x != y and self.shape != "box" or x != z and self.shape == "ball":
+        if (x != y and self.shape != "box") or (x != z and self.shape == "ball"):
             equal = "three equal sizes" if self.shape == "ball" else "equal sizes along x and y"
             raise InputError(f"size={list(self.size)} is no {self.shape}; give {equal}, or a box")
 

@@ -1,15 +1,14 @@
 """One step of one environment, as terms see it, and the rules that all tasks of terms share."""
 
-from typing import Any
-
 import warp as wp
 
+from drone_rl.sim.rendering.raytrace.structs_kernel import struct
 from drone_rl.sim.terms.geometry_kernel import GOAL, NOTHING, OBSTACLE, Objects, nearest, sweep
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
-@wp.struct
+@struct
 class Step:
     """A step of one environment: what terms read. SI units; the drone is a ball."""
 
@@ -128,14 +127,13 @@ def choose_goal(world: World, env: int, drone: wp.vec3d, left: wp.vec3) -> None:
 
 
 @wp.func
-def observe(world: World, env: int, motion: Motion) -> Step:
-    """Apply the rules of contact after a motion, and return the step for the terms.
+def touch_all(world: World, env: int, motion: Motion) -> Step:
+    """Apply the rules of contact after a motion, and return the step with what was touched.
 
     A goal that the drone touches on its way is reached and vanishes; an obstacle stays.
     """
     objects = world.objects
     step = Step()
-    ahead = world.goal[env]
     for i in range(objects.shapes.shape[0]):
         is_solid = objects.roles[i] == OBSTACLE
         if objects.present[env, i] and (is_solid or objects.roles[i] == GOAL):
@@ -149,15 +147,22 @@ def observe(world: World, env: int, motion: Motion) -> Step:
                     step.reached += 1
             elif not is_solid:
                 step.remaining += 1
-    clearance = motion.now[2]
     around = nearest(objects, env, motion.now, OBSTACLE)
-    clearance = wp.min(clearance, around.distance) - world.radius
+    step.clearance = float(wp.min(motion.now[2], around.distance) - world.radius)
     if motion.now[2] < world.radius:
         step.contact = True
-    step.clearance = float(clearance)
+    return step
+
+
+@wp.func
+def observe(world: World, env: int, motion: Motion) -> Step:
+    """Apply the rules of contact after a motion, and return the step for the terms."""
+    objects = world.objects
+    step = touch_all(world, env, motion)
     left = left_of(motion.attitude)
     up = up_of(motion.attitude)
     forward = wp.cross(left, up)
+    ahead = world.goal[env]
     if ahead != NOTHING:
         place = objects.places[env, ahead]
         step.distance = float(wp.length(place - motion.now))

@@ -21,13 +21,13 @@ from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH, SIDES, Side, place_in_view, side_of
 from drone_rl.sim.tasks.task import Goals, Grid, State, Task, register_task
-from drone_rl.sim.terms import shipped_terms as shipped_terms  # registers them
+from drone_rl.sim.terms import shipped_terms_kernel as shipped_terms_kernel  # registers them
 from drone_rl.sim.terms.fused import FusedTerms
 from drone_rl.sim.terms.geometry_kernel import GOAL, NOTHING, OBSTACLE, Objects
-from drone_rl.sim.terms.rules_kernel import FixedEnd, make_rules
+from drone_rl.sim.terms.rules_kernel import SUCCESS, make_rules
 from drone_rl.sim.terms.settings import ROLES, SHAPES, ObjectSettings, TermTaskSettings
 from drone_rl.sim.terms.step_kernel import World, begin
-from drone_rl.sim.terms.terms import ENDS, REWARDS, SUCCESSES, Term
+from drone_rl.sim.terms.terms import ENDS, REWARDS, SUCCESSES
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.utils.errors import InputError
 
@@ -35,6 +35,7 @@ _CLASSES = (SemanticClass.TARGET, SemanticClass.OBSTACLE, SemanticClass.GROUND)
 _KINDS = {"ball": "sphere", "cylinder": "cylinder", "box": "box"}
 _MOST_TRIES = 1000
 """Largest number of samples of a place until one keeps away from the objects before it."""
+_LAST_ENDS = ("STEP_LIMIT", "LOST_CONTROL")
 _SECONDS = 0.1
 """Duration of a step of dynamics without time."""
 
@@ -72,9 +73,7 @@ class ObjectEntity(VisualEntity):
 class TermTask(Task[ObjectState]):
     """A task of terms: every rule is that of its settings; see `define_task`."""
 
-    truncation = FixedEnd.STEP_LIMIT
-    success_end = FixedEnd.SUCCESS
-    expected_end = FixedEnd.STEP_LIMIT
+    success_end = SUCCESS
     strata = SIDES
     observed = ("reached", "end_reason")
     scored = ("reached", "sides", "places")
@@ -90,16 +89,18 @@ class TermTask(Task[ObjectState]):
         self.settings = s = settings
         self.name = s.name
         self.drone_size = s.drone_size
-        self.origin = tuple(sum(s.start.range_of(axis)) / 2 for axis in "xyz")
+        x, y, z = (sum(s.start.range_of(axis)) / 2 for axis in "xyz")
+        self.origin = (x, y, z)
         self.each = [of for of in s.objects.values() for _ in range(of.count)]
         """Settings of each of the P objects."""
         self.roles = torch.tensor([ROLES.index(of.role) for of in self.each])
         self._rewards = tuple(REWARDS.by_name[name] for name in s.reward)
         self._ends = tuple(ENDS.by_name[name] for name in s.end)
         (success,) = (SUCCESSES.by_name[name] for name in s.success)
-        named = [term.name.upper() for term in self._ends]
-        fixed = [end.name for end in FixedEnd]
-        self.ends = enum.IntEnum("End", {name: i for i, name in enumerate([*fixed, *named])})
+        own = [term.name.upper() for term in self._ends]
+        ends: Any = enum.IntEnum("End", ["RUNNING", "SUCCESS", *own, *_LAST_ENDS], start=0)
+        self.ends = ends
+        self.truncation = self.expected_end = self.ends["STEP_LIMIT"]
         self.rules = make_rules(self._rewards, self._ends, success)
         self._success = success
         self.vocabulary = TaskVocabulary(tested=f"scenes of the task {s.name}")
@@ -177,7 +178,11 @@ class TermTask(Task[ObjectState]):
         return of.apart == 0 or all(np.linalg.norm(gap.clip(0)) >= of.apart for gap in gaps)
 
     def start(self, sampled: Tensor, body: BodyState) -> ObjectState:
-        """Return initial states; see `sample`. Raises an `InputError` if a term does not compile."""
+        """Return initial states; see `sample`.
+
+        Raises:
+            InputError: A term can't be compiled.
+        """
         self.rules.load()
         count, objects = len(sampled), len(self.each)
         half = 0.5 * sampled[:, 3]
@@ -298,7 +303,7 @@ class TermTask(Task[ObjectState]):
     def fused_rules(self, dynamics: Dynamics, num_envs: int) -> FusedTerms | None:
         """See `Task.fused_rules`."""
         is_solid = bool((self.roles == OBSTACLE).any())
-        if not FusedTerms.supports(dynamics) or is_solid and isinstance(dynamics, Quadrotor):
+        if not FusedTerms.supports(dynamics) or (is_solid and isinstance(dynamics, Quadrotor)):
             return None
         sampled = self.sample(np.random.RandomState(0)).expand(num_envs, -1)
         place = torch.tensor(self.origin, dtype=torch.float64).repeat(num_envs, 1)

@@ -13,13 +13,15 @@ weights included, are arrays there, so that other numbers compile nothing.
 import dataclasses
 import inspect
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any, ClassVar, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from drone_rl.utils.errors import InputError, did_you_mean
-from drone_rl.utils.plugins import described
+from drone_rl.utils.plugins import place_of
 from drone_rl.utils.schema import Real, shown
 from drone_rl.utils.settings import Settings, about
 
+MOST_PARAMETERS = 4
+"""Largest number of parameters of a term."""
 F = TypeVar("F", bound=Callable[..., Any])
 Number = Annotated[float, Real(-1e6, 1e6)]
 
@@ -56,15 +58,20 @@ class Terms:
         """Return a decorator that registers a function; `own` are numbers that are not arguments.
 
         Raises:
-            InputError: The function takes no step, or a parameter has no number as default.
+            InputError: The function has too many parameters, or one without a number as default.
         """
 
         def decorate(function: F) -> F:
-            first, *rest = inspect.signature(function).parameters.values()
+            _, *rest = inspect.signature(function).parameters.values()
+            if len(rest) > MOST_PARAMETERS:
+                raise InputError(
+                    f"{place_of(function)} has {len(rest)} parameters besides the step; give at "
+                    f"most {MOST_PARAMETERS}"
+                )
             for parameter in rest:
                 if not isinstance(parameter.default, int | float):
                     raise InputError(
-                        f"{described(function)}: the parameter {parameter.name} has no number as "
+                        f"{place_of(function)}: the parameter {parameter.name} has no number as "
                         f"default; write {parameter.name}: float = 1.0"
                     )
             numbers = {**own, **{p.name: float(p.default) for p in rest}}
@@ -84,7 +91,7 @@ class Terms:
         unknown names.
         """
         if isinstance(given, list | tuple):
-            given = dict.fromkeys(given, {})
+            given = {name: {} for name in given}
         if not isinstance(given, Mapping):
             return given
         return {name: self._settings(name, of) for name, of in given.items() if of is not None}
