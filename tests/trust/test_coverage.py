@@ -86,14 +86,15 @@ def test_verdict_with_a_required_domain(good, tmp_path):
     told = {"shifts": path, "require_domain": tmp_path / "needs.yaml", "progress": silent}
     told["domain_flights"] = 30
     done = drone_rl.judge(good, episodes=5, sampled=False, **told)
-    assert done.required_domain.is_covered and "blur of up to 1 pixels" in done.domain
-    assert done.domain.startswith(f"Read from {path}, dated 1970-01-01 0")
-    assert "not measured again here: good with" in done.domain
+    (line,) = (one.text for one in done.findings if one.section == "shifts")
+    assert done.required_domain.is_covered and "ood with blur of up to 1 pixels" in line
+    assert f"see {path}, dated 1970-01-01 0" in line
     assert "re-checked by 30 episodes at each of 3 strengths" in str(done)
-    assert len(str(done).splitlines()) == 4 and done.domain in done._repr_html_()
+    assert len(str(done).splitlines()) == 5  # verdict, two findings, required domain, seed
+    assert line in str(done) and line in done._repr_html_()
     assert done.as_dict()["required_domain"]["lacking"] == {}
     strict = drone_rl.judge(good, episodes=5, sampled=False, good_share=0.99, **told)
-    assert not strict.required_domain.is_covered and "not quoted" in strict.domain
+    assert not strict.required_domain.is_covered and "not quoted" in str(strict)
     unchecked = drone_rl.judge(good, episodes=5, sampled=False, **{**told, "domain_flights": 0})
     assert not unchecked.required_domain.is_covered
     assert "not covered: it requires 0.9" in str(strict)
