@@ -158,12 +158,14 @@ class Actions(abc.ABC):
     def always(self, name: str) -> Tensor:
         """Return the full-speed action of a part, by name. Shape: the entry's."""
 
-    @abc.abstractmethod
     def speeds_of(self, action: Tensor) -> Tensor:
         """Return the commanded speeds: forward, left, up and turning left, 1 is the greatest.
 
+        By default those of the action's part by name, see `SPEEDS`; zero for other names.
         Shapes: (*), then the entry's, to (*, 4), float32.
         """
+        table = [SPEEDS.get(name, (0.0, 0.0, 0.0, 0.0)) for name in self.names]
+        return torch.tensor(table, device=action.device)[self.part(action)]
 
     @abc.abstractmethod
     def sample(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
@@ -220,11 +222,6 @@ class DiscreteActions(Actions):
         """Return the number of the action."""
         return torch.tensor(self.names.index(name))
 
-    def speeds_of(self, action: Tensor) -> Tensor:
-        """See `Actions`."""
-        table = torch.tensor([SPEEDS[name] for name in self.names], device=action.device)
-        return table[action]
-
     def sample(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
         """Sample numbers."""
         return torch.randint(len(self), shape, generator=generator, device=generator.device)
@@ -254,7 +251,7 @@ SPEEDS = {
     "up": (0.0, 0.0, 1.0, 0.0),
     "down": (0.0, 0.0, -1.0, 0.0),
 }
-"""Speeds of each discrete action by name, see `Actions.speeds_of`."""
+"""Speeds of parts by name, see `Actions.speeds_of`."""
 
 
 class Move(enum.IntEnum):
