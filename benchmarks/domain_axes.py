@@ -4,6 +4,7 @@ import dataclasses
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from benchmarks.benchmark import Setup
@@ -72,7 +73,8 @@ def _ranges(
     policy: Policy, measured: Range, name: str
 ) -> Iterator[tuple[Mapping[str, float | str], bool]]:
     """Yield ranges that end near each limit, and whether they are inside."""
-    subject: Any = policy.description  # has the task, camera and appearance that axes need
+    camera, look = policy.description.camera, policy.appearance
+    subject: Any = SimpleNamespace(task=policy.task, camera=camera, appearance=look)
     axis = AXES[name]
     if axis.own is not None:
         axis = dataclasses.replace(axis, neutral=axis.own(subject))

@@ -17,8 +17,8 @@ MUTABLE = {
     "explanations.truth:Intervention",
     "explanations.rollouts:RolloutDataset",
     "trust.domain:End",
+    "policies.zoo.files:TrainingProgress",
     "sweeps.figures:Layout",
-    "training.callbacks:TrainingProgress",
     "training.actor_critic:ActorCriticLearner",
     "training.learners:GradientLearner",
     "training.learners:ReinforceLearner",
@@ -50,7 +50,7 @@ def classes():
 
 
 def test_data_classes_are_frozen(classes):
-    assert len(classes) > 100
+    assert len(classes) > 50
     mutable = {n for n, k in classes.items() if not k.__dataclass_params__.frozen}
     assert {name.removeprefix("drone_rl.") for name in mutable} == MUTABLE
 

@@ -24,7 +24,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import RootSeed
 from tests.evidence import SHIFTS, changed
-from tests.trust.making import shifts_of
+from tests.trust.making import shifts_of, subject_of
 
 
 @pytest.fixture
@@ -151,7 +151,7 @@ def test_invented_range_is_contradicted(near):
 
 @pytest.mark.parametrize("name", list(AXES))
 def test_rechecked_strengths_are_within_the_required_range(near, name):
-    of, axis = near.description, AXES[name]
+    of, axis = subject_of(near), AXES[name]
     value = axis.value(axis.strengths[1], of)
     stated = shifts_of(near, axes=(name,))
     neutral = stated.axes[name].neutral

@@ -34,7 +34,6 @@ def examined(policy):
 def with_unit(by_unit):
     """The shipped policy with the hidden unit 2^24 + 1 - 2^24 added to the logit of a left turn."""
     from benchmarks.gamed_rounding import BIG, parameter, widened
-    from drone_rl.policies.zoo import parse
 
     described, weights = widened()
     unit = parameter(weights, "fc1.weight")[-1]
@@ -42,9 +41,8 @@ def with_unit(by_unit):
     parameter(weights, "fc1.bias")[-1] = 1.0
     parameter(weights, "logits.weight")[Move.LEFT, -1] = by_unit
     policy = drone_rl.load_policy("good")
-    return dataclasses.replace(
-        policy, description=parse(described), state={**policy.state, "policy": weights}
-    )
+    state = policy.state.replace(description=described, weights=weights)
+    return dataclasses.replace(policy, description=described, state=state)
 
 
 def test_an_honest_policy_takes_the_same_actions_in_both_implementations():

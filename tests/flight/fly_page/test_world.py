@@ -6,7 +6,8 @@ import torch
 import drone_rl
 from drone_rl.config.commands import CAMERAS
 from drone_rl.config.networks import Lstm, SmallCnn
-from drone_rl.config.transforms import Gray, Stack
+from drone_rl.config.transforms import Gray, Noise, Stack
+from drone_rl.envs import GrayPixels
 from drone_rl.sim.dynamics import FlightState, Quadrotor
 from tests.untrained import untrained
 
@@ -138,6 +139,21 @@ def test_a_policy_that_remembers_keeps_its_memory_from_step_to_step(make_world):
         assert_follows()
 
 
+def test_a_policy_observes_through_its_camera_faults(make_world):
+    world = make_world(untrained(SmallCnn(channels=(2,), hidden=(4,)), Gray(), Noise(strength=0.2)))
+    noises = []
+    for _ in range(3):
+        world.step(FORWARD)
+        seen = world.see()
+        noises.append(seen.observation - GrayPixels()._apply_transform(seen.frame))
+        world.set_light(0.5)
+        world.see()
+        world.set_light(1.0)  # the noise of a state is the same in any light
+        assert torch.equal(world.see().observation, seen.observation)
+    assert all(0.1 < noise.std() < 0.25 for noise in noises)
+    assert not torch.equal(noises[0], noises[1])
+
+
 def test_wind_blows_from_its_direction(make_world):
     world = make_world("flight")
     assert world.wind == (0.0, 0.0)
@@ -145,7 +161,7 @@ def test_wind_blows_from_its_direction(make_world):
     assert world.flight_dynamics.wind == pytest.approx((-5.0, 0.0, 0.0))
     world.set_wind(4.0, 90.0)  # from the right, to the left
     assert world.worlds.dynamics.settings.wind == pytest.approx((0.0, 4.0, 0.0), abs=1e-12)
-    assert world.conditions[2].wind == pytest.approx((0.0, 4.0, 0.0), abs=1e-12)
+    assert world.conditions["dynamics"].wind == pytest.approx((0.0, 4.0, 0.0), abs=1e-12)
 
 
 def test_the_policys_own_wind_is_the_first_one(make_world):
@@ -185,4 +201,4 @@ def test_an_action_lasts_as_long_as_its_move_takes(make_world, policy, speed, se
 @pytest.mark.parametrize("wind", [(0.0, 5.0, 0.0), (3.0, 1.0, 0.5), (0.1, -0.7, 0.0)])
 def test_demonstrations_note_the_exact_wind_of_the_policy(make_world, wind):
     policy = drone_rl.load_policy("flight").in_dynamics(wind=wind)
-    assert make_world(policy).conditions[2] == policy.dynamics
+    assert make_world(policy).conditions["dynamics"] == policy.dynamics
