@@ -27,7 +27,7 @@ from drone_rl.trust.charts import chart, strips
 from drone_rl.trust.domain import Prober
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
 from drone_rl.trust.perturbations import Condition, PerturbationMode
-from drone_rl.trust.rounding_sensitivity import require_function
+from drone_rl.trust.repetition import require_repeatable
 from drone_rl.trust.shifts_results import Domain, NetworkIdentity, Range, Robustness, packed
 from drone_rl.trust.suite import Suite, make_strip
 from drone_rl.utils.display import TableResult
@@ -94,7 +94,7 @@ def shifts(
     check_axes(settings.axes or ())
     loaded = as_policy(policy, outputs, task=task, dynamics=dynamics)
     begin = time.perf_counter()
-    require_function(loaded, seed=seed.value, device=settings.device, renderer=settings.renderer)
+    require_repeatable(loaded, seed=seed.value, device=settings.device, renderer=settings.renderer)
     subject = make_evaluated_policy(loaded, settings)
     if settings.domain:
         if (judged := as_task(subject.task)).oracle is None:

@@ -11,7 +11,7 @@ from drone_rl.config.commands import JudgeSettings
 from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.zoo import certificate_path
 from drone_rl.sim.tasks.collect_cubes import CubesEnd
-from drone_rl.trust.results import Proof, Rounding
+from drone_rl.trust.results import Proof
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import RootSeed, root_seed
 from drone_rl.verification.checker.certificate import Certificate, certificate_file
@@ -50,12 +50,8 @@ class Claim:
         """
         return 1.0 - 0.05 ** (1.0 / self.uniform) if self.uniform else None
 
-    def quote(self, greedy: CompleteEpisodes, *, rounding: Rounding | None = None) -> Proof:
-        """Return what a verdict may quote: nothing if an episode contradicts the certificate.
-
-        A proof holds for any order of sums, so nothing is quoted either if the episodes depend too
-        much on rounding.
-        """
+    def quote(self, greedy: CompleteEpisodes) -> Proof:
+        """Return what a verdict may quote: nothing if an episode contradicts the certificate."""
         stated = self.certificate
         if stated is None:
             return Proof(refused=self.refused)
@@ -63,8 +59,6 @@ class Claim:
         if not all(held):
             count = f"{len(held) - sum(held)} of {len(held)} greedy flights of this verdict"
             return Proof(refused=f"{count} ended otherwise than it states")
-        if rounding is not None and rounding.excessive:
-            return Proof(refused="decisions of the policy depend on rounding")
         return Proof(
             every=stated.is_proved,
             share=stated.success,
