@@ -40,7 +40,8 @@ def _parts(many: int) -> dict[str, Any]:
     scenes = Scenes(env)
     flights = collect(env, actor, num_episodes=1, num_frames=many)
     rows = select_frames(flights.episode, many)
-    features = render_frames(flights, rows, scenes, network, (layer,)).features[layer]
+    frames = render_frames(flights, rows, scenes, network, (layer,))
+    features = frames.arrays[f"features/{layer}"]
     results = {}
     for count in (600, many):
         begin = time.perf_counter()

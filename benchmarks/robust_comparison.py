@@ -8,7 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs.rollout import Agent
-from drone_rl.trust.agents import OracleAgent, PolicyAgent
+from drone_rl.policies.baselines import OracleAgent
+from drone_rl.trust.agents import PolicyAgent
 from drone_rl.trust.axes import AXES, GROUPS, Axis
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
 from drone_rl.trust.perturbations import Condition
@@ -142,5 +143,5 @@ def _share(evaluator: PairedEvaluator, condition: Condition, agent: Agent) -> fl
 
 
 def _is_possible(evaluator: PairedEvaluator, condition: Condition, possible_share: float) -> bool:
-    success = evaluator.run(condition, agent=OracleAgent()).episodes.success
+    success = evaluator.run(condition, agent=OracleAgent(only_visible=True)).episodes.success
     return proportion(int(success.sum()), len(success)).upper95 >= possible_share

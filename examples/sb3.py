@@ -24,10 +24,11 @@ def train(frames: int = 80_000, *, num_envs: int = 64, steps: int = 64, seed: in
         seed: Seed of environments, weights and actions.
     """
     name = "drone_rl/CollectCubes-v0"
-    envs = gymnasium.make_vec(name, num_envs=num_envs, autoreset_mode="SameStep")
+    how = {"autoreset_mode": "SameStep", "transforms": TRANSFORMS}
+    envs = gymnasium.make_vec(name, num_envs=num_envs, **how)
     network = {"features_extractor_class": drone_rl.Sb3Trunk, "net_arch": []}
     options = {"n_steps": steps, "n_epochs": 4, "batch_size": 512, "learning_rate": 1e-3}
-    env = VecMonitor(drone_rl.Sb3Worlds(envs, TRANSFORMS))
+    env = VecMonitor(drone_rl.Sb3Worlds(envs))
     model = PPO("CnnPolicy", env, ent_coef=0.01, policy_kwargs=network, seed=seed, **options)
     model.learn(frames)
     env.close()

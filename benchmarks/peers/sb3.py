@@ -91,9 +91,11 @@ def train_sb3(
     """
     if algorithm not in ALGORITHMS:
         raise InputError(f"algorithm={algorithm!r} is unknown; give {', '.join(ALGORITHMS)}")
-    worlds = gymnasium.make_vec(environment, num_envs=num_envs, autoreset_mode="SameStep")
+    worlds = gymnasium.make_vec(
+        environment, num_envs=num_envs, autoreset_mode="SameStep", transforms=TRANSFORMS
+    )
     assert isinstance(worlds, DroneWorlds)
-    env, solved = Sb3Worlds(worlds, TRANSFORMS), Solved(target)
+    env, solved = Sb3Worlds(worlds), Solved(target)
     model = ALGORITHMS[algorithm](
         "MlpPolicy",  # only its trunk and heads are used
         env,

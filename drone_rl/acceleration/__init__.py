@@ -1,10 +1,10 @@
-"""Faster implementations of collecting and learning.
+"""Faster implementations of collecting and learning, for small networks on a CPU.
 
-`drone_rl.collectors.speedups` is the one module that imports it. Each `try_create` returns an
-implementation, or the reasons why there is none.
+Each `try_create` returns an implementation, or the reasons why it does not support a configuration;
+TorchRL and PyTorch do what it does not support.
 """
 
-from drone_rl.acceleration.activations import ActivationRecorder as ActivationRecorder
 from drone_rl.acceleration.fused_episodes import FusedEpisodes as FusedEpisodes
 from drone_rl.acceleration.fused_network import FusedNetwork as FusedNetwork
+from drone_rl.acceleration.fused_network import with_fused_passes as with_fused_passes
 from drone_rl.acceleration.packed_layers import Reasons as Reasons

@@ -14,7 +14,7 @@ from torch import Tensor
 from torchrl.envs.utils import ExplorationType
 
 from drone_rl.acceleration import rollout_kernel
-from drone_rl.acceleration.activations import ActivationRecorder
+from drone_rl.acceleration.fused_network import ActivationRecorder
 from drone_rl.acceleration.packed_layers import PackedNetwork, Reasons, unsupported
 from drone_rl.envs import DroneEnv, Observer
 from drone_rl.envs.transforms import CropRows, StandardizePixels
@@ -23,6 +23,7 @@ from drone_rl.policies.networks import require_finite
 from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
 from drone_rl.sim.rendering.raytrace.renderer import Raytracer
 from drone_rl.sim.rendering.raytrace.structs_kernel import Images
+from drone_rl.sim.tasks import State
 
 _MAX_STEPS = 64
 """Steps of one launch of the kernel; most episodes end within them."""
@@ -61,7 +62,8 @@ class FusedEpisodes:
         camera.mean, camera.deviation = _mean_and_deviation(env.observer)
         self._camera = camera
         self._rows = _cropped_rows(env.observer)
-        shape = (self._workers.size, network.workspace_size)
+        size = network.offsets.outputs[-1]
+        shape = (self._workers.size, int(rollout_kernel.TOGETHER) * size)
         self._workspaces = wp.empty(shape, dtype=float, device="cpu")
         pixels = view.height * view.width
         self._length = max(1, min(_MAX_STEPS, _MAX_PIXELS // (count * pixels)))
@@ -76,7 +78,6 @@ class FusedEpisodes:
                 "end_reason": torch.empty(rows, dtype=torch.int32),
             }
         )
-        size = network.num_activations
         launches = _MAX_ACTIVATIONS // (rows * size)
         self.activations = ActivationRecorder(launches * rows, size)
         """Of the last batch, for a `FusedNetwork` that learns from it."""
@@ -106,24 +107,23 @@ class FusedEpisodes:
         if reasons or rules is None:
             return Reasons(reasons)
         first_pixel = _cropped_rows(env.observer).start * env.observer.view.width
-        network = PackedNetwork(actor.network, int(rollout_kernel.TOGETHER), first_pixel)
+        network = PackedNetwork(actor.network, first_pixel)
         return cls(env, actor, keeps_inputs, network, rules, num_threads)
 
-    def run(self, num_envs: int) -> TensorDictBase | None:
-        """Run an episode in each of the first environments, which have just started.
+    def run(self, started: State) -> TensorDictBase | None:
+        """Run episodes to their ends, from states of k environments at their starts.
 
         Returns:
-            A batch as `EpisodeCollector`'s, whose traj_ids are 0 to `num_envs` - 1; None if actions
-            are chosen in another way than by sampling or greedily.
+            A batch as `EpisodeCollector`'s, whose traj_ids are 0 to k - 1; None if actions are
+            chosen in another way than by sampling or greedily.
         """
         if self._actor.exploration not in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC):
             return None
         load_kernels(self._kernel.module).result()
-        state: Any = self._env.worlds.state
-        self._rules.begin(state)
+        self._rules.begin(started)
         self.activations.recording = None
-        self._network.update()
-        env_of_step, logged = self._run(num_envs)
+        self._network.pack()
+        env_of_step, logged = self._run(len(started))
         logged["action"] = logged["action"].long()
         outcome = self._env.outcome(logged.pop("end_reason").long(), logged.pop("reward"))
         batch = TensorDict({}, [len(env_of_step)])
@@ -168,7 +168,7 @@ class FusedEpisodes:
         frames.gray = gray
         self._logits = opened["logits"]
         rollout: Any = rollout_kernel.Rollout()
-        rollout.camera, rollout.layers = self._camera, self._network.layers
+        rollout.camera, rollout.layers = self._camera, self._network.arrays
         rollout.workspaces, rollout.draws = self._workspaces, wp.from_torch(draws)
         rollout.frames, rollout.logits = frames, wp.from_torch(self._logits)
         rollout.actions = wp.from_torch(opened["action"])

@@ -1,8 +1,7 @@
 """Fused forward and backward pass of a small network."""
 
 import math
-from collections.abc import Sequence
-from typing import Any, Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self, TypeVar
 
 import torch
 import warp as wp
@@ -10,16 +9,11 @@ from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
 from drone_rl.acceleration import gradients_kernel
-from drone_rl.acceleration.activations import ActivationRecorder, Recording
 from drone_rl.acceleration.gradients_kernel import BLOCK, FrameBatch, PackedParams, Workspace
 from drone_rl.acceleration.layers_kernel import WIDTH
 from drone_rl.acceleration.packed_layers import (
-    Order,
-    OutputOffsets,
-    PackedLayer,
+    PackedNetwork,
     Reasons,
-    as_geometries,
-    as_indices,
     odd_lines,
     packed_layers,
     unsupported,
@@ -29,8 +23,63 @@ from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
 
 MAX_WEIGHTS = 2**20
 """Larger networks do not fit into a core's cache, and torch is as fast."""
+N = TypeVar("N", bound=nn.Module)
 Wrt = Literal["weights", "pixels"]
 """What gradients are computed with respect to."""
+
+
+class Recording(NamedTuple):
+    """Outputs of all layers for the observations of one batch."""
+
+    pixels: Tensor
+    """Observations, by identity. Shape: (k, C, H, W)."""
+    version: int
+    """Counter of the changes of `pixels` in place."""
+    weights: Tensor
+    """Packed weights that gave the outputs."""
+    rows: Tensor
+    """Row of each observation among the outputs."""
+
+
+class ActivationRecorder:
+    """Outputs of all layers that a collector's kernel hands to the learner, which needs them, too.
+
+    A fused collector writes them once a learner asks. The learner finds them by the memory of the
+    observations: it passes the batch's pixels, or a slice of them. A copy is evaluated again, as
+    are pixels that were changed in place (by torch; NumPy's writes do not count).
+    """
+
+    def __init__(self, num_rows: int, size: int) -> None:
+        """Record up to `num_rows` observations with `size` outputs each, from `start` on."""
+        self._shape = num_rows, size
+        self.outputs = torch.empty(0, size)
+        self.recording: Recording | None = None
+        """The present batch; None while `outputs` are overwritten, or if they had no room."""
+
+    def start(self) -> None:
+        """Allocate the memory, before the next batch."""
+        self.outputs = torch.empty(self._shape)
+
+    def record(self, rows: Tensor, weights: Tensor, pixels: Tensor) -> None:
+        """Make `outputs` those of a batch; `rows`, (k,), are theirs."""
+        if int(rows.max()) < len(self.outputs):
+            self.recording = Recording(pixels, pixels._version, weights, rows.int())
+
+    def find(self, pixels: Tensor, weights: Tensor) -> Tensor | None:
+        """Return the rows in `outputs` of contiguous observations (k, C * H * W), if they have any.
+
+        `weights` are the packed weights, which must be those that gave the outputs.
+        """
+        recording = self.recording
+        if recording is None or pixels._version != recording.version:
+            return None
+        size = pixels.shape[1] * pixels.element_size()
+        first, rest = divmod(pixels.data_ptr() - recording.pixels.data_ptr(), size)
+        last = first + len(pixels)
+        is_slice = rest == 0 and first >= 0 and last <= len(recording.rows)
+        if not (is_slice and torch.equal(weights, recording.weights)):
+            return None
+        return recording.rows[first:last]
 
 
 class FusedNetwork(ImageNetwork):
@@ -51,7 +100,7 @@ class FusedNetwork(ImageNetwork):
         super().__init__()
         self.network, self.in_shape, self.actions = network, network.in_shape, network.actions
         self._num_threads, self._activations = num_threads, activations
-        self._differentiates: Wrt = wrt
+        self._wrt: Wrt = wrt
         self._engine: _Engine | None = None
         load_kernels(gradients_kernel)
         if activations is not None:
@@ -72,7 +121,7 @@ class FusedNetwork(ImageNetwork):
             network: Network from pixels to logits.
             num_threads: Threads that share the observations; it affects the rounding of sums.
             wrt: Differentiate with respect to the weights, or to the pixels with fixed weights.
-            activations: Those of a `FusedCollector`, which batches from it need not compute again.
+            activations: Those of `FusedEpisodes`, which batches from it need not compute again.
         """
         reasons = unsupported(network)
         if not reasons and wrt == "pixels" and not packed_layers(network)[0].has_transpose:
@@ -87,14 +136,27 @@ class FusedNetwork(ImageNetwork):
     def forward(self, pixels: Tensor) -> Tensor:
         """Return the logits of pixels (*, C, H, W)."""
         if self._engine is None:
-            layers = packed_layers(self.network)
-            self._engine = _Engine(
-                layers, self._num_threads, self._differentiates, self._activations
-            )
+            packed = PackedNetwork(self.network)
+            self._engine = _Engine(packed, self._num_threads, self._wrt, self._activations)
         self.network.check(pixels)
         flat = pixels.reshape(-1, math.prod(self.in_shape)).contiguous()
-        parameters = self._engine.parameters if self._differentiates == "weights" else ()
+        parameters = self._engine.packed.parameters if self._wrt == "weights" else ()
         return _Logits.apply(self._engine, flat, *parameters).reshape(*pixels.shape[:-3], -1)
+
+
+def with_fused_passes(
+    network: N,
+    num_threads: int = 1,
+    *,
+    wrt: Wrt = "weights",
+    activations: ActivationRecorder | None = None,
+) -> N | FusedNetwork:
+    """Return the `FusedNetwork` of a network if the kernel supports it, else the network itself.
+
+    See `FusedNetwork.try_create` for the arguments.
+    """
+    fused = FusedNetwork.try_create(network, num_threads, wrt=wrt, activations=activations)
+    return network if isinstance(fused, Reasons) else fused
 
 
 class _Outputs(NamedTuple):
@@ -127,64 +189,48 @@ class _Logits(torch.autograd.Function):
 
 
 class _Engine:
-    """Run both passes in threads, with packed layers and their buffers."""
+    """Run both passes in threads, with packed weights and buffers."""
 
     def __init__(
         self,
-        layers: Sequence[PackedLayer],
+        packed: PackedNetwork,
         num_threads: int,
         wrt: Wrt,
         activations: ActivationRecorder | None,
     ) -> None:
         load_kernels(gradients_kernel).result()
-        self._layers, self._activations = layers, activations
+        self.packed, self._activations = packed, activations
         self._has_fixed_weights = wrt == "pixels"
         self._workers = WorkerPool(num_threads, num_threads)
-        self._order = order = Order(layers)
-        self._weights = torch.zeros(order.weight_offsets[-1])
-        self._transposed = torch.zeros(order.transposed_offsets[-1])
-        offsets = OutputOffsets.of(layers)
-        self._logits_offset, self._size = offsets.outputs[-2:]
+        convolutions = [layer for layer in packed.layers if layer.is_convolution]
+        self._logits_offset, self._size = packed.offsets.outputs[-2:]
         params = self._params = PackedParams()
-        params.geometries = as_geometries(
-            {"weights_offset": at, **layer.geometry, "is_rectified": int(layer is not layers[-1])}
-            for layer, at in zip(layers, order.weight_offsets, strict=False)
-        )
-        params.transposed = as_geometries(
-            {"weights_offset": at, **_transposed(layer)}
-            for layer, at in zip(layers, order.transposed_offsets, strict=False)
-        )
-        params.weights = wp.from_torch(self._weights)
-        params.transposed_weights = wp.from_torch(self._transposed)
-        params.output_offsets = as_indices(offsets.outputs)
-        params.kept_offsets = as_indices(offsets.kept)
-        params.num_convolutions = sum(layer.is_convolution for layer in layers)
-        stride = odd_lines(self._logits_offset - offsets.kept[params.num_convolutions - 1])
-        params.inputs_stride = stride
-        self._gradients = torch.empty(self._workers.size, *self._weights.shape)
-        numbers = (v.num_inputs * math.prod(v.output_shape) for v in layers if v.is_convolution)
-        sizes = {"deltas": int(BLOCK) * self._size, "inputs": int(BLOCK) * stride}
-        sizes["patches"] = max(numbers)
+        params.layers, params.transposed = packed.arrays, packed.transposed
+        params.transposed_weights = wp.from_torch(packed.transposed_weights)
+        features_offset = packed.offsets.kept[len(convolutions) - 1]
+        params.inputs_stride = odd_lines(self._logits_offset - features_offset)
+        sizes = {
+            "deltas": int(BLOCK) * self._size,
+            "inputs": int(BLOCK) * params.inputs_stride,
+            "patches": max(c.num_inputs * math.prod(c.output_shape) for c in convolutions),
+        }
+        num_gradients = 0 if self._has_fixed_weights else len(packed.weights)
+        self._gradients = torch.empty(self._workers.size, num_gradients)
         self._workspaces = [Workspace() for _ in range(self._workers.size)]
         for workspace, gradients in zip(self._workspaces, self._gradients, strict=True):
             for name, size in sizes.items():
                 setattr(workspace, name, wp.empty(size, dtype=float, device="cpu"))
-            workspace.gradients = wp.from_torch(gradients[: 0 if self._has_fixed_weights else None])
+            workspace.gradients = wp.from_torch(gradients)
         self._spare: Tensor | None = None
         """Buffer to reuse for outputs; allocating one takes longer than evaluating a layer."""
-        order.pack(self._weights, self._transposed)
-
-    @property
-    def parameters(self) -> list[Tensor]:
-        """Weight and bias of each layer."""
-        return [parameter for layer in self._layers for parameter in layer.parameters]
+        packed.pack()
 
     def compute(self, pixels: Tensor) -> _Outputs:
         """Return the outputs of all layers, those that were recorded if there are any."""
         if not self._has_fixed_weights:
-            self._order.pack(self._weights, self._transposed)
+            self.packed.pack()
         recorder = self._activations
-        rows = None if recorder is None else recorder.find(pixels, self._weights)
+        rows = None if recorder is None else recorder.find(pixels, self.packed.weights)
         if recorder is not None and rows is not None:
             return _Outputs(recorder.outputs.view(-1), rows, recorder.recording)
         size, spare, self._spare = len(pixels) * self._size, self._spare, None
@@ -202,7 +248,7 @@ class _Engine:
 
     def logits(self, outputs: _Outputs) -> Tensor:
         """Return the outputs of the last layer. Shape: (num_observations, num_actions)."""
-        last = self._logits_offset + torch.arange(len(self._layers[-1].layer.weight))
+        last = self._logits_offset + torch.arange(len(self.packed.layers[-1].layer.weight))
         return outputs.values.take(outputs.rows[:, None].long() * self._size + last)
 
     def gradients(self, pixels: Tensor, outputs: _Outputs, grad_output: Tensor) -> list[Tensor]:
@@ -225,14 +271,6 @@ class _Engine:
         self._workers.map_spans(0, len(pixels), run_span)
         if recording is None:
             self._spare = values
-        return (
-            [grad_pixels] if self._has_fixed_weights else self._order.unpack(self._gradients.sum(0))
-        )
-
-
-def _transposed(layer: PackedLayer) -> dict[str, int]:
-    """Return the geometry that maps gradients with respect to outputs to those of the patches."""
-    outs, size = layer.num_outs, layer.num_inputs
-    patches = {"num_patches": math.prod(layer.output_shape), "patches_per_row": 1}
-    kernel = {"row_stride": outs, "kernel_rows": 1, "kernel_row_length": outs}
-    return {**patches, **kernel, "num_outs": size, "output_stride": size}
+        if self._has_fixed_weights:
+            return [grad_pixels]
+        return self.packed.unpack(self._gradients.sum(0))

@@ -9,10 +9,12 @@ import warp as wp
 from drone_rl.acceleration.layers_kernel import (
     PREAMBLE,
     LayerGeometry,
+    Layers,
     copy,
     multiply,
-    num_kept,
-    pool,
+    row_size,
+    run_convolutions,
+    run_linear,
 )
 
 _TILES = (
@@ -158,20 +160,12 @@ BLOCK = wp.constant(64)
 
 @wp.struct
 class PackedParams:
-    """Weights of a network, and the geometry of its layers in both passes."""
+    """A network, and what the backward pass needs of it."""
 
-    geometries: wp.array[LayerGeometry]
-    """Of each layer in the forward pass. `forward` and `backward` set the offsets of inputs and
-    outputs, and the number of patches of linear layers."""
+    layers: Layers
     transposed: wp.array[LayerGeometry]
-    """Of each layer in the backward pass, from gradients of outputs to those of patches."""
-    weights: wp.array[float]
+    """Of each layer, from gradients of outputs to those of patches, without offsets."""
     transposed_weights: wp.array[float]
-    output_offsets: wp.array[int]
-    """Offset of each layer in the outputs of a frame, and the size of these."""
-    kept_offsets: wp.array[int]
-    """Offset of each layer's outputs after pooling."""
-    num_convolutions: int
     inputs_stride: int
     """Stride between the linear layers' inputs of two frames in `Workspace.inputs`."""
 
@@ -209,40 +203,26 @@ class Workspace:
 @wp.kernel
 def forward(first: int, last: int, params: PackedParams, batch: FrameBatch) -> None:
     """Compute the outputs of all layers of frames `first` to `last` - 1; launch dimension 1."""
-    size = _size(params)
     for block in range(first, last, BLOCK):
-        for frame in range(block, wp.min(block + BLOCK, last)):
-            for layer in range(params.num_convolutions):
-                g = params.geometries[layer]
-                g.output_offset = frame * size + params.output_offsets[layer]
-                if layer == 0:
-                    multiply(batch.frames[frame], params.weights, batch.outputs, g)
-                else:
-                    g.input_offset = frame * size + params.kept_offsets[layer - 1]
-                    multiply(batch.outputs, params.weights, batch.outputs, g)
-                if g.pool_size > 0:
-                    g.pooled_offset = frame * size + params.kept_offsets[layer]
-                    pool(batch.outputs, g)
-        for layer in range(params.num_convolutions, params.geometries.shape[0]):
-            g = params.geometries[layer]
-            g.input_offset = block * size + params.kept_offsets[layer - 1]
-            g.output_offset = block * size + params.output_offsets[layer]
-            g.num_patches = wp.min(BLOCK, last - block)
-            g.row_stride = size
-            g.output_stride = size
-            multiply(batch.outputs, params.weights, batch.outputs, g)
+        end = wp.min(block + BLOCK, last)
+        for frame in range(block, end):
+            run_convolutions(params.layers, batch.frames[frame], batch.outputs, frame)
+        run_linear(params.layers, batch.outputs, block, end - block)
 
 
 @wp.func
-def _size(params: PackedParams) -> int:
-    """Numbers of the outputs of a frame."""
-    return params.output_offsets[params.geometries.shape[0]]
-
-
-@wp.func
-def _stride(params: PackedParams, layer: int) -> int:
+def _stride(layers: Layers, layer: int) -> int:
     """Numbers of the outputs of a layer after pooling, with padding."""
-    return params.output_offsets[layer + 1] - params.kept_offsets[layer]
+    return layers.output_offsets[layer + 1] - layers.kept_offsets[layer]
+
+
+@wp.func
+def _num_kept(g: LayerGeometry) -> int:
+    """Return the numbers of a frame that a layer keeps: its outputs after pooling."""
+    if g.pool_size == 0:
+        return g.num_patches * g.num_outs
+    rows = g.num_patches / g.patches_per_row / g.pool_size
+    return rows * (g.patches_per_row / g.pool_size) * g.num_outs
 
 
 @wp.kernel
@@ -250,13 +230,14 @@ def backward(
     first: int, last: int, params: PackedParams, batch: FrameBatch, workspace: Workspace
 ) -> None:
     """Run the backward pass of frames `first` to `last` - 1; launch dimension 1."""
+    layers = params.layers
     for block in range(first, last, BLOCK):
         end = wp.min(block + BLOCK, last)
         for frame in range(block, end):
             _begin(params, frame, block, batch, workspace)
-        for i in range(params.geometries.shape[0]):
-            layer = params.geometries.shape[0] - 1 - i
-            if layer >= params.num_convolutions:
+        for i in range(layers.geometries.shape[0]):
+            layer = layers.geometries.shape[0] - 1 - i
+            if layer >= layers.num_convolutions:
                 _linear(params, layer, end - block, workspace)
             else:
                 for frame in range(block, end):
@@ -268,14 +249,15 @@ def _begin(
     params: PackedParams, frame: int, block: int, batch: FrameBatch, workspace: Workspace
 ) -> None:
     """Write the inputs of a frame's linear layers, and the logits' gradient padded with zeros."""
-    inputs_offset = params.kept_offsets[params.num_convolutions - 1]
-    top = params.geometries.shape[0] - 1
+    layers = params.layers
+    inputs_offset = layers.kept_offsets[layers.num_convolutions - 1]
+    top = layers.geometries.shape[0] - 1
     row = frame - block
-    source = batch.rows[frame] * _size(params) + inputs_offset
-    size = params.output_offsets[top] - inputs_offset
+    source = batch.rows[frame] * row_size(layers) + inputs_offset
+    size = layers.output_offsets[top] - inputs_offset
     copy(batch.outputs, source, workspace.inputs, row * params.inputs_stride, size)
-    at = BLOCK * params.output_offsets[top] + row * _stride(params, top)
-    for action in range(params.geometries[top].num_outs):
+    at = BLOCK * layers.output_offsets[top] + row * _stride(layers, top)
+    for action in range(layers.geometries[top].num_outs):
         gradient = float(0.0)
         if action < batch.grad_output.shape[1]:
             gradient = batch.grad_output[frame, action]
@@ -285,24 +267,25 @@ def _begin(
 @wp.func
 def _linear(params: PackedParams, layer: int, count: int, workspace: Workspace) -> None:
     """Compute the gradients with respect to a linear layer's weights and inputs."""
-    first = params.kept_offsets[params.num_convolutions - 1]
-    inputs_offset = params.kept_offsets[layer - 1] - first
+    layers = params.layers
+    first = layers.kept_offsets[layers.num_convolutions - 1]
+    inputs_offset = layers.kept_offsets[layer - 1] - first
     if workspace.gradients.shape[0] > 0:
-        g = params.geometries[layer]  # the frames' inputs, side by side, are its patches
+        g = layers.geometries[layer]  # the frames' inputs, side by side, are its patches
         g.input_offset = inputs_offset
-        g.output_offset = BLOCK * params.output_offsets[layer]
+        g.output_offset = BLOCK * layers.output_offsets[layer]
         g.num_patches = count
         g.patches_per_row = count
         g.row_stride = 0
         g.column_stride = params.inputs_stride
-        g.output_stride = _stride(params, layer)
+        g.output_stride = _stride(layers, layer)
         accumulate(workspace.inputs, workspace.deltas, workspace.gradients, g)
     transposed = params.transposed[layer]
-    transposed.input_offset = BLOCK * params.output_offsets[layer]
-    transposed.output_offset = BLOCK * params.kept_offsets[layer - 1]
+    transposed.input_offset = BLOCK * layers.output_offsets[layer]
+    transposed.output_offset = BLOCK * layers.kept_offsets[layer - 1]
     transposed.num_patches = count
-    transposed.row_stride = _stride(params, layer)
-    transposed.output_stride = _stride(params, layer - 1)
+    transposed.row_stride = _stride(layers, layer)
+    transposed.output_stride = _stride(layers, layer - 1)
     multiply(workspace.deltas, params.transposed_weights, workspace.deltas, transposed)
     for row in range(count):
         delta = transposed.output_offset + row * transposed.output_stride
@@ -320,20 +303,21 @@ def _convolution(
     workspace: Workspace,
 ) -> None:
     """Compute the gradients with respect to a convolution's weights and input, for one frame."""
+    layers = params.layers
     row = frame - block
-    frame_at = batch.rows[frame] * _size(params)
+    frame_at = batch.rows[frame] * row_size(layers)
     input_offset = int(0)
     if layer > 0:
-        input_offset = frame_at + params.kept_offsets[layer - 1]
-    g = params.geometries[layer]
+        input_offset = frame_at + layers.kept_offsets[layer - 1]
+    g = layers.geometries[layer]
     g.input_offset = input_offset
-    kept_delta_at = BLOCK * params.kept_offsets[layer] + row * _stride(params, layer)
+    kept_delta_at = BLOCK * layers.kept_offsets[layer] + row * _stride(layers, layer)
     g.output_offset = kept_delta_at
     if g.pool_size > 0:
-        size = params.kept_offsets[layer] - params.output_offsets[layer]
-        g.output_offset = BLOCK * params.output_offsets[layer] + row * size
-        outputs_at = frame_at + params.output_offsets[layer]
-        kept_at = frame_at + params.kept_offsets[layer]
+        size = layers.kept_offsets[layer] - layers.output_offsets[layer]
+        g.output_offset = BLOCK * layers.output_offsets[layer] + row * size
+        outputs_at = frame_at + layers.output_offsets[layer]
+        kept_at = frame_at + layers.kept_offsets[layer]
         unpool(batch.outputs, outputs_at, kept_at, workspace.deltas, kept_delta_at, g)
     if workspace.gradients.shape[0] > 0:
         if layer == 0:
@@ -349,7 +333,7 @@ def _convolution(
         fold(workspace.patches, batch.grad_frames[frame], batch.grad_frames.shape[1], g)
         return
     below = layer - 1
-    g.input_offset = BLOCK * params.kept_offsets[below] + row * _stride(params, below)
-    num_inputs = num_kept(params.geometries[below])
+    g.input_offset = BLOCK * layers.kept_offsets[below] + row * _stride(layers, below)
+    num_inputs = _num_kept(layers.geometries[below])
     fold(workspace.patches, workspace.deltas, num_inputs, g)
     rectify(workspace.deltas, g.input_offset, batch.outputs, input_offset, num_inputs)

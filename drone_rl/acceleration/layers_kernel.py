@@ -168,15 +168,6 @@ def pool(values: wp.array[float], g: LayerGeometry) -> None:
     ...
 
 
-@wp.func
-def num_kept(g: LayerGeometry) -> int:
-    """Return the numbers of a frame that a layer keeps: its outputs after pooling."""
-    if g.pool_size == 0:
-        return g.num_patches * g.num_outs
-    rows = g.num_patches / g.patches_per_row / g.pool_size
-    return rows * (g.patches_per_row / g.pool_size) * g.num_outs
-
-
 @wp.func_native("""
 const float* from = source.data + source_at;
 float* to = target.data + target_at;
@@ -191,74 +182,52 @@ def copy(
 
 @wp.struct
 class Layers:
-    """A network: convolutions run frame by frame, linear layers on several frames at once."""
+    """A network, and where the outputs of each layer are in the row of a frame."""
 
     geometries: wp.array[LayerGeometry]
-    """One for each layer; offsets are those in a workspace."""
+    """Without the offsets of inputs and outputs, but with that of the first pixel in a frame."""
     weights: wp.array[float]
-    num_convolutions: int
-    features_size: int
-    """Size of the convolutions' output for one frame."""
-    logits_offset: int
-    """Offset of the logits in a workspace."""
-    logits_stride: int
-    """Stride between the logits of two frames."""
     output_offsets: wp.array[int]
-    """Offset of each layer in the saved outputs of a frame."""
+    """Offset of each layer's outputs before pooling; last, the size of a row."""
     kept_offsets: wp.array[int]
-    """The same of its outputs after pooling."""
+    """Offset of each layer's outputs after pooling, which are the inputs of the next layer."""
+    num_convolutions: int
+
+
+@wp.func
+def row_size(layers: Layers) -> int:
+    """Return the numbers of a row: the outputs of all layers for one frame, with padding."""
+    return layers.output_offsets[layers.geometries.shape[0]]
 
 
 @wp.func
 def run_convolutions(
-    layers: Layers, frame: wp.array[float], workspace: wp.array[float], row: int
+    layers: Layers, frame: wp.array[float], outputs: wp.array[float], row: int
 ) -> None:
-    """Compute the convolutions of one frame of gray pixels.
-
-    `row` is its number among the frames whose linear layers are computed together.
-    """
+    """Compute the outputs of the convolutions for one frame of gray pixels."""
+    at = row * row_size(layers)
     for layer in range(layers.num_convolutions):
-        geometry = layers.geometries[layer]
-        if layer == layers.num_convolutions - 1:
-            if geometry.pool_size > 0:
-                geometry.pooled_offset += row * layers.features_size
-            else:
-                geometry.output_offset += row * layers.features_size
+        g = layers.geometries[layer]
+        g.output_offset = at + layers.output_offsets[layer]
         if layer == 0:
-            multiply(frame, layers.weights, workspace, geometry)
+            multiply(frame, layers.weights, outputs, g)
         else:
-            multiply(workspace, layers.weights, workspace, geometry)
-        if geometry.pool_size > 0:
-            pool(workspace, geometry)
+            g.input_offset = at + layers.kept_offsets[layer - 1]
+            multiply(outputs, layers.weights, outputs, g)
+        if g.pool_size > 0:
+            g.pooled_offset = at + layers.kept_offsets[layer]
+            pool(outputs, g)
 
 
 @wp.func
-def run_linear(layers: Layers, workspace: wp.array[float], count: int) -> None:
-    """Compute the linear layers of the first `count` frames."""
+def run_linear(layers: Layers, outputs: wp.array[float], first: int, count: int) -> None:
+    """Compute the outputs of the linear layers for `count` frames, from row `first` on, at once."""
+    size = row_size(layers)
     for layer in range(layers.num_convolutions, layers.geometries.shape[0]):
-        geometry = layers.geometries[layer]
-        geometry.num_patches = count
-        multiply(workspace, layers.weights, workspace, geometry)
-
-
-@wp.func
-def save_outputs(
-    layers: Layers,
-    first: int,
-    last: int,
-    workspace: wp.array[float],
-    row: int,
-    outputs: wp.array[float],
-) -> None:
-    """Copy the outputs of layers `first` to `last` - 1 of one frame out of the workspace."""
-    for layer in range(first, last):
-        geometry = layers.geometries[layer]
-        size = geometry.num_patches * geometry.num_outs
-        offset = geometry.output_offset
-        if geometry.pool_size > 0:
-            copy(workspace, offset, outputs, layers.output_offsets[layer], size)
-            size = num_kept(geometry)
-            offset = int(geometry.pooled_offset)
-        if layer >= layers.num_convolutions - 1:
-            offset += row * size
-        copy(workspace, offset, outputs, layers.kept_offsets[layer], size)
+        g = layers.geometries[layer]
+        g.input_offset = first * size + layers.kept_offsets[layer - 1]
+        g.output_offset = first * size + layers.output_offsets[layer]
+        g.num_patches = count
+        g.row_stride = size
+        g.output_stride = size
+        multiply(outputs, layers.weights, outputs, g)

@@ -1,5 +1,6 @@
 """A network laid out for kernels, see `layers_kernel`."""
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import accumulate
@@ -94,6 +95,19 @@ class PackedLayer(NamedTuple):
         }
 
     @property
+    def transposed(self) -> dict[str, int]:
+        """Geometry from the gradients of outputs to those of patches."""
+        return {
+            "num_patches": math.prod(self.output_shape),
+            "patches_per_row": 1,
+            "row_stride": self.num_outs,
+            "kernel_rows": 1,
+            "kernel_row_length": self.num_outs,
+            "num_outs": self.num_inputs,
+            "output_stride": self.num_inputs,
+        }
+
+    @property
     def parameters(self) -> tuple[Tensor, Tensor]:
         """Weight and bias."""
         return self.layer.get_parameter("weight"), self.layer.get_parameter("bias")
@@ -113,43 +127,6 @@ class PackedLayer(NamedTuple):
         numbers = torch.arange(first, last).view(outs, *inner)
         by_pixel[:, :, : self.channels, :outs] = numbers.permute(2, 3, 1, 0)
         return order
-
-
-class Order:
-    """Maps parameters to packed weights and back."""
-
-    def __init__(self, layers: Sequence[PackedLayer]) -> None:
-        self._layers = layers
-        first, packed, transposed = 1, [], []
-        for layer in layers:
-            order = layer.order(first)
-            packed.append(in_panels(order))
-            unbiased = torch.cat([order.new_zeros(1, layer.num_inputs), order[1:].T])
-            transposed.append(in_panels(unbiased) if layer.has_transpose else order[:0, 0])
-            first += sum(parameter.numel() for parameter in layer.parameters)
-        self._packed, self._transposed = torch.cat(packed), torch.cat(transposed)
-        self._unpacked = torch.empty(first, dtype=torch.int32)
-        self._unpacked[self._packed.long()] = torch.arange(len(self._packed), dtype=torch.int32)
-        self.weight_offsets = list(accumulate(map(len, packed), initial=0))
-        """Offsets of the layers in the packed weights, and the size of these."""
-        self.transposed_offsets = list(accumulate(map(len, transposed), initial=0))
-        """The same of the transposed weights."""
-
-    @torch.no_grad()
-    def pack(self, weights: Tensor, transposed: Tensor | None = None) -> None:
-        """Write the packed weights, and the transposed ones without biases."""
-        parameters = [p.flatten() for layer in self._layers for p in layer.parameters]
-        flat = torch.cat([weights.new_zeros(1), *parameters])
-        torch.index_select(flat, 0, self._packed, out=weights)
-        if transposed is not None:
-            torch.index_select(flat, 0, self._transposed, out=transposed)
-
-    def unpack(self, gradients: Tensor) -> list[Tensor]:
-        """Return the gradient of each weight and bias from that of the packed weights."""
-        flat = gradients.index_select(0, self._unpacked[1:])
-        parameters = [p for layer in self._layers for p in layer.parameters]
-        parts = flat.split([p.numel() for p in parameters])
-        return [part.view(p.shape) for part, p in zip(parts, parameters, strict=True)]
 
 
 class OutputOffsets(NamedTuple):
@@ -183,24 +160,14 @@ def in_panels(by_row: Tensor) -> Tensor:
     return by_row.view(len(by_row), -1, WIDTH).transpose(0, 1).flatten()
 
 
-def as_geometries(layers: Iterable[Mapping[str, int]]) -> Any:
-    """Return an array of `LayerGeometry` from the fields of each layer; 0 for missing ones."""
-    kind: Any = LayerGeometry
-    dtype = np.dtype(kind.numpy_dtype())
-    rows = [tuple(fields.get(name, 0) for name in dtype.names or ()) for fields in layers]
-    return wp.array(np.array(rows, dtype), dtype=kind, device="cpu")
-
-
-def as_indices(numbers: Sequence[int]) -> Any:
-    """Return an array of int32."""
-    return wp.from_torch(torch.tensor(numbers, dtype=torch.int32))
-
-
 class Reasons(tuple[str, ...]):
     """Reasons why an implementation does not support a configuration."""
 
     def __str__(self) -> str:
         return "; ".join(self)
+
+
+_LETTERS = {nn.Conv2d: "c", nn.ReLU: "r", nn.MaxPool2d: "p", nn.Flatten: "f", nn.Linear: "l"}
 
 
 def unsupported(network: nn.Module) -> list[str]:
@@ -245,51 +212,83 @@ def packed_layers(network: nn.Module) -> list[PackedLayer]:
     return packed
 
 
-_LETTERS = {nn.Conv2d: "c", nn.ReLU: "r", nn.MaxPool2d: "p", nn.Flatten: "f", nn.Linear: "l"}
-
-
 class PackedNetwork:
     """A network that kernels support, with its weights laid out for them."""
 
-    def __init__(self, network: nn.Module, num_frames: int, first_pixel: int = 0) -> None:
-        """Pack a network, see `unsupported`.
+    def __init__(self, network: nn.Module, first_pixel: int = 0) -> None:
+        """Lay out a network, see `unsupported`; call `pack` for its weights.
 
-        Args:
-            network: The network.
-            num_frames: Frames whose linear layers are computed at once.
-            first_pixel: Index of the first pixel of a frame that the network sees.
+        `first_pixel` is the index of the first pixel of a frame that the network sees.
         """
-        packed = packed_layers(network)
-        self._order = Order(packed)
-        self.weights = torch.zeros(self._order.weight_offsets[-1])
+        layers = self.layers = packed_layers(network)
+        first, packed, transposed = 1, list[Tensor](), list[Tensor]()
+        for layer in layers:
+            order = layer.order(first)
+            packed.append(in_panels(order))
+            unbiased = torch.cat([order.new_zeros(1, layer.num_inputs), order[1:].T])
+            transposed.append(in_panels(unbiased) if layer.has_transpose else order[:0, 0])
+            first += sum(parameter.numel() for parameter in layer.parameters)
+        self._packed, self._transposed = torch.cat(packed), torch.cat(transposed)
+        self._unpacked = torch.empty(first, dtype=torch.int32)
+        self._unpacked[self._packed.long()] = torch.arange(len(self._packed), dtype=torch.int32)
+        self.weights = torch.zeros(len(self._packed))
         """Packed weights."""
-        geometries, inputs, outputs = [], first_pixel, 0
-        for i, (layer, weights) in enumerate(zip(packed, self._order.weight_offsets, strict=False)):
-            is_last = i == len(packed) - 1
-            offsets = {"input_offset": inputs, "weights_offset": weights, "output_offset": outputs}
-            geometries.append({**offsets, **layer.geometry, "is_rectified": int(not is_last)})
-            if layer.pool_size:
-                outputs += layer.output_size
-                geometries[-1]["pooled_offset"] = outputs
-            is_alone = not is_last and packed[i + 1].is_convolution
-            inputs = outputs
-            outputs += layer.pooled_size * (1 if is_alone else num_frames)
-        self.workspace_size = outputs
-        """Numbers of the buffer that kernels need."""
-        layers: Any = Layers()
-        layers.geometries = as_geometries(geometries)
-        layers.weights = wp.from_torch(self.weights)
-        layers.num_convolutions = sum(layer.is_convolution for layer in packed)
-        layers.features_size = packed[layers.num_convolutions].num_inputs
-        layers.logits_offset, layers.logits_stride = inputs, packed[-1].num_outs
-        offsets = OutputOffsets.of(packed)
-        self.num_activations = offsets.outputs[-1]
-        """Numbers of the outputs of all layers of a frame."""
-        layers.output_offsets = as_indices(offsets.outputs)
-        layers.kept_offsets = as_indices(offsets.kept)
-        self.layers = layers
+        self.transposed_weights = torch.zeros(len(self._transposed))
+        """The same for the backward pass, without biases."""
+        self.offsets = OutputOffsets.of(layers)
+        self.arrays: Any = Layers()
         """For kernels."""
+        self.arrays.geometries = _as_geometries(
+            {
+                **layer.geometry,
+                "input_offset": first_pixel,
+                "weights_offset": at,
+                "is_rectified": int(layer is not layers[-1]),
+            }
+            for layer, at in zip(layers, _starts(packed), strict=True)
+        )
+        self.arrays.weights = wp.from_torch(self.weights)
+        self.arrays.output_offsets = _as_indices(self.offsets.outputs)
+        self.arrays.kept_offsets = _as_indices(self.offsets.kept)
+        self.arrays.num_convolutions = sum(layer.is_convolution for layer in layers)
+        self.transposed: Any = _as_geometries(
+            {**layer.transposed, "weights_offset": at}
+            for layer, at in zip(layers, _starts(transposed), strict=True)
+        )
+        """Geometries of the backward pass, for kernels."""
 
-    def update(self) -> None:
-        """Pack the present weights."""
-        self._order.pack(self.weights)
+    @property
+    def parameters(self) -> list[Tensor]:
+        """Weight and bias of each layer."""
+        return [parameter for layer in self.layers for parameter in layer.parameters]
+
+    @torch.no_grad()
+    def pack(self) -> None:
+        """Write the present weights to `weights` and `transposed_weights`."""
+        flat = torch.cat([torch.zeros(1), *(p.flatten() for p in self.parameters)])
+        torch.index_select(flat, 0, self._packed, out=self.weights)
+        torch.index_select(flat, 0, self._transposed, out=self.transposed_weights)
+
+    def unpack(self, gradients: Tensor) -> list[Tensor]:
+        """Return the gradient of each of `parameters` from that of the packed weights."""
+        flat = gradients.index_select(0, self._unpacked[1:])
+        parts = flat.split([p.numel() for p in self.parameters])
+        return [part.view(p.shape) for part, p in zip(parts, self.parameters, strict=True)]
+
+
+def _starts(parts: Sequence[Tensor]) -> list[int]:
+    """Return where each part begins when they are joined."""
+    return list(accumulate(map(len, parts), initial=0))[:-1]
+
+
+def _as_geometries(layers: Iterable[Mapping[str, int]]) -> Any:
+    """Return an array of `LayerGeometry` from the fields of each layer; 0 for missing ones."""
+    kind: Any = LayerGeometry
+    dtype = np.dtype(kind.numpy_dtype())
+    rows = [tuple(fields.get(name, 0) for name in dtype.names or ()) for fields in layers]
+    return wp.array(np.array(rows, dtype), dtype=kind, device="cpu")
+
+
+def _as_indices(numbers: Sequence[int]) -> Any:
+    """Return an array of int32."""
+    return wp.from_torch(torch.tensor(numbers, dtype=torch.int32))

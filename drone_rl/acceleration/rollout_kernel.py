@@ -9,7 +9,7 @@ from typing import Any
 
 import warp as wp
 
-from drone_rl.acceleration.layers_kernel import Layers, run_convolutions, run_linear, save_outputs
+from drone_rl.acceleration.layers_kernel import Layers, copy, row_size, run_convolutions, run_linear
 from drone_rl.sim.rendering.raytrace.plain_kernel import render_image
 from drone_rl.sim.rendering.raytrace.structs_kernel import (
     Geoms,
@@ -49,7 +49,7 @@ class Rollout:
     camera: CameraView
     layers: Layers
     workspaces: wp.array2d[float]
-    """Buffers for activations, one a worker."""
+    """Outputs of all layers for `TOGETHER` frames, one a worker."""
     draws: wp.array2d[float]
     """Uniform samples for actions; below 0 for the most probable one. Shape: (num_envs, steps)."""
     frames: Images
@@ -111,7 +111,6 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
     ) -> int:
         """Render running environments, compute the convolutions; return how many are running."""
         camera = rollout.camera
-        layers = rollout.layers
         running = int(0)
         for env in range(first, last):
             if envs.end_reasons[env] == 0:
@@ -131,11 +130,7 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
                 )
                 frame = rollout.frames.gray[row]
                 standardise(frame, frame.shape[0], camera.mean, camera.deviation)
-                workspace = rollout.workspaces[worker]
-                run_convolutions(layers, frame, workspace, running)
-                if rollout.outputs.shape[0] > 0:
-                    end = layers.num_convolutions
-                    save_outputs(layers, 0, end, workspace, running, rollout.outputs[row])
+                run_convolutions(rollout.layers, frame, rollout.workspaces[worker], running)
                 running += 1
         return running
 
@@ -145,11 +140,13 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
         layers = rollout.layers
         workspace = rollout.workspaces[worker]
         num_actions = rollout.logits.shape[1]
-        at = int(layers.logits_offset)
+        size = row_size(layers)
+        logits_offset = layers.output_offsets[layers.geometries.shape[0] - 1]
         running = int(0)
         for env in range(first, last):
             if envs.end_reasons[env] == 0:
                 row = env * rollout.draws.shape[1] + step
+                at = running * size + logits_offset
                 for i in range(num_actions):
                     rollout.logits[row, i] = workspace[at + i]
                 action = choose(workspace, at, num_actions, rollout.draws[env, step])
@@ -157,9 +154,7 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
                 rollout.rewards[row] = move(envs, env, action)
                 rollout.end_reasons[row] = envs.end_reasons[env]
                 if rollout.outputs.shape[0] > 0:
-                    linear, end = layers.num_convolutions, layers.geometries.shape[0]
-                    save_outputs(layers, linear, end, workspace, running, rollout.outputs[row])
-                at += layers.logits_stride
+                    copy(workspace, running * size, rollout.outputs[row], 0, size)
                 running += 1
 
     @wp.kernel(module="unique", module_options=_OPTIONS)
@@ -174,7 +169,7 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
             running = int(1)
             while step < rollout.draws.shape[1] and running > 0:
                 running = observe(group, end, step, worker, rollout, envs)
-                run_linear(rollout.layers, rollout.workspaces[worker], running)
+                run_linear(rollout.layers, rollout.workspaces[worker], 0, running)
                 act(group, end, step, worker, rollout, envs)
                 step += 1
 

@@ -1,6 +1,6 @@
 """From environment and policy to batches of experience."""
 
-from drone_rl.collectors.batched_collector import BatchedCollector as BatchedCollector
+from drone_rl.collectors.collector import BatchedCollector as BatchedCollector
+from drone_rl.collectors.collector import ThreadedCollector as ThreadedCollector
 from drone_rl.collectors.episodes import EpisodeCollector as EpisodeCollector
 from drone_rl.collectors.rollouts import RolloutCollector as RolloutCollector
-from drone_rl.collectors.threaded import ThreadedCollector as ThreadedCollector

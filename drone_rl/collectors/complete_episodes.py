@@ -10,8 +10,8 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import EnvBase
 
+from drone_rl.acceleration import Reasons
 from drone_rl.collectors.episodes import EpisodeCollector
-from drone_rl.collectors.speedups import Reasons
 from drone_rl.envs import worlds_of
 from drone_rl.envs.rollout import Agent
 from drone_rl.policies.actor import exploring

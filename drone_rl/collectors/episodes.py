@@ -1,7 +1,7 @@
 """Collects complete episodes from a batch of environments."""
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import torch
 from tensordict import TensorDict, TensorDictBase
@@ -10,14 +10,11 @@ from tensordict.utils import NestedKey
 from torch import Tensor
 from torchrl.envs import EnvBase
 
-from drone_rl.collectors.batched_collector import BatchedCollector, BatchOptions
-from drone_rl.collectors.speedups import Reasons, fused_episodes
+from drone_rl.acceleration import FusedEpisodes, Reasons
+from drone_rl.collectors.collector import BatchedCollector, BatchOptions
 from drone_rl.envs.drone_env import Entries
 from drone_rl.envs.rollout import Act, Agent, StepContext, steps
 from drone_rl.sim.tasks import State
-
-if TYPE_CHECKING:
-    from drone_rl.acceleration import FusedEpisodes
 
 
 class EpisodeCollector(BatchedCollector):
@@ -62,8 +59,8 @@ class EpisodeCollector(BatchedCollector):
         self.fused: FusedEpisodes | Reasons = Reasons(["collector.compiled is false"])
         """The kernel that runs the episodes, or the reasons why they are stepped."""
         if compiled:
-            self.fused = fused_episodes(
-                self.base_env, actor, keeps_inputs=keep_actor_entries, num_threads=num_threads
+            self.fused = FusedEpisodes.try_create(
+                self.base_env, actor, keep_actor_entries, num_threads
             )
 
     @property
@@ -77,9 +74,8 @@ class EpisodeCollector(BatchedCollector):
         """Run an episode in every environment, or in the first `num_envs`. Shape: (T_total,)."""
         size = self.env.batch_size[0]
         count = size if num_envs is None else min(num_envs, size)
-        env = self.base_env
-        started = env.start()[torch.arange(count, device=env.device)]
-        batch = None if isinstance(self.fused, Reasons) else self.fused.run(count)
+        started = self.base_env.start()[torch.arange(count, device=self.base_env.device)]
+        batch = None if isinstance(self.fused, Reasons) else self.fused.run(started)
         if batch is None:
             batch = self._step(self._agent, started)
         elif self._info:  # the task's batched step computes it; nothing is rendered

@@ -9,7 +9,7 @@ from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
-from drone_rl.collectors.batched_collector import BatchedCollector, BatchOptions
+from drone_rl.collectors.collector import BatchedCollector, BatchOptions
 from drone_rl.envs.drone_env import Entries
 from drone_rl.envs.rollout import Step, steps
 from drone_rl.utils.errors import InputError
@@ -82,6 +82,7 @@ class RolloutCollector(BatchedCollector):
         self._count = self._count + 1
         return {
             **step.act.entries,
+            "action": step.act.action,
             **self._outcome(step),
             **{("next", name): value for name, value in step.following.inputs.items()},
             ("next", "episode_reward"): self._reward,

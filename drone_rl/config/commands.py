@@ -4,6 +4,8 @@ from typing import Annotated, Any
 
 from drone_rl.config import ActionSettings, CameraSettings, DynamicsSettings, RendererName
 from drone_rl.config.camera import DeviceSettings, RendererSettings
+from drone_rl.config.parts import Parts
+from drone_rl.config.transforms import MOST_TRANSFORMS, Transform
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Listed, Maybe, OneOf, Real, Several, Whole
 from drone_rl.utils.settings import Settings
@@ -134,6 +136,8 @@ class GymnasiumSettings(DeviceSettings):
     """Observations: the camera's image or the state vector."""
     camera: CameraSettings = CameraSettings()
     """Camera of the policy."""
+    transforms: Annotated[tuple[Transform, ...], Parts(Transform, MOST_TRANSFORMS)] = ()
+    """From the camera's image to the observation; by default it stays as it is."""
     dynamics: DynamicsSettings = DynamicsSettings()
     """Vehicle dynamics."""
     actions: ActionSettings = ActionSettings()

@@ -36,6 +36,7 @@ class GymnasiumOptions(DeviceOptions, total=False):
 
     observations: str
     camera: CameraSettings | Mapping[str, Any]
+    transforms: Sequence[Transform] | Mapping[str, Any]
     dynamics: DynamicsSettings | Mapping[str, Any]
     actions: ActionSettings | Mapping[str, Any]
     render_mode: str | None

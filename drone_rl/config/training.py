@@ -29,12 +29,11 @@ from drone_rl.config.learning import (
 )
 from drone_rl.config.networks import Network, SmallCnn
 from drone_rl.config.parts import NetworkOptions, Part, Parts
-from drone_rl.config.transforms import DEFAULT_TRANSFORMS, Transform
+from drone_rl.config.transforms import DEFAULT_TRANSFORMS, MOST_TRANSFORMS, Transform
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Whole
 from drone_rl.utils.settings import Settings
 
-MOST_TRANSFORMS = 16
 DETERMINISTIC = 0.01
 """Entropy in nats below which a policy is practically deterministic."""
 

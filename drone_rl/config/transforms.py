@@ -8,6 +8,8 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Several, Whole, shown
 from drone_rl.utils.settings import prefixed_errors
 
+MOST_TRANSFORMS = 16
+
 
 class Frame(NamedTuple):
     """Shape and type of an image."""

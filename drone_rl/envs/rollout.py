@@ -223,6 +223,11 @@ class ActorAgent:
             self._state[key] = with_rows(self._state.get(key), starting, value)
 
 
+def as_agent(policy: TensorDictModuleBase | Agent) -> Agent:
+    """Return an actor of TorchRL as an agent; agents are returned."""
+    return ActorAgent(policy) if isinstance(policy, TensorDictModuleBase) else policy
+
+
 def _entry(context: StepContext, key: NestedKey) -> Tensor:
     """Return an entry of a `DroneEnv` by TorchRL's key. Shape: (k, *)."""
     if isinstance(key, tuple):

@@ -174,7 +174,7 @@ def _embeddings(settings: FigureSettings, *policies: Policy) -> _Drawn:
         layer, actions = feature_layer(network), scenes.actions
         assert layer is not None
         points, faithful = embed(
-            data.features[layer],
+            data.arrays[f"features/{layer}"],
             perplexity=min(_PERPLEXITY, (len(data) - 1) // 3),
             seed=legacy_seed(settings.seed),
             kernel=settings.kernel,
@@ -238,7 +238,7 @@ def _class_models(settings: FigureSettings, policy: Policy) -> _Drawn:
     )
     header, values = models.rows()
     probabilities = dict(zip(header[1:], map(float, values[1:]), strict=True))
-    return models.image(), caption, {"probabilities": probabilities}
+    return models.figure(), caption, {"probabilities": probabilities}
 
 
 def _attributions(settings: FigureSettings, policy: Policy) -> _Drawn:

@@ -10,13 +10,8 @@ import numpy as np
 from PIL import Image
 
 from drone_rl.config.configuration import from_arguments
-from drone_rl.explanations.class_models import (
-    NO_GRADIENTS,
-    Attempts,
-    image_statistics,
-    visualise,
-)
-from drone_rl.explanations.results import ImageStatistics
+from drone_rl.explanations.class_models import NO_GRADIENTS, best_models, image_statistics
+from drone_rl.explanations.results import BestModels, ImageStatistics
 from drone_rl.explanations.rollouts import collect
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.explanations.settings import (
@@ -71,8 +66,8 @@ class ClassModels(TableResult):
     """Observations optimized for each action of a policy, with one or several settings."""
 
     policy: BasePolicy
-    tried: Mapping[str, Attempts]
-    """Results by title of the settings."""
+    tried: Mapping[str, tuple[ClassModelSettings, BestModels]]
+    """Settings and their results, by title."""
     statistics: ImageStatistics
     """Of the observations in the policy's episodes, the training set."""
     actions: ShownActions
@@ -84,62 +79,57 @@ class ClassModels(TableResult):
         """Return a table of texts: a header, then each setting's probability of each action."""
         order, names = self.actions.order, self.actions.names
         rows = [["settings", *(names[action] for action in order)]]
-        for title, attempts in self.tried.items():
-            reached = attempts.best_values()["probabilities"]
-            rows.append([title, *(f"{reached[action]:.3f}" for action in order)])
+        for title, (_, best) in self.tried.items():
+            rows.append([title, *(f"{best.probabilities[action]:.3f}" for action in order)])
         return rows
 
-    def image(self) -> Image.Image:
+    def figure(self) -> Image.Image:
         """Return the images: a row for each setting, a column for each action.
 
         Black and white are the limits of the observations; without clipping, those of the row.
         """
         tiles, order = [], self.actions.order
-        for title, attempts in self.tried.items():
-            pixels, reached = attempts.best_images(), attempts.best_values()["probabilities"]
+        for title, (settings, best) in self.tried.items():
             low, high = self.statistics.low, self.statistics.high
-            if not attempts.settings.clamp:
-                low, high = float(pixels.min()), float(pixels.max())
+            if not settings.clamp:
+                low, high = float(best.images.min()), float(best.images.max())
             for action in order:
                 start = f"{title}: " if len(self.tried) > 1 and action == order[0] else ""
-                caption = f"{start}{self.actions.names[action]} {reached[action]:.3f}"
-                image = images.shown_picture(pixels[action].numpy(), low, high, self.channels)
+                caption = f"{start}{self.actions.names[action]} {best.probabilities[action]:.3f}"
+                image = images.shown_picture(best.images[action], low, high, self.channels)
                 tiles.append(images.titled(images.enlarge(image), caption))
         return images.gridded(tiles, len(order))
 
     def save(self, folder: Path) -> None:
-        """Write `class_models.png`, `class_models.json`, and all images as `class_models.npz`."""
-        self.image().save(folder / "class_models.png")
+        """Write `class_models.png`, `class_models.json` and `class_models.npz`."""
+        self.figure().save(folder / "class_models.png")
         written = {
             "policy": self.policy.origin["policy"],
             **self.seed.as_dict(),
             "statistics": self.statistics.model_dump(),
             "settings": {
-                title: {**attempts.settings.values(), **attempts.best_values()}
-                for title, attempts in self.tried.items()
+                title: {**settings.values(), **best.model_dump(exclude={"images"})}
+                for title, (settings, best) in self.tried.items()
             },
             **provenance(),
         }
         (folder / "class_models.json").write_text(json.dumps(written, indent=2))
-        images_by_setting = {f"images_{i}": a.images for i, a in enumerate(self.tried.values())}
-        np.savez_compressed(folder / "class_models.npz", **images_by_setting)  # pyright: ignore[reportArgumentType]
+        pixels: dict[str, Any] = {
+            f"images_{i}": of.images for i, (_, of) in enumerate(self.tried.values())
+        }
+        np.savez_compressed(folder / "class_models.npz", **pixels)
 
     def notes(self) -> list[str]:
         """Return a line for each setting that makes some action improbable, and the seed's."""
         lines = []
-        for title, attempts in self.tried.items():
-            reached = attempts.best_values()["probabilities"]
-            failed = [self.actions.names[a] for a in self.actions.order if reached[a] <= 0.5]
-            if failed:
+        for title, (_, best) in self.tried.items():
+            order, reached = self.actions.order, best.probabilities
+            if failed := [self.actions.names[a] for a in order if reached[a] <= 0.5]:
                 lines.append(
                     f"{title}: no image found makes {listed(failed, 'or')} more probable than not; "
                     "the policy or these settings may be the reason, compare gallery=true"
                 )
         return [*lines, Seeded(**self.seed.as_dict()).seed_line()]
-
-    def figure(self) -> Image.Image:
-        """Return the gallery."""
-        return self.image()
 
 
 def class_models(
@@ -178,7 +168,10 @@ def class_models(
         tried = {title: ClassModelSettings(**changed) for title, changed in GALLERY.items()}
     return ClassModels(
         subject,
-        {t: visualise(network, statistics, one, seed=seed.value) for t, one in tried.items()},
+        {
+            title: (one, best_models(network, statistics, [one], seed=seed.value))
+            for title, one in tried.items()
+        },
         statistics,
         shown_actions({"actions": network.actions.as_dict()}),
         channels,

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from drone_rl.collectors.speedups import accelerated_gradients
+from drone_rl.acceleration import with_fused_passes
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.results import BestModels, ClassModel, ImageStatistics
 from drone_rl.explanations.settings import ClassModelSettings
@@ -32,7 +32,11 @@ def section(context: Context) -> ClassModel:
     network = copy.deepcopy(context.network)  # it accumulates gradients
 
     def best(objective: str) -> BestModels:
-        return best_models(search(network, statistics, objective, seed=context.seed.value))
+        tried = [
+            ClassModelSettings(maximize=objective, parameterisation=kind, blur=blur)
+            for kind, blur in itertools.product(("pixel", "fourier"), (0.5, 0.9, 1.4))
+        ]
+        return best_models(network, statistics, tried, seed=context.seed.value)
 
     return ClassModel(
         statistics=statistics,
@@ -42,44 +46,35 @@ def section(context: Context) -> ClassModel:
     )
 
 
-@dataclasses.dataclass(frozen=True)
-class Attempts:
-    """Results of one setting from each random start, for each action."""
-
-    images: Tensor  # (num_actions, starts, C, H, W); optimized observations
-    probabilities: Tensor  # (num_actions, starts); the policy's, of the action
-    roughness: Tensor  # (num_actions, starts); relative to the data set's
-    settings: ClassModelSettings
-
-    def best(self) -> list[int]:
-        """Return each action's most probable start; within `AS_PROBABLE` of it, the smoothest."""
-        highest = self.probabilities.amax(1, keepdim=True)
-        less_probable = self.probabilities < highest - AS_PROBABLE
-        return self.roughness.masked_fill(less_probable, float("inf")).argmin(1).tolist()
-
-    def best_images(self) -> Tensor:
-        """Return the observations of `best`. Shape: (num_actions, C, H, W)."""
-        return torch.stack([self.images[a, i] for a, i in enumerate(self.best())])
-
-    def best_values(self) -> dict[str, list[float]]:
-        """Return probability and roughness of `best`."""
-        return {
-            name: [float(getattr(self, name)[a, i]) for a, i in enumerate(self.best())]
-            for name in ("probabilities", "roughness")
-        }
-
-
-def best_models(tried: Sequence[Attempts]) -> BestModels:
-    """Return the best of attempts with several settings, which have the same number of starts."""
-    fields = ("images", "probabilities", "roughness")
-    joined = {name: torch.cat([getattr(a, name) for a in tried], 1) for name in fields}
-    every = Attempts(**joined, settings=tried[0].settings)
+def best_models(
+    network: ImageNetwork,
+    statistics: ImageStatistics,
+    tried: Sequence[ClassModelSettings],
+    *,
+    seed: int = 0,
+) -> BestModels:
+    """Optimize observations for each action with each of the settings; return the best."""
+    images = torch.cat([optimize(network, statistics, one, seed=seed) for one in tried], 1)
+    actions, flat = range(len(images)), images.flatten(0, 1)
+    with torch.no_grad():
+        every = network.actions.probabilities(network(flat)).unflatten(0, images.shape[:2])
+    probabilities = torch.stack([every[action, :, action] for action in actions])
+    best = most_probable(probabilities, _differences(flat).view_as(probabilities))
     return BestModels(
-        probabilities=tuple(every.best_values()["probabilities"]),
-        attempts=every.probabilities.shape[1],
-        highest=tuple(every.probabilities.amax(1).tolist()),
-        images=every.best_images().numpy(),
+        probabilities=tuple(float(probabilities[a, i]) for a, i in enumerate(best)),
+        attempts=images.shape[1],
+        highest=tuple(probabilities.amax(1).tolist()),
+        images=images[actions, best].numpy(),
     )
+
+
+def most_probable(probabilities: Tensor, roughness: Tensor) -> list[int]:
+    """Return each action's most probable image; within `AS_PROBABLE` of it, the smoothest.
+
+    Both arguments have a row for each action. Shape: (num_actions, N).
+    """
+    less_probable = probabilities < probabilities.amax(1, keepdim=True) - AS_PROBABLE
+    return roughness.masked_fill(less_probable, float("inf")).argmin(1).tolist()
 
 
 def image_statistics(observations: Tensor) -> ImageStatistics:
@@ -93,48 +88,31 @@ def image_statistics(observations: Tensor) -> ImageStatistics:
     )
 
 
-def visualise(
+def optimize(
     network: ImageNetwork,
     statistics: ImageStatistics,
     settings: ClassModelSettings,
     *,
     seed: int = 0,
-) -> Attempts:
-    """Optimize observations for each action from random starts; the network is not changed."""
-    generator, shape = plain_generator(seed), network.in_shape
-    num_actions = len(network.actions.names)
-    start = torch.rand(settings.starts, *shape, generator=generator)
+) -> Tensor:
+    """Optimize observations for each action from random starts; the network is not changed.
+
+    Returns:
+        Shape: (num_actions, starts, C, h, w).
+    """
+    generator, num_actions = plain_generator(seed), len(network.actions.names)
+    start = torch.rand(settings.starts, *network.in_shape, generator=generator)
     start = statistics.low + (statistics.high - statistics.low) * start
     if settings.initial == "constant":
         start = torch.full_like(start, statistics.mean)
-    images = start.repeat(num_actions, 1, 1, 1)
     action = torch.arange(num_actions).repeat_interleave(settings.starts)
-    quick = accelerated_gradients(network, wrt="pixels")
+    quick = with_fused_passes(network, wrt="pixels")
     ascent = _Ascent(quick, action, statistics, settings, generator)
-    optimize = ascent.pixels if settings.parameterisation == "pixel" else ascent.fourier
-    reached = optimize(images)
+    climb = ascent.pixels if settings.parameterisation == "pixel" else ascent.fourier
+    reached = climb(start.repeat(num_actions, 1, 1, 1))
     if not bool(reached.isfinite().all()):
         raise InputError(f"with lr={settings.lr:g} the images diverge; give less, or clamp=true")
-    with torch.no_grad():
-        each = network.actions.probabilities(network(reached)).gather(1, action[:, None])[:, 0]
-    by_action = (num_actions, settings.starts)
-    return Attempts(
-        images=reached.view(*by_action, *shape),
-        probabilities=each.view(by_action),
-        roughness=(_differences(reached) / max(statistics.roughness, 1e-12)).view(by_action),
-        settings=settings,
-    )
-
-
-def search(
-    network: ImageNetwork, statistics: ImageStatistics, objective: str = "logit", *, seed: int = 0
-) -> list[Attempts]:
-    """Try a few settings, each from all starts."""
-    tried = []
-    for kind, blur in itertools.product(("pixel", "fourier"), (0.5, 0.9, 1.4)):
-        settings = ClassModelSettings(maximize=objective, parameterisation=kind, blur=blur)
-        tried.append(visualise(network, statistics, settings, seed=seed))
-    return tried
+    return reached.unflatten(0, (num_actions, settings.starts))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -89,7 +89,6 @@ class Context:
             self.restart(),
             num_episodes=self.settings.data_episodes,
             num_frames=self.settings.frames,
-            meta={"layer": self.layer, "seed": self.seed.value},
         )
 
     @functools.cached_property

@@ -32,7 +32,7 @@ def section(context: Context) -> Tsne:
             "as a torch module made of layers."
         )
     data, settings = context.dataset, context.settings
-    originals = {"features": data.features[layer], "pixels": data.observations}
+    originals = {"features": data.arrays[f"features/{layer}"], "pixels": data.observations}
     maps = {}
     for name, values in originals.items():
         points, measured = embed(

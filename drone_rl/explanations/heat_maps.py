@@ -10,7 +10,7 @@ from captum.attr import IntegratedGradients, LayerGradCam, Saliency
 from torch import Tensor, nn
 from torch.nn import functional
 
-from drone_rl.collectors.speedups import accelerated_gradients
+from drone_rl.acceleration import with_fused_passes
 from drone_rl.explanations.hooks import find_layer, probabilities, spatial_layers
 from drone_rl.explanations.patches import replaced
 from drone_rl.policies import ImageNetwork
@@ -76,7 +76,7 @@ class Explainer:
 
     def integrated_gradients(self, observations: Tensor, actions: Tensor) -> Tensor:
         """Return the absolute path integral from the baseline. Shape: (T, H, W)."""
-        quick = accelerated_gradients(self.network, wrt="pixels")
+        quick = with_fused_passes(self.network, wrt="pixels")
         method = IntegratedGradients(self._forward("probability", quick))
 
         def attribute(x: Tensor, a: Tensor) -> Tensor:

@@ -147,15 +147,6 @@ def rank_correlation(first: NDArray, second: NDArray) -> NDArray:
     return np.divide((a * b).sum(1), norm, out=np.zeros(len(a)), where=norm > 0)
 
 
-def sample_frames(episode: NDArray, most: int) -> NDArray:
-    """Return indices of at most `most` frames of each episode, evenly spaced. Shape: (N,)."""
-    parts = [np.zeros(0, np.int64)]
-    for number in np.unique(episode):
-        rows = np.flatnonzero(episode == number)
-        parts.append(rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(np.int64)])
-    return np.concatenate(parts)
-
-
 def _levels(heat: NDArray) -> NDArray:
     """Round heat so that differences from floating-point errors become ties. Shape kept."""
     peak = np.abs(heat).max(1, keepdims=True)

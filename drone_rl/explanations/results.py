@@ -5,7 +5,6 @@ name, such as "truth.patch_effects". This module imports no torch, so that a rep
 without.
 """
 
-from collections.abc import Container
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -21,7 +20,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
 from drone_rl.utils.intervals import Mean, Share
 from drone_rl.utils.limits import EXPLANATION_BYTES
-from drone_rl.utils.models import Model
+from drone_rl.utils.models import Model, Seeded
 
 Array = np.ndarray
 """An array of a result; the fields say its shape."""
@@ -194,18 +193,6 @@ class Likeness(Median):
     """Of each shuffled policy."""
 
 
-class RandomWeights(Model):
-    """A method's score on a policy and on policies with shuffled weights."""
-
-    score: float
-    best: float
-    mean: float
-    tried: int
-    """Number of shuffled policies."""
-    as_good: int
-    """How many of them scored as much."""
-
-
 class MethodTest(Model):
     """Results of one method; those of tests are missing without frames."""
 
@@ -217,8 +204,6 @@ class MethodTest(Model):
     """How much more it scores than each placebo."""
     pointing: Pointing | None = None
     likeness: Likeness | None = None
-    random_weights: RandomWeights | None = None
-    maps_without_heat: int = 0
 
     @property
     def weakest(self) -> Median | None:
@@ -417,7 +402,7 @@ class Asymmetry(Model):
     worst: tuple[Mirrored, ...]
 
 
-class Explanation(Model):
+class Explanation(Seeded):
     """Everything that is known of one policy; a section that is not computed is None.
 
     Results of other sections are kept under their names. After reading, they are plain values.
@@ -432,10 +417,6 @@ class Explanation(Model):
     date: str
     settings: dict[str, Any]
     """See `ExplainSettings`."""
-    seed: int
-    """Root of all random streams."""
-    seed_is_fixed: bool
-    """Whether it was known before the analysis."""
     seconds: dict[str, float]
     """Time of each section."""
     actions: ShownActions
@@ -475,10 +456,6 @@ class Explanation(Model):
     def untested(self) -> list[str]:
         """Return which of colors, light and sizes were not evaluated."""
         return not_evaluated(self.robustness)
-
-    def others(self, known: Container[str]) -> dict[str, Any]:
-        """Return the results of sections that have no field and are not known."""
-        return {name: of for name, of in (self.model_extra or {}).items() if name not in known}
 
     @classmethod
     def load(cls, folder: Path) -> Self:

@@ -5,15 +5,13 @@ counts no more than a short one.
 """
 
 import dataclasses
-import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import EnvBase
@@ -22,51 +20,26 @@ from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.envs import worlds_of
 from drone_rl.envs.rollout import ActorAgent, Recording, Step, steps
 from drone_rl.explanations.hooks import features, probabilities
-from drone_rl.explanations.scenes import Region, Scenes
+from drone_rl.explanations.scenes import Scenes
 from drone_rl.policies import ImageNetwork, RecurrentNetwork
-from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.dynamics.state import heading_of
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import State, Task
 from drone_rl.trust.agents import PolicyAgent
 
-RENDERED = {
-    "observations": "input of the policy's network, float32 (T, C, h, w)",
-    "probabilities": "the policy's probability of each action, float32 (T, number of actions)",
-    "frames": "RGB images before the action, in the middle of the appearance's ranges and without "
-    "camera faults, as regions and depth: uint8 (T, H, W, 3)",
-    "regions": "what each pixel shows: " + ", ".join(f"{r.value} {r.name.lower()}" for r in Region),
-    "depth": "metres along the optical axis, 0 for the sky, float16 (T, H, W)",
-}
-"""Fields of rendered frames only."""
 _POSE = ("drone", "attitude")
 _SAME = 1e-9  # poses (metres, quaternion) that differ by less are equal up to rounding
 
 
-def step_fields(task: Task[Any], actions: Actions) -> dict[str, str]:
-    """Return the fields of each step; in the file also of every step flown, as "flights/..."."""
-    ends = ", ".join(f"{end.value} {end.name.lower()}" for end in task.ends)
-    return {
-        **actions.fields(),
-        "rewards": "reward of the action, float32 (T,)",
-        "event": "1 where the action reaches a goal, -1 where it misses one, else 0, int8 (T,)",
-        "drone": "position before the action, metres, world frame: x forward, y left, z up (T, 3)",
-        "attitude": "of the drone before the action, quaternion (w, x, y, z) (T, 4)",
-        **task.remembered,
-        "episode": "number of the episode (T,)",
-        "step": "step of the episode (T,)",
-        "end_reason": "after the action: " + ends,
-    }
-
-
 @dataclasses.dataclass
 class RolloutDataset:
-    """Frames of episodes in order of time; see `step_fields` and `RENDERED`."""
+    """Steps of episodes in order of time, as arrays by name; see docs/reference/files.md.
+
+    Frames, regions, depth, probabilities and "features/..." are those of `render_frames` only.
+    """
 
     arrays: dict[str, NDArray]
-    features: dict[str, NDArray]  # output of each recorded layer, by name. Shape: (T, *).
-    meta: dict[str, Any]  # origin; its "fields" describe the arrays
 
     def __len__(self) -> int:
         return len(self.arrays["actions"])
@@ -101,15 +74,12 @@ class RolloutDataset:
             body = begun.moved(place, attitude)
         return task.recall(kept, body)
 
-    def save(self, path: str | Path, flights: "RolloutDataset | None" = None) -> None:
+    def save(self, path: str | Path, flights: "RolloutDataset") -> None:
         """Write the file, with all steps of the episodes as "flights/..."."""
         arrays: dict[str, Any] = dict(self.arrays)  # Any: numpy's allow_pickle
-        arrays |= {f"features/{name}": value for name, value in self.features.items()}
-        if flights is not None:
-            whole = flights.arrays.items()
-            arrays |= {f"flights/{name}": value for name, value in whole if name not in RENDERED}
-        described = json.dumps({**self.meta, "features": list(self.features)})
-        np.savez_compressed(path, meta=described, **arrays)
+        whole = flights.arrays.items()
+        arrays |= {f"flights/{name}": value for name, value in whole if name != "observations"}
+        np.savez_compressed(path, **arrays)
 
 
 def collect(
@@ -118,14 +88,14 @@ def collect(
     *,
     num_episodes: int,
     num_frames: int = 1,
-    meta: dict[str, Any] | None = None,
 ) -> RolloutDataset:
     """Collect at least so many whole episodes and steps of a policy, with sampled actions.
 
-    Only observations are rendered. `meta` is the origin of the policy.
+    Only observations are rendered.
     """
     worlds = worlds_of(env)
-    agent = Recording(ActorAgent(actor), (*worlds.task.entries, *_POSE))
+    task, actions = worlds.task, worlds.dynamics.actions
+    agent = Recording(ActorAgent(actor), (*task.entries, *_POSE))
     episodes = rollout(
         agent,
         env,
@@ -134,14 +104,22 @@ def collect(
         greedy=False,
         exact=True,
         keep=None,
-        info=worlds.task.entries,
+        info=task.entries,
     )
-    assert episodes.steps is not None
-    fields = step_fields(worlds.task, worlds.dynamics.actions)
-    described = {**fields, "observations": RENDERED["observations"]}
-    about = {"greedy": False, **(meta or {}), "fields": described}
-    arrays = _arrays(episodes.steps, worlds.task, worlds.dynamics.actions)
-    return RolloutDataset(arrays, {}, about)
+    batch: Any = episodes.steps
+    info, after = batch["info"], batch["next", "info"]
+    arrays = {
+        "observations": batch["pixels"],
+        **actions.kept(batch["action"]),
+        "rewards": batch["next", "reward"][:, 0],
+        "event": _events(task, info, after),
+        **{name: info[name] for name in _POSE},
+        **task.remember(info),
+        "episode": torch.arange(len(episodes)).repeat_interleave(episodes.length),
+        "step": torch.cat([torch.arange(length) for length in episodes.length.tolist()]),
+        "end_reason": after["end_reason"][:, 0],
+    }
+    return RolloutDataset({name: value.cpu().numpy() for name, value in arrays.items()})
 
 
 def select_frames(episode: NDArray, num_frames: int) -> NDArray:
@@ -156,13 +134,21 @@ def select_frames(episode: NDArray, num_frames: int) -> NDArray:
         short = np.flatnonzero(quota < lengths)[:left]
         more = max(1, left // len(short))
         quota[short] = np.minimum(lengths[short], quota[short] + more)
-    firsts = lengths.cumsum() - lengths
-    return np.concatenate(
-        [
-            first + ((np.arange(count) + 0.5) * length / max(count, 1)).astype(int)
-            for first, length, count in zip(firsts, lengths, quota, strict=True)
-        ]
-    )
+    return spread_frames(episode, quota)
+
+
+def spread_frames(episode: NDArray, most: int | NDArray) -> NDArray:
+    """Return indices of at most `most` frames of each episode, evenly spaced in time.
+
+    `most` is one number, or one of each episode. Shape: (T,) to (N,).
+    """
+    _, firsts, lengths = np.unique(episode, return_index=True, return_counts=True)
+    counts = np.minimum(lengths, most)
+    parts = [
+        first + ((np.arange(count) + 0.5) * length / max(count, 1)).astype(int)
+        for first, length, count in zip(firsts, lengths, counts, strict=True)
+    ]
+    return np.concatenate([np.zeros(0, int), *parts])
 
 
 def render_frames(
@@ -174,8 +160,7 @@ def render_frames(
 ) -> RolloutDataset:
     """Return steps (T,) with frames, ground truth, probabilities and outputs of layers."""
     arrays = {name: value[rows] for name, value in flights.arrays.items()}
-    fields = {**flights.meta["fields"], **RENDERED}
-    dataset = RolloutDataset(arrays, {}, {**flights.meta, "fields": fields})
+    dataset = RolloutDataset(arrays)
     worlds = scenes.worlds
     state = dataset.state(worlds.task, worlds.dynamics).to(worlds.device)
     observations = dataset.tensor("observations")
@@ -184,29 +169,8 @@ def render_frames(
     arrays["depth"] = scenes.depth(state).cpu().numpy().astype(np.float16)
     arrays["probabilities"] = probabilities(network, observations).cpu().numpy()
     for layer in layers:
-        dataset.features[layer] = features(network, observations, layer).cpu().numpy()
+        arrays[f"features/{layer}"] = features(network, observations, layer).cpu().numpy()
     return dataset
-
-
-def _arrays(batch: TensorDictBase, task: Task[Any], actions: Actions) -> dict[str, NDArray]:
-    info = cast(Mapping[str, Tensor], batch["info"])
-    episode = cast(Tensor, batch["collector", "traj_ids"])
-    end_reason = cast(Tensor, batch["next", "info", "end_reason"])[:, 0]
-    starts = torch.cat([episode.new_ones(1, dtype=torch.bool), episode[1:] != episode[:-1]])
-    number = starts.cumsum(0) - 1
-    first = starts.nonzero()[:, 0][number]
-    arrays = {
-        "observations": cast(Tensor, batch["pixels"]),
-        **actions.kept(cast(Tensor, batch["action"])),
-        "rewards": cast(Tensor, batch["next", "reward"])[:, 0],
-        "event": _events(task, info, cast(Mapping[str, Tensor], batch["next", "info"])),
-        **{name: info[name] for name in _POSE},
-        **task.remember(info),
-        "episode": number,
-        "step": torch.arange(len(batch), device=episode.device) - first,
-        "end_reason": end_reason,
-    }
-    return {name: value.cpu().numpy() for name, value in arrays.items()}
 
 
 def _events(task: Task[Any], before: Mapping[str, Tensor], after: Mapping[str, Tensor]) -> Tensor:

@@ -10,9 +10,8 @@ from torch import Tensor
 from drone_rl.explanations import trust
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.hooks import probabilities
-from drone_rl.explanations.patches import sample_frames
 from drone_rl.explanations.results import Outcomes, Truth
-from drone_rl.explanations.rollouts import Step, run_from
+from drone_rl.explanations.rollouts import Step, run_from, spread_frames
 from drone_rl.explanations.scenes import DARK_GROUND, Region, Scenes
 from drone_rl.policies import ImageNetwork
 from drone_rl.sim.rendering import Appearance
@@ -140,7 +139,7 @@ def measure_outcomes(
     """
     task = scenes.task
     ahead = (~task.next_offset(state)[:, 0].isnan()).nonzero()[:, 0].cpu().numpy()
-    rows = ahead[sample_frames(episode[ahead], FLIGHTS_AN_EPISODE)]
+    rows = ahead[spread_frames(episode[ahead], FLIGHTS_AN_EPISODE)]
     start, group = state[torch.from_numpy(rows)].to(scenes.worlds.device), episode[rows]
     target = task.next_target(start)
     variants = {

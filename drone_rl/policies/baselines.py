@@ -1,92 +1,125 @@
-"""Baselines that ignore the images: an oracle, random actions and constant actions."""
+"""Baselines as agents that see no images: the oracle, random actions and constant actions."""
 
+import dataclasses
 from typing import Any
 
 import torch
-from tensordict.nn import TensorDictModule
 from torch import Tensor
 
-from drone_rl.config import BaseTaskSettings
+from drone_rl.envs.rollout import Act, Agent, StepContext
 from drone_rl.sim.actions import Actions
-from drone_rl.sim.tasks import Task, as_task
+from drone_rl.sim.tasks import Task
 from drone_rl.utils.errors import InputError
 
+_NOTHING = -1.0
 
-def oracle_policy(
-    task: BaseTaskSettings | Task[Any], actions: Actions | None = None
-) -> TensorDictModule:
-    """Return a policy that acts by the true state: an upper bound for one that sees images.
 
-    By default its actions are the oracle's own, `OracleRule.actions`.
+class OracleAgent:
+    """The task's oracle: an upper bound for policies that see images.
 
-    Raises:
-        InputError: The task has no oracle, or none for these actions.
+    It compensates for delayed actions. With `only_visible` it knows the exact position of each cube
+    that the segmentation image of the policy's camera, with the same faults, shows in at least one
+    pixel, and nothing about the others.
     """
-    task = as_task(task)
-    rule = task.oracle
-    if rule is None:
-        raise InputError(
-            f"task={task.name} has no oracle; choose a task that has one, or give this one "
-            "a rule that knows the truth (Task.oracle)"
-        )
-    if actions is not None and not rule.can_fly(actions):
-        raise InputError(
-            f"the oracle of task={task.name} acts by {', '.join(rule.actions.names)}, these "
-            f"drones by {', '.join(actions.names)}; choose dynamics that it can fly"
-        )
-    available = actions or rule.actions
-    return TensorDictModule(
-        lambda *entries: rule.decide(entries, available),
-        in_keys=[("info", name) for name in rule.reads],
-        out_keys=["action"],
-    )
+
+    needs_only_hiding_faults = True
+
+    def __init__(self, *, only_visible: bool = False) -> None:
+        self._only_visible = only_visible
+
+    def act(self, context: StepContext) -> Act:
+        """See `Agent`."""
+        worlds, rule = context.worlds, context.worlds.task.oracle
+        assert rule is not None
+        body = context.state.body
+        for action in context.pending:
+            body = worlds.dynamics.step(body, action)
+        info = worlds.info(dataclasses.replace(context.state, body=body))
+        if self._only_visible:
+            info["next_cube"] = self._first_visible(context, info["next_cube"])
+        return Act(rule.decide([info[name] for name in rule.reads], context.actions))
+
+    def _first_visible(self, context: StepContext, next_cube: Tensor) -> Tensor:
+        """Return the index of the nearest visible cube, or the number of cubes. Shape: (n, 1)."""
+        props = torch.tensor([*context.worlds.scene.props, -1], device=next_cube.device)
+        numbers = props[context.render("segmentation").long()].float()[:, None]
+        faults, starts = context.observer.faults, context.starts
+        numbers = faults(numbers, context.rows, starts, _NOTHING).flatten(1)
+        count = context.worlds.task.places(context.state).shape[1]  # distractors come after
+        is_cube = (numbers >= next_cube) & (numbers < count)
+        visible = torch.where(is_cube, numbers, torch.full_like(numbers, count))
+        return visible.amin(-1, keepdim=True).long()
 
 
-def random_policy(actions: Actions, generator: torch.Generator) -> TensorDictModule:
-    """Return a policy that samples every action with the same probability."""
-    return TensorDictModule(
-        lambda done: actions.sample(done.shape[:-1], generator),
-        in_keys=["done"],
-        out_keys=["action"],
-    )
+class RandomAgent:
+    """Takes every action with the same probability."""
+
+    def __init__(self, generator: torch.Generator) -> None:
+        self._generator = generator
+
+    def act(self, context: StepContext) -> Act:
+        """See `Agent`."""
+        return Act(context.actions.sample((len(context.rows),), self._generator))
 
 
-def constant_policy(action: int | Tensor) -> TensorDictModule:
-    """Return a policy that always takes one action: a number, or a tensor of one environment."""
-    one = torch.as_tensor(action)
-    return TensorDictModule(
-        lambda done: one.expand(*done.shape[:-1], *one.shape).to(done.device, copy=True),
-        in_keys=["done"],
-        out_keys=["action"],
-    )
+class ConstantAgent:
+    """Always takes one action: a number, or a tensor of one environment."""
+
+    def __init__(self, action: int | Tensor) -> None:
+        self._action = torch.as_tensor(action)
+
+    def act(self, context: StepContext) -> Act:
+        """See `Agent`."""
+        rows, one = context.rows, self._action
+        return Act(one.expand(len(rows), *one.shape).to(rows.device, copy=True))
 
 
 def make_baseline(
-    name: str,
-    task: BaseTaskSettings | Task[Any],
-    generator: torch.Generator,
-    actions: Actions | None = None,
-) -> TensorDictModule:
-    """Build a baseline of a task: "oracle" or one of its random and constant baselines.
+    name: str, task: Task[Any], actions: Actions, generator: torch.Generator
+) -> Agent:
+    """Return a baseline of a task: "oracle" or one of its random and constant baselines.
 
-    By default its actions are those of the task's default dynamics; `generator` samples random
-    ones. Raises an `InputError` if the task has no oracle, or the drones have no such action.
+    Args:
+        name: The baseline.
+        task: The task.
+        actions: The action space of the drones.
+        generator: Source of random actions.
+
+    Raises:
+        InputError: The task has no oracle, or the drones lack an action that the baseline needs.
     """
-    task = as_task(task)
-    actions = actions or task.make_dynamics().actions
-    if name == "oracle":
-        return oracle_policy(task, actions)
     if name == "random":
-        return random_policy(actions, generator)
+        return RandomAgent(generator)
+    if name == "oracle":
+        _check_oracle(task, actions)
+        return OracleAgent()
     if name not in actions.names:
         raise InputError(
             f"baseline={name} of task={task.name} is no action of these drones, which have "
             f"{', '.join(actions.names)}; name some of these in Task.blind_baselines"
         )
-    return constant_policy(actions.always(name))
+    return ConstantAgent(actions.always(name))
 
 
 def check_baselines(task: Task[Any], actions: Actions) -> None:
     """Raise an `InputError` if these actions lack what a baseline or the oracle of a task needs."""
     for name in (*task.blind_baselines, "oracle"):
-        make_baseline(name, task, torch.Generator(), actions)
+        make_baseline(name, task, actions, torch.Generator())
+
+
+def _check_oracle(task: Task[Any], actions: Actions) -> None:
+    if task.oracle is None:
+        raise InputError(
+            f"task={task.name} has no oracle; choose a task that has one, or give this one "
+            "a rule that knows the truth (Task.oracle)"
+        )
+    if not task.oracle.can_fly(actions):
+        raise InputError(
+            f"the oracle of task={task.name} acts by {', '.join(task.oracle.actions.names)}, these "
+            f"drones by {', '.join(actions.names)}; choose dynamics that it can fly"
+        )
+
+
+def has_visible_oracle(task: Task[Any]) -> bool:
+    """Return whether a task has an oracle that can be limited to visible cubes."""
+    return task.oracle is not None and "next_cube" in task.oracle.reads

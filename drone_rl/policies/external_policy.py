@@ -23,7 +23,15 @@ from drone_rl.config import (
 )
 from drone_rl.config.configuration import Changes, as_changes
 from drone_rl.config.options import DynamicsOptions, TaskOptions
-from drone_rl.config.transforms import Frame, Gray, Rgb, Standardize, Transform, as_transforms
+from drone_rl.config.transforms import (
+    Fault,
+    Frame,
+    Gray,
+    Rgb,
+    Standardize,
+    Transform,
+    as_transforms,
+)
 from drone_rl.policies import ExternalNetwork
 from drone_rl.policies.environment import EnvOptions, make_env
 from drone_rl.policies.external_network import Function, Logits
@@ -215,12 +223,14 @@ def policy_from(
         appearance=trained_in,
     )
     policy.make_network()  # raises errors early
+    clean = tuple(step for step in policy.transforms if not isinstance(step, Fault))
+    checked = dataclasses.replace(policy, transforms=clean)
     if observations is None:
-        check_on_episodes(policy)
+        check_on_episodes(checked)
     else:
         model: Any = network
         predict = functools.partial(model.predict, transforms=before_wrappers)
-        check_on_episodes(policy, predict, observations.names)
+        check_on_episodes(checked, predict, observations.names)
     return policy
 
 

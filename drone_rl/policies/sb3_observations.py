@@ -39,7 +39,7 @@ from drone_rl.utils.schema import Instance, Whole
 
 Function = Callable[[NDArray[Any]], NDArray[Any]]
 """A batch of observations to a batch of observations."""
-_LIBRARIES = ("gymnasium.", "stable_baselines3.")
+_LIBRARIES = ("gymnasium.", "stable_baselines3.", "drone_rl.")
 _NEUTRAL = {
     "Autoreset",
     "DictInfoToList",
@@ -52,6 +52,7 @@ _NEUTRAL = {
     "RecordEpisodeStatistics",
     "RecordVideo",
     "RenderCollection",
+    "Sb3Worlds",
     "SyncVectorEnv",
     "TimeLimit",
     "VecCheckNan",
@@ -89,12 +90,10 @@ class Observations:
             "no environment is given; give drone_rl.policy_from env=, the environment of the "
             "training with its wrappers"
         )
-        first = space if world is None else _space_of(world)
-        if _is_color(first):
-            self.transforms = (Rgb(),)
-            self.conditions.setdefault("camera", _camera(first))
-        if wrappers and isinstance(wrappers[0], Sb3Worlds):
-            self.transforms, wrappers = wrappers[0].transforms, wrappers[1:]
+        if world is not None:
+            self.transforms = world.batch.options.transforms or (Rgb(),)
+        elif _is_color(space):
+            self.transforms, self.conditions["camera"] = (Rgb(),), _camera(space)
         unknown = [i for i, wrapper in enumerate(wrappers) if not _is_known(wrapper)]
         if unknown:
             self.transforms = None
@@ -167,8 +166,9 @@ class Observations:
             transforms: Transforms up to the wrappers, if those of the environment are unknown.
         """
         first = transforms if self.transforms is None else self.transforms
-        pixels = Pipeline([transform.make() for transform in first or ()])(frames)
-        seen = [one[None] for one in _into(self._inner)(pixels.numpy())]
+        pipeline = Pipeline([transform.make() for transform in first or ()])
+        pixels = [pipeline(frame[None], starts=not i) for i, frame in enumerate(frames)]
+        seen = [_into(self._inner)(one.numpy()) for one in pixels]
         for wrapper in self._wrappers:
             if isinstance(wrapper, VecFrameStack):
                 seen = _stacked(wrapper, seen)
@@ -319,8 +319,6 @@ def _keeps(wrapper: Any) -> bool:
     """Return whether observations and actions pass a wrapper unchanged."""
     if isinstance(wrapper, VecNormalize):
         return not wrapper.norm_obs
-    if isinstance(wrapper, Sb3Worlds):
-        return not wrapper.transforms
     kind = type(wrapper)
     is_library = f"{kind.__module__}.".startswith(_LIBRARIES)
     return (is_library and kind.__name__ in _NEUTRAL) or any(
@@ -337,7 +335,7 @@ def _changes_actions(wrapper: Any) -> bool:
 def _is_known(wrapper: Any) -> bool:
     if isinstance(wrapper, ObservationWrapper):
         return type(wrapper).step is ObservationWrapper.step
-    return isinstance(wrapper, VecNormalize | VecTransposeImage | VecFrameStack | Sb3Worlds)
+    return isinstance(wrapper, VecNormalize | VecTransposeImage | VecFrameStack)
 
 
 class _Spaces(Env[Any, Any]):
@@ -351,8 +349,6 @@ class _Spaces(Env[Any, Any]):
 
 def _function(wrapper: Any) -> Function:
     """Return what a wrapper without memory does to a batch, with a copy of its statistics."""
-    if isinstance(wrapper, Sb3Worlds):
-        return wrapper.observe
     if isinstance(wrapper, VecTransposeImage):
         return VecTransposeImage.transpose_image
     if isinstance(wrapper, VecNormalize):

@@ -9,8 +9,8 @@ from torch import Tensor
 
 from drone_rl.envs import base_env
 from drone_rl.envs.rollout import ActorAgent, steps
-from drone_rl.policies.policy import BasePolicy
 from drone_rl.policies.networks import ImageNetwork
+from drone_rl.policies.policy import BasePolicy
 from drone_rl.utils.errors import InputError
 
 _ENVIRONMENTS, _RESETS, _STEPS = 2, 2, 6

@@ -37,7 +37,7 @@ class Components(NamedTuple):
     generators: dict[str, torch.Generator]
     """Random streams of this process, by name."""
     activations: Any = None
-    """`FusedCollector.activations`, if a fused collector alone makes the batches."""
+    """`FusedEpisodes.activations`, if a fused collector alone makes the batches."""
 
 
 def joined(collector: Any, groups: Sequence[EnvGroup]) -> Components:

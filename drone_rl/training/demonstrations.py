@@ -29,8 +29,8 @@ from drone_rl.config.configuration import from_arguments
 from drone_rl.config.options import UnseededTrainOptions
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.envs.rollout import ActorAgent, Recording
-from drone_rl.policies.baselines import oracle_policy
+from drone_rl.envs.rollout import Recording
+from drone_rl.policies.baselines import make_baseline
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import make_dynamics
 from drone_rl.sim.tasks import as_task
@@ -322,7 +322,8 @@ def record_oracle(
         appearance=settings.appearance,
     )
     with closing(env):
-        oracle = ActorAgent(oracle_policy(settings.task, env.worlds.dynamics.actions))
+        worlds, actions = env.worlds, env.worlds.dynamics.actions
+        oracle = make_baseline("oracle", worlds.task, actions, torch.Generator())
         batch: Any = rollout(Recording(oracle), env, flights, keep=None).steps
     conditions, paths = FlightConditions.of(settings), []
     for number in range(flights):

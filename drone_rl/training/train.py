@@ -14,8 +14,8 @@ from typing import Any, Unpack
 
 import torch
 
+from drone_rl.acceleration import with_fused_passes
 from drone_rl.collectors import EpisodeCollector, ThreadedCollector
-from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.config.learning import Episodes, Reinforce
 from drone_rl.config.options import TrainOptions
 from drone_rl.config.registry import implements, modules_of
@@ -205,7 +205,7 @@ def reinforce_learner(
     """Make the learner without a critic; its loss has the last two settings."""
     limits, network, actor = settings.trainer, parts.network, parts.collector.actor
     may_fuse = limits.compiled and not network.is_recurrent
-    fused = functools.partial(accelerated_gradients, activations=parts.activations)
+    fused = functools.partial(with_fused_passes, activations=parts.activations)
     learning = fused(network, limits.num_threads) if may_fuse else network
     is_fused = learning is not network  # its kernel has `limits.num_threads` threads
     if is_fused:

@@ -41,10 +41,10 @@ def run_baselines(
     source = env.side_streams(torch.tensor([0]), _RANDOM_ACTIONS)[0]
     generator = torch.Generator(env.device).manual_seed(int(source.integers(2**63)))
     names = (*task.blind_baselines, "oracle")
-    actors = {name: make_baseline(name, task, generator, actions) for name in names}
+    agents = {name: make_baseline(name, task, actions, generator) for name in names}
     results = {}
-    for name, actor in actors.items():
+    for name, agent in agents.items():
         env.load_state_dict(worlds)
-        results[name] = rollout(actor, env, episodes)
+        results[name] = rollout(agent, env, episodes)
     env.close()
     return results

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from drone_rl.config.commands import JudgeSettings, ShiftSettings
+from drone_rl.policies.baselines import OracleAgent
 from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.zoo import shifts_path
-from drone_rl.trust.agents import OracleAgent
 from drone_rl.trust.axes import AXES, Axis, find_axes
 from drone_rl.trust.axes_table import NAMES
 from drone_rl.trust.domain import Prober
@@ -178,7 +178,7 @@ def recheck_domain(
     }
     count = sum(map(len, tried.values())) + 1
     with closing(PairedEvaluator(subject, settings.domain_flights, seed.value)) as evaluator:
-        oracle = evaluator.run(Condition(), agent=OracleAgent(only_visible=False)).episodes
+        oracle = evaluator.run(Condition(), agent=OracleAgent()).episodes
         prober = Prober(evaluator, oracle, settings.good_share, plain_part=1 / count)
         contradictions = [contradicted(None, 0.0, "", prober.plain)]
         for axis, strengths in tried.items():

@@ -23,7 +23,8 @@ import torch
 from torch import Tensor
 
 from drone_rl.collectors.complete_episodes import CompleteEpisodes
-from drone_rl.trust.agents import OracleAgent, PolicyAgent, has_oracle
+from drone_rl.policies.baselines import OracleAgent, has_visible_oracle
+from drone_rl.trust.agents import PolicyAgent
 from drone_rl.trust.axes import Axis
 from drone_rl.trust.paired_evaluation import PairedEvaluator
 from drone_rl.trust.perturbations import Condition
@@ -182,10 +183,11 @@ class Prober:
     def _explain(self, axis: Axis, end: Any, strength: float, probed: Probe) -> FailedEnd:
         value = finite(axis.value(strength, self._evaluator.subject))
         failed = FailedEnd(**dict(probed), end=end, value=value)
-        if probed.refused is not None or not has_oracle(self._oracle.task):
+        if probed.refused is not None or not has_visible_oracle(self._oracle.task):
             return failed
         condition = axis.make(strength, self._evaluator.subject)
-        success = self._evaluator.run(condition, agent=OracleAgent()).episodes.success
+        agent = OracleAgent(only_visible=True)
+        success = self._evaluator.run(condition, agent=agent).episodes.success
         seen = proportion(int(success.sum()), len(success))
         return failed.replace(oracle=seen, impossible=seen.upper95 < self._possible)
 

@@ -22,8 +22,8 @@ from drone_rl.sim.tasks import as_task
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.trust.baselines import run_baselines
 from drone_rl.trust.metrics import summarise
-from drone_rl.trust.results import Difference, Figures
 from drone_rl.trust.repetition import require_repeatable
+from drone_rl.trust.results import Difference, Figures
 from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import Mean, Share

@@ -5,7 +5,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Unpack, cast, overload
 
-from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
 from drone_rl.config import AppearanceSettings, DynamicsSettings, TaskSettings
@@ -13,6 +12,7 @@ from drone_rl.config.commands import HeldOutSettings, JudgeSettings
 from drone_rl.config.configuration import Changes, as_changes, from_arguments
 from drone_rl.config.options import JudgeOptions
 from drone_rl.envs import DroneEnv
+from drone_rl.envs.rollout import Agent
 from drone_rl.policies.baselines import make_baseline
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
@@ -300,7 +300,7 @@ def _baseline(
     dynamics: DynamicsSettings,
     settings: HeldOutSettings,
     seed: RootSeed,
-) -> Iterator[tuple[EnvBase, TensorDictModuleBase]]:
+) -> Iterator[tuple[EnvBase, Agent]]:
     """Environments without images, and a baseline."""
     env = DroneEnv(
         settings.batch_size,
@@ -313,6 +313,6 @@ def _baseline(
     )
     generator = torch_generator(seed.value, Stream.ACTIONS, device=env.device)
     try:
-        yield env, make_baseline(name, task, generator, env.worlds.dynamics.actions)
+        yield env, make_baseline(name, env.worlds.task, env.worlds.dynamics.actions, generator)
     finally:
         env.close()

@@ -20,7 +20,7 @@ from drone_rl.config import (
     DynamicsSettings,
 )
 from drone_rl.envs import Observer
-from drone_rl.envs.rollout import ActorAgent, Agent, DelayedAgent, steps
+from drone_rl.envs.rollout import Agent, DelayedAgent, steps
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.baselines import make_baseline
 from drone_rl.sim.dynamics import draw_seeds, make_dynamics
@@ -200,7 +200,7 @@ class PairedEvaluator:
         for name in worlds.task.blind_baselines:
             generator = torch_generator(self.seed, Stream.ACTIONS)
             actions = worlds.dynamics.actions
-            agent = ActorAgent(make_baseline(name, worlds.task, generator, actions))
+            agent = make_baseline(name, worlds.task, actions, generator)
             episodes[name] = self.run(condition, agent=agent).episodes
         return episodes
 

@@ -69,7 +69,9 @@ class WithOtherImages:
         return self._agent.act(context.part(every, inputs))
 
 
-def repeat(env: EnvBase, actor: TensorDictModuleBase, greedy: CompleteEpisodes) -> Repetition:
+def repeat(
+    env: EnvBase, actor: TensorDictModuleBase | Agent, greedy: CompleteEpisodes
+) -> Repetition:
     """Run the first episodes again, and compare how they end.
 
     The policy is called with one environment at a time, and with `FEW`. PyTorch evaluates it, so
@@ -83,7 +85,7 @@ def repeat(env: EnvBase, actor: TensorDictModuleBase, greedy: CompleteEpisodes) 
     first = greedy.first(min(NEEDED_EPISODES, len(greedy)))
     runs = []
     for size, how in ((1, "one environment at a time"), (FEW, f"{FEW} environments at a time")):
-        again = _again(InGroups(_agent(actor), size), env, len(first), flushes=size == 1)
+        again = _again(InGroups(_as_agent(actor), size), env, len(first), flushes=size == 1)
         is_other = (again.end_reason != first.end_reason) | (
             again.goals.reached != first.goals.reached
         ).any(-1)
@@ -98,11 +100,11 @@ def repeat(env: EnvBase, actor: TensorDictModuleBase, greedy: CompleteEpisodes) 
 
 
 def exchange_images(
-    env: EnvBase, actor: TensorDictModuleBase, greedy: CompleteEpisodes
+    env: EnvBase, actor: TensorDictModuleBase | Agent, greedy: CompleteEpisodes
 ) -> CameraUse:
     """Run the episodes again with the images of other episodes; the arguments are `repeat`'s."""
     greedy = greedy.first(min(EXCHANGED, len(greedy)))
-    exchanged = _again(WithOtherImages(_agent(actor)), env, len(greedy))
+    exchanged = _again(WithOtherImages(_as_agent(actor)), env, len(greedy))
     strata = {}
     confidence = 1.0 - 0.05 / len(greedy.task.strata)
     for i, name in enumerate(greedy.task.strata):
@@ -145,10 +147,12 @@ def require_repeatable(
         )
 
 
-def _agent(actor: TensorDictModuleBase) -> Agent:
+def _as_agent(actor: TensorDictModuleBase | Agent) -> Agent:
     """Return an agent that acts like an actor, without memory of earlier episodes."""
     network = getattr(actor, "network", None)
-    return PolicyAgent(network) if isinstance(network, ImageNetwork) else ActorAgent(actor)
+    if isinstance(network, ImageNetwork):
+        return PolicyAgent(network)
+    return ActorAgent(actor) if isinstance(actor, TensorDictModuleBase) else actor
 
 
 def _again(agent: Agent, env: EnvBase, episodes: int, *, flushes: bool = False) -> CompleteEpisodes:

@@ -15,13 +15,12 @@ from drone_rl.config.commands import ShiftSettings
 from drone_rl.config.configuration import from_arguments
 from drone_rl.config.options import ShiftOptions
 from drone_rl.envs import base_env, worlds_of
-from drone_rl.policies.baselines import check_baselines
+from drone_rl.policies.baselines import OracleAgent, check_baselines
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.zoo import fingerprint
 from drone_rl.sim.tasks import as_task
-from drone_rl.trust.agents import OracleAgent
 from drone_rl.trust.axes import Axis, check_axes, find_axes
 from drone_rl.trust.charts import chart, strips
 from drone_rl.trust.domain import Prober
@@ -149,7 +148,7 @@ def _domain(
     """Search the operating domain."""
     ranges: dict[str, Range] = {}
     with closing(PairedEvaluator(subject, settings.domain_episodes, seed.value)) as evaluator:
-        oracle = evaluator.run(Condition(), agent=OracleAgent(only_visible=False)).episodes
+        oracle = evaluator.run(Condition(), agent=OracleAgent()).episodes
         prober = Prober(evaluator, oracle, settings.good_share, settings.possible_share)
         for axis in axes:
             report(f"range of {axis.name}")

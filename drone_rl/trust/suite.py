@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.envs.rollout import Act, StepContext
-from drone_rl.trust.agents import OracleAgent, has_oracle
+from drone_rl.policies.baselines import OracleAgent, has_visible_oracle
 from drone_rl.trust.axes import TOGETHER, Axis
 from drone_rl.trust.paired_evaluation import ConditionResult, PairedEvaluator
 from drone_rl.trust.perturbations import Condition, PerturbationMode
@@ -38,7 +38,7 @@ class Suite:
         """
         self._evaluator, self._modes, self._possible = evaluator, modes, possible_share
         self.plain = evaluator.run(Condition())
-        self._knows = has_oracle(self.plain.episodes.task)
+        self._knows = has_visible_oracle(self.plain.episodes.task)
         self.oracle: ConditionResult | None = None
         self.oracle = self._fly_oracle(Condition()) if self._knows else None
 
@@ -102,7 +102,7 @@ class Suite:
         kept = dataclasses.replace(condition, appearance_changes=(), faults=faults)
         if kept == Condition() and self.oracle is not None:
             return self.oracle
-        return self._evaluator.run(condition, agent=OracleAgent())
+        return self._evaluator.run(condition, agent=OracleAgent(only_visible=True))
 
     def _figures(self, result: ConditionResult) -> ModeFigures:
         episodes, plain = result.episodes, self.plain.episodes

@@ -12,6 +12,7 @@ from torchrl.envs import EnvBase
 
 from drone_rl.collectors.complete_episodes import CompleteEpisodes, rollout
 from drone_rl.envs import base_env, worlds_of
+from drone_rl.envs.rollout import Agent
 from drone_rl.policies.baselines import check_baselines
 from drone_rl.policies.policy import BasePolicy, load_policy
 from drone_rl.sim.actions import Actions
@@ -66,7 +67,7 @@ class FindClaim(Protocol):
 
 def judge_policy(
     env: EnvBase,
-    actor: TensorDictModuleBase,
+    actor: TensorDictModuleBase | Agent,
     episodes: int,
     *,
     sampled: bool = True,

@@ -18,7 +18,7 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.envs import DroneEnv, Observer, base_env
-from drone_rl.envs.rollout import Act, ActorAgent, StepContext, steps
+from drone_rl.envs.rollout import Act, ActorAgent, Agent, StepContext, as_agent, steps
 from drone_rl.policies.actor import Exploring
 from drone_rl.policies.policy import Policy
 from drone_rl.sim.actions import MOVES, Actions
@@ -148,7 +148,7 @@ class StepImages(NamedTuple):
 
 
 def film_episode(
-    env: EnvBase, actor: TensorDictModuleBase, *, greedy: bool = True
+    env: EnvBase, actor: TensorDictModuleBase | Agent, *, greedy: bool = True
 ) -> Iterator[np.ndarray]:
     """Run one episode in a single environment and yield its video frames.
 
@@ -166,7 +166,7 @@ def film_episode(
 
 @torch.no_grad()
 def run_episode(
-    env: EnvBase, actor: TensorDictModuleBase, *, greedy: bool = True
+    env: EnvBase, actor: TensorDictModuleBase | Agent, *, greedy: bool = True
 ) -> Iterator[tuple[StepContext, Act | None, float]]:
     """Run one episode in a single environment; yield each step with the reward of the one before.
 
@@ -174,7 +174,7 @@ def run_episode(
     None.
     """
     base, reward, step = base_env(env), 0.0, None
-    agent = Exploring(ActorAgent(actor), greedy=greedy)
+    agent = Exploring(as_agent(actor), greedy=greedy)
     for step in steps(agent, base.observer, base.start(), looks_ahead=True):
         base.worlds.state = step.context.state
         yield step.context, step.act, reward

@@ -19,6 +19,7 @@ from drone_rl.config.commands import ProvableSettings, ProveSettings
 from drone_rl.config.configuration import check_same_config, from_arguments
 from drone_rl.config.options import TrainOptions
 from drone_rl.config.training import TrainSettings
+from drone_rl.envs.rollout import Agent
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import describe, read_checkpoint
 from drone_rl.sim.tasks import FailureReplayTask
@@ -242,7 +243,7 @@ def train_until_proved(
 
 
 def find_failures(
-    env: EnvBase, actor: TensorDictModuleBase, num_episodes: int, enough: int
+    env: EnvBase, actor: TensorDictModuleBase | Agent, num_episodes: int, enough: int
 ) -> tuple[NDArray[np.float64], int]:
     """Search for cube placements from which a greedy policy misses a cube.
 

@@ -26,17 +26,16 @@ def infer_kernel(
 ) -> None:
     for row in range(count):
         run_convolutions(layers, images[row], workspace, row)
-    run_linear(layers, workspace, count)
+    run_linear(layers, workspace, 0, count)
 
 
 def infer(packed, images, num_actions):
-    workspace = torch.full((packed.workspace_size,), torch.nan)
-    count = len(images)
+    first, last = packed.offsets.outputs[-2:]
+    outputs = torch.full((len(images), last), torch.nan)
     given = wp.from_torch(images.flatten(1).contiguous())
-    inputs = [packed.layers, given, wp.from_torch(workspace), count]
+    inputs = [packed.arrays, given, wp.from_torch(outputs.flatten()), len(images)]
     wp.launch(infer_kernel, 1, inputs=inputs, device="cpu")
-    outs = packed.layers.logits_stride
-    logits = workspace[packed.layers.logits_offset :][: count * outs].view(count, outs)
+    logits = outputs[:, first : first + WIDTH]
     assert not logits[:, num_actions:].any()
     return logits[:, :num_actions]
 
@@ -53,11 +52,11 @@ def infer(packed, images, num_actions):
 )
 def test_logits_equal_the_network_after_updates(shape, options):
     network = SmallCNN(shape, 3, generator=torch.Generator().manual_seed(0), **options)
-    packed = PackedNetwork(network, 6)
+    packed = PackedNetwork(network)
     optimizer = torch.optim.Adam(network.parameters(), lr=0.1)
     for count in (6, 1, 5):
         images = torch.randn(count, *shape)
-        packed.update()
+        packed.pack()
         logits = network(images)
         given = infer(packed, images, 3)
         assert logits.abs().max() > 1e-3 and torch.allclose(given, logits, rtol=1e-4, atol=1e-5)
@@ -76,8 +75,8 @@ def test_logits_equal_the_network_after_updates(shape, options):
 )
 def test_logits_equal_those_of_a_network_with_pooling(shape, options):
     network = OriginalCNN(shape, 3, generator=torch.Generator().manual_seed(0), **options)
-    packed = PackedNetwork(network, 6)
-    packed.update()
+    packed = PackedNetwork(network)
+    packed.pack()
     for count in (6, 1, 5):
         images = torch.randn(count, *shape)
         assert torch.allclose(infer(packed, images, 3), network(images), rtol=1e-4, atol=1e-4)
@@ -85,8 +84,8 @@ def test_logits_equal_those_of_a_network_with_pooling(shape, options):
 
 def test_first_pixel_skips_rows_of_a_larger_frame():
     network = SmallCNN((1, 12, 20), 3, generator=torch.Generator().manual_seed(0))
-    packed = PackedNetwork(network, 2, first_pixel=3 * 20)
-    packed.update()
+    packed = PackedNetwork(network, first_pixel=3 * 20)
+    packed.pack()
     images = torch.randn(2, 1, 17, 20)
     assert torch.allclose(infer(packed, images, 3), network(images[:, :, 3:15]), atol=1e-5)
 
@@ -108,8 +107,8 @@ def test_only_supported_layers_are_packed(layers, is_supported):
     network = network_of(*layers)
     assert (not unsupported(network)) is is_supported
     if is_supported:
-        packed = PackedNetwork(network, 2)
-        packed.update()
+        packed = PackedNetwork(network)
+        packed.pack()
         images = torch.randn(2, 1, 8, 8)
         assert torch.allclose(infer(packed, images, 3), network(images), atol=1e-5)
 

@@ -5,8 +5,8 @@ import drone_rl
 from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv, base_env
-from drone_rl.policies.baselines import constant_policy, oracle_policy, random_policy
-from drone_rl.sim.actions import MOVES, Move
+from drone_rl.policies.baselines import ConstantAgent, OracleAgent, RandomAgent
+from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.trust.metrics import summarise
 from drone_rl.utils.errors import InputError
@@ -19,27 +19,27 @@ from drone_rl.utils.seeding import Stream
 )
 def test_oracle_collects_all_cubes(settings):
     env = DroneEnv(100, settings, pixels=False, stream=Stream.REPORT)
-    summary = summarise(rollout(oracle_policy(settings), env, 100))
+    summary = summarise(rollout(OracleAgent(), env, 100))
     assert summary.success.share == 1.0
 
 
 def test_random_policy_matches_the_original_study():
     env = DroneEnv(500, pixels=False)
-    policy = random_policy(MOVES, torch.Generator().manual_seed(0))
+    policy = RandomAgent(torch.Generator().manual_seed(0))
     summary = summarise(rollout(policy, env, 500))
     assert 0.7 < summary.mean_goals < 1.0  # 0.84 there
     assert 125 < summary.mean_length < 142  # 133 there
 
 
 def test_more_episodes_than_fit_into_memory_are_refused():
-    env, policy = DroneEnv(1, pixels=False), constant_policy(Move.FORWARD)
+    env, policy = DroneEnv(1, pixels=False), ConstantAgent(Move.FORWARD)
     with pytest.raises(InputError, match=r"episodes=1000000000000 .*give fewer episodes"):
         rollout(policy, env, 10**12)
 
 
 def test_episodes_do_not_depend_on_the_batch_size():
     """Of 4 worlds, 10 episodes: three rounds, of which the last gives two worlds'."""
-    policy = oracle_policy(TaskSettings())
+    policy = OracleAgent()
     together = rollout(policy, DroneEnv(4, pixels=False, seed=3), 10)
     alone = [rollout(policy, DroneEnv(1, pixels=False, seed=3, first_world=i), 3) for i in range(4)]
     for name, value in {**vars(together.goals), "length": together.length}.items():
@@ -74,7 +74,7 @@ def test_heights_are_metres_above_the_drone():
     start = env.state_dict()
     drawn = env.reset()["info", "cube_positions"][..., 2]
     env.load_state_dict(start)
-    flown = rollout(constant_policy(Move.FORWARD), env, 4)
+    flown = rollout(ConstantAgent(Move.FORWARD), env, 4)
     torch.testing.assert_close(flown.goals.height, drawn.double() - 5.0)
     assert (flown.end_reason == CubesEnd.FRONT_BOUNDARY).any()
     assert flown.length.max() == 45  # 44 is still within bounds
@@ -84,7 +84,7 @@ def test_initial_states_do_not_depend_on_the_policy():
     env = DroneEnv(8, TaskSettings(vertical_bound=1.0, altitude=5.0), pixels=False)
     start = env.state_dict()
     flown = []
-    for policy in (oracle_policy(env.worlds.task.settings), constant_policy(Move.LEFT)):
+    for policy in (OracleAgent(), ConstantAgent(Move.LEFT)):
         env.load_state_dict(start)
         flown.append(rollout(policy, env, 20))
     ours, theirs = (episodes.goals for episodes in flown)
@@ -116,7 +116,7 @@ def test_implementations_run_the_same_episodes(compiled, implementation):
 
 def test_entries_of_steps_are_kept_on_request():
     env = DroneEnv(2, TaskSettings(), pixels=False)
-    oracle = oracle_policy(TaskSettings())
+    oracle = OracleAgent()
     episodes = rollout(oracle, env, 3, keep=None, info=("drone",))
     assert len(episodes.steps) == episodes.length.sum()
     assert torch.equal(episodes.steps["next", "info", "drone"][0, :2], torch.tensor([1.0, 0.0]))

@@ -28,7 +28,7 @@ def scenes(world):
 @pytest.fixture
 def dataset(world):
     env, actor, network = world
-    flights = collect(env, actor, num_episodes=1, num_frames=60, meta={"from": "a test"})
+    flights = collect(env, actor, num_episodes=1, num_frames=60)
     rows = select_frames(flights.episode, 60)
     return render_frames(flights, rows, Scenes(env), network, ("relu1", "fc_relu1"))
 

@@ -44,7 +44,7 @@ def episode_of(length, collects=(), misses=(), end=CubesEnd.ALL_CUBES):
         "end_reason": reason,
         "episode": np.zeros(length, int),
     }
-    return RolloutDataset(arrays, {}, {})
+    return RolloutDataset(arrays)
 
 
 def test_key_frames_of_a_successful_episode():

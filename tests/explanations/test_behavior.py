@@ -27,12 +27,13 @@ def fake(observations, probabilities, offsets, actions=None, episode=None):
         "probabilities": np.asarray(probabilities, np.float32),
         "actions": np.asarray(actions if actions is not None else [F] * count),
         "episode": np.asarray(episode if episode is not None else [0] * count),
+        "offsets": np.array(offsets, np.float64),
     }
-    return RolloutDataset(arrays, {}, {"offsets": np.array(offsets, np.float64)})
+    return RolloutDataset(arrays)
 
 
 def pairs_of(data, alike):
-    return find_pairs(data, alike, MOVES, data.meta["offsets"])
+    return find_pairs(data, alike, MOVES, data.offsets)
 
 
 LEFT, RIGHT = [0.0, 0.9, 0.1], [0.0, 0.1, 0.9]
@@ -46,7 +47,7 @@ def test_pairs_are_classified_by_the_place_of_the_target():
         probabilities=[LEFT, RIGHT, RIGHT, LEFT, LEFT, RIGHT],
         offsets=[[5, 1], [6, 2], [5, 3], [5, -3], [5, 1], [5, 1]],
     )
-    data.meta["offsets"][4] = np.nan
+    data.offsets[4] = np.nan
     pairs = pairs_of(data, alike=0.1)
     assert {(p.left, p.right): p.kind for p in pairs} == {
         (0, 1): "contradiction", (3, 2): "justified", (4, 5): "unknown",
@@ -122,7 +123,7 @@ UP, DOWN, TO_LEFT, TO_RIGHT, STAY = range(5)
 
 
 def flights(actions, episode):
-    return RolloutDataset({"actions": np.array(actions, int), "episode": np.array(episode)}, {}, {})
+    return RolloutDataset({"actions": np.array(actions, int), "episode": np.array(episode)})
 
 
 def loops_of(moves, episode, actions=MOVES):
@@ -147,7 +148,7 @@ def test_episodes_with_a_loop_are_counted_once():
     data = fake(np.zeros((10, 1)), [LEFT] * 10, [[5, 1]] * 10)
     data.arrays["actions"][:] = [L, R, L, F, L, R, L, F, F, F]
     data.arrays["episode"][8:] = 1
-    data.offset = lambda task: data.meta["offsets"]
+    data.offset = lambda task: data.offsets
     scenes = SimpleNamespace(actions=MOVES, task=None)
     found = flaws_section(SimpleNamespace(dataset=data, flights=data, scenes=scenes))
     assert len(found.loops) == 2 and found.looping_steps == pytest.approx(0.6)

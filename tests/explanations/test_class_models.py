@@ -8,15 +8,14 @@ import torch
 import drone_rl
 from drone_rl.explanations.class_model_gallery import GALLERY
 from drone_rl.explanations.class_models import (
-    Attempts,
     ClassModelSettings,
     _Ascent,
     best_models,
     gaussian_blur,
     image_statistics,
-    search,
+    most_probable,
+    optimize,
     section,
-    visualise,
 )
 from drone_rl.explanations.context import LeftOutError
 from drone_rl.explanations.results import ImageStatistics
@@ -43,20 +42,20 @@ def test_images_show_what_the_policy_responds_to(halves, parameterisation, objec
     settings = ClassModelSettings(
         maximize=objective, parameterisation=parameterisation, blur=0.5, steps=64, starts=2
     )
-    found = visualise(halves, STATISTICS, settings, seed=3)
-    left, right = found.images[1, :, 0], found.images[2, :, 0]
+    images = optimize(halves, STATISTICS, settings, seed=3)
+    left, right = images[1, :, 0], images[2, :, 0]
     assert (left[..., :6].mean((1, 2)) < left[..., 6:].mean((1, 2)) - 0.5).all()
     assert (right[..., 6:].mean((1, 2)) < right[..., :6].mean((1, 2)) - 0.5).all()
-    assert (found.probabilities[1:] > 0.99).all()
-    for action in range(3):
-        reached = halves(found.images[action]).softmax(-1)[:, action]
-        torch.testing.assert_close(found.probabilities[action], reached.detach())
+    found = best_models(halves, STATISTICS, [settings], seed=3)
+    assert min(found.probabilities[1:]) > 0.99
+    reached = halves(torch.from_numpy(found.images)).softmax(-1).diagonal()
+    assert found.probabilities == pytest.approx(reached.tolist())
 
 
 def test_the_same_seed_gives_the_same_image_and_the_policy_is_unchanged(halves):
     before = {k: v.clone() for k, v in halves.state_dict().items()}
     settings = ClassModelSettings(steps=5, starts=2)
-    images = [visualise(halves, STATISTICS, settings, seed=s).images for s in (1, 1, 2)]
+    images = [optimize(halves, STATISTICS, settings, seed=s) for s in (1, 1, 2)]
     assert torch.equal(images[0], images[1]) and not torch.equal(images[0], images[2])
     assert all(torch.equal(before[k], v) for k, v in halves.state_dict().items())
     assert all(p.grad is None for p in halves.parameters())
@@ -65,8 +64,8 @@ def test_the_same_seed_gives_the_same_image_and_the_policy_is_unchanged(halves):
 def test_best_start_is_the_most_probable_then_the_smoothest():
     probabilities = torch.tensor([[0.5, 0.8, 0.7], [0.995, 0.999, 0.98], [0.3, 0.3, 0.1]])
     roughness = torch.tensor([[0.1, 9.0, 0.1], [2.0, 3.0, 1.0], [2.0, 1.0, 0.5]])
-    found = Attempts(torch.zeros(3, 3, 1, 1, 1), probabilities, roughness, ClassModelSettings())
-    assert found.best() == [1, 0, 1]  # within a hundredth: the smoother
+    found = most_probable(probabilities, roughness)
+    assert found == [1, 0, 1]  # within a hundredth: the smoother
 
 
 def test_an_action_that_no_image_reaches_has_a_low_probability():
@@ -74,9 +73,10 @@ def test_an_action_that_no_image_reaches_has_a_low_probability():
     network = MLP((1, 6, 12), 3, hidden=())
     with torch.no_grad():
         network.layers.logits.bias.copy_(torch.tensor([0.0, -20.0, 0.0]))
-    found = best_models(search(network, STATISTICS))
-    assert found.highest[1] < 0.01 and found.highest[0] > 0.5
-    assert found.attempts == 6 * 8
+    tried = [ClassModelSettings(steps=8, blur=blur, starts=3) for blur in (0.5, 0.9)]
+    found = best_models(network, STATISTICS, tried)
+    assert found.highest[1] < 0.01 and found.highest[0] > 0.45
+    assert found.attempts == 2 * 3
 
 
 def test_statistics_by_hand():
@@ -190,12 +190,12 @@ def test_the_result_has_a_row_of_probabilities(found):
 def test_gallery_shows_each_refinement():
     found = drone_rl.class_models("poor", gallery=True, episodes=2, seed=0)
     assert list(found.tried) == list(GALLERY)
-    first, *_, last = found.tried.values()
-    assert first.settings.maximize == "probability" and first.settings.blur == 0.0
-    assert last.settings == drone_rl.ClassModelsSettings().as_base(type(last.settings))
+    (first, _), *_, (last, _) = found.tried.values()
+    assert first.maximize == "probability" and first.blur == 0.0
+    assert last == drone_rl.ClassModelsSettings().as_base(type(last))
     failed = "defaults: no image found makes forward or right more probable than not"
     assert failed in str(found) and failed in found._repr_html_()
-    width, height = found.image().size
+    width, height = found.figure().size
     assert height > len(GALLERY) * 25 and width > 3 * 64
 
 

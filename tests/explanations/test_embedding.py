@@ -8,16 +8,15 @@ from openTSNE.affinity import PerplexityBasedNN
 
 from drone_rl.explanations.context import LeftOutError
 from drone_rl.explanations.embedding import embed, faithfulness, section
+from drone_rl.explanations.rollouts import RolloutDataset
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.utils.errors import InputError
 
 
 def test_features_and_pixels_are_embedded():
     rng = np.random.default_rng(0)
-    data = SimpleNamespace(
-        features={"fc1": rng.normal(size=(40, 8)).astype(np.float32)},
-        observations=rng.normal(size=(40, 1, 3, 4)).astype(np.float32),
-    )
+    shapes = {"features/fc1": (40, 8), "observations": (40, 1, 3, 4)}
+    data = RolloutDataset({n: rng.normal(size=s).astype(np.float32) for n, s in shapes.items()})
     settings = ExplainSettings(frames=40, perplexity=4, seed=1)
     seed = SimpleNamespace(value=settings.seed)
     found = section(SimpleNamespace(dataset=data, settings=settings, seed=seed, layer="fc1"))

@@ -14,7 +14,6 @@ from drone_rl.explanations.patches import (
     placebo_maps,
     pointing,
     replaced,
-    sample_frames,
     scores,
     shuffled_networks,
 )
@@ -104,12 +103,6 @@ def test_pointing_where_patches_tie():
 def test_frames_without_an_effect():
     effects = np.array([[0.0, 0.99e-4], [0.0, 1e-4], [0.2, 0.5]])
     assert has_effect(effects).tolist() == [False, True, True]
-
-
-def test_frames_are_spread_over_each_episode():
-    episode = np.array([3] * 9 + [5] * 2 + [8])
-    assert sample_frames(episode, 3).tolist() == [0, 4, 8, 9, 10, 11]
-    assert sample_frames(np.zeros(0), 3).tolist() == []
 
 
 def test_placebos_by_hand():

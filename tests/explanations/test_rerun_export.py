@@ -20,7 +20,7 @@ from drone_rl.explanations.rerun_export import (
     record_episode,
 )
 from drone_rl.policies.actor import exploring
-from drone_rl.policies.baselines import constant_policy
+from drone_rl.policies.baselines import ConstantAgent
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.utils.errors import InputError
 
@@ -83,7 +83,7 @@ def recorded(make_pipeline, tmp_path):
 @pytest.fixture
 def straight(recorded):
     """An episode straight on, through two cubes."""
-    return recorded(constant_policy(0), task=TWO_AHEAD)
+    return recorded(ConstantAgent(0), task=TWO_AHEAD)
 
 
 def test_timelines_are_steps_and_seconds(straight, tmp_path):
@@ -129,7 +129,7 @@ def test_rewards_are_at_the_step_that_they_lead_to(straight):
 def test_the_camera_has_its_pose_on_the_drone_and_its_mounting(recorded):
     def camera(**look):
         settings = AppearanceSettings(**look)
-        found = recorded(constant_policy(0), task=TWO_AHEAD, appearance=settings)
+        found = recorded(ConstantAgent(0), task=TWO_AHEAD, appearance=settings)
         found = found["/world/drone/camera"]
         x, y, z, w = found["Transform3D:quaternion"][0][0]
         forward = [-2 * (x * z + w * y), -2 * (y * z - w * x), -(1 - 2 * (x * x + y * y))]  # of -z
@@ -155,7 +155,7 @@ def test_heat_maps_are_laid_over_observations(recorded):
         with torch.no_grad():  # a policy with opinions, or every map would be nearly flat
             network.layers.logits.weight.mul_(300)
 
-    found = recorded(constant_policy(0), sharpen, task=TWO_AHEAD)
+    found = recorded(ConstantAgent(0), sharpen, task=TWO_AHEAD)
     methods = found["/heat_map/method"]["TextLog:text"]
     allowed = {"heat map: grad_cam", "heat map: grad_cam_logit"}
     assert methods and {text for (text,) in methods.values()} <= allowed

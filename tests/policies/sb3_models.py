@@ -8,7 +8,8 @@ import torch
 from torch import nn
 
 import drone_rl
-from drone_rl.config.transforms import Gray, Standardize
+from drone_rl.config.transforms import Gray, Stack, Standardize
+from drone_rl.envs import Pipeline
 
 gymnasium = pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
 sb3 = pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
@@ -33,7 +34,8 @@ class Playback(gymnasium.Env):
 
     def __init__(self, episodes):
         self.frames = np.asarray(episodes)
-        self.observation_space = gymnasium.spaces.Box(0, 255, self.frames.shape[2:], np.uint8)
+        shape, dtype = self.frames.shape[2:], self.frames.dtype
+        self.observation_space = gymnasium.spaces.Box(0, 255, shape, dtype.type)
         self.episode, self.step_number = -1, 0
 
     def reset(self, *, seed=None, options=None):
@@ -80,12 +82,10 @@ def single(*layers):
     return make
 
 
-def batched(*transforms):
-    def make(env):
-        given = gymnasium.vector.SyncVectorEnv([lambda: env], autoreset_mode="SameStep")
-        return drone_rl.Sb3Worlds(given, transforms)
-
-    return make
+def batched(env):
+    return drone_rl.Sb3Worlds(
+        gymnasium.vector.SyncVectorEnv([lambda: env], autoreset_mode="SameStep")
+    )
 
 
 def channels_first(env):
@@ -137,13 +137,14 @@ KINDS = {
     "bytes, CNN, not scaled": ("CnnPolicy", single(), plain, of_floats()),
     "bytes, channels first": ("CnnPolicy", single(channels_first), plain, {}),
     "floats, channels last": ("MlpPolicy", single(floats), plain, {}),
-    "floats, channels first": ("CnnPolicy", batched(Gray(), Standardize()), plain, of_floats()),
+    "floats, channels first": ("CnnPolicy", batched, plain, of_floats()),
     "own wrapper": ("CnnPolicy", single(Inverted), plain, {}),
     "gray": ("CnnPolicy", single(gray), plain, {}),
     "flat": ("MlpPolicy", single(wrappers.FlattenObservation), plain, {}),
     "stacked": ("CnnPolicy", single(), stacked, {}),
-    "stacked side by side": ("MlpPolicy", batched(Gray()), stacked, of_floats()),
-    "normalized": ("MlpPolicy", batched(Gray()), normalized, of_floats()),
+    "stacked side by side": ("MlpPolicy", batched, stacked, of_floats()),
+    "stack of the environment": ("MlpPolicy", batched, plain, of_floats()),
+    "normalized": ("MlpPolicy", batched, normalized, of_floats()),
     "normalized bytes": ("MlpPolicy", single(), normalized, of_floats()),
     "gray, stacked, normalized": (
         "MlpPolicy",
@@ -155,6 +156,13 @@ KINDS = {
     "BatchNorm": ("CnnPolicy", single(), plain, with_layer(norm)),
     "own features extractor": ("CnnPolicy", single(), plain, with_layer(nn.Tanh)),
 }
+TRANSFORMS = {
+    "floats, channels first": (Gray(), Standardize()),
+    "stacked side by side": (Gray(),),
+    "stack of the environment": (Gray(), Stack()),
+    "normalized": (Gray(),),
+}
+"""Transforms of the environments of some kinds."""
 
 
 def latent(policy, seen):
@@ -166,7 +174,8 @@ def latent(policy, seen):
 def make_model(kind):
     """Return a model with random weights whose actions differ between frames."""
     policy, inner, outer, options = KINDS[kind]
-    env = outer(inner(gymnasium.make(NAME, camera=CAMERA, **TASK)))
+    given = TRANSFORMS.get(kind, ())
+    env = outer(inner(gymnasium.make(NAME, camera=CAMERA, transforms=given, **TASK)))
     env.seed(1)
     model = sb3.PPO(policy, env, seed=0, n_steps=4, batch_size=4, **options)
     env = model.get_env()
@@ -182,11 +191,18 @@ def make_model(kind):
     return model
 
 
+def seen_by(transforms, episodes):
+    """Apply transforms to episodes (E, T, H, W, 3), one frame after the other."""
+    pipeline = Pipeline([transform.make() for transform in transforms])
+    frames = torch.as_tensor(episodes).unbind(1)
+    return torch.stack([pipeline(one, starts=not t) for t, one in enumerate(frames)], 1).numpy()
+
+
 def library_actions(model, kind, episodes):
     """Return the actions of `predict` in episodes (E, T, H, W, 3), shape (E, T)."""
     _, inner, outer, _ = KINDS[kind]
     model = copy.copy(model)
-    env = outer(inner(Playback(episodes)))
+    env = outer(inner(Playback(seen_by(TRANSFORMS.get(kind, ()), episodes))))
     if (own := model.get_vec_normalize_env()) is not None:
         while not isinstance(env, VecNormalize):
             env = env.venv

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 import drone_rl
-from drone_rl.config.transforms import Rgb, Standardize
+from drone_rl.config.transforms import Gray, Noise, Rgb, Standardize
 from drone_rl.envs import base_env
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.utils.errors import InputError
@@ -61,6 +61,13 @@ def test_task_and_camera_are_those_of_the_environment():
         make_model("bytes, CNN"), task=drone_rl.TaskSettings(num_cubes=1), name="mine"
     )
     assert (given.name, given.task.num_cubes, given.transforms) == ("mine", 1, (Rgb(),))
+
+
+def test_camera_faults_of_the_environment_are_those_of_the_policy():
+    transforms = (Gray(), Noise(strength=0.2))
+    env = gymnasium.make(NAME, camera=CAMERA, transforms=transforms)
+    policy = as_policy(sb3.PPO("MlpPolicy", env, seed=0, n_steps=4, batch_size=4))
+    assert policy.transforms == transforms
 
 
 def reload(model, folder, env=None):
@@ -126,7 +133,7 @@ class Peeking(gymnasium.ObservationWrapper):
     """A wrapper whose result depends on more than the current observation."""
 
     def observation(self, observation):
-        return observation + np.uint8(self.unwrapped.batch.observe().min())
+        return observation + np.uint8(self.unwrapped.batch.worlds.num_envs)
 
 
 def model_of(env):

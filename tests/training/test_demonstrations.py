@@ -17,7 +17,7 @@ from drone_rl.config import (
 )
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.policies.baselines import oracle_policy
+from drone_rl.policies.baselines import OracleAgent
 from drone_rl.training.demonstrations import (
     Demonstration,
     FlightConditions,
@@ -215,7 +215,7 @@ def test_the_oracle_is_recorded_as_it_flies(tmp_path, kind):
     found = read_demonstrations(tmp_path, FlightConditions.of(settings))
     assert [path.name for path in paths] == [f"flight_0000{i}.npz" for i in range(3)]
     env = DroneEnv(3, settings.task, settings.camera, seed=5, actions=settings.actions)
-    flown = rollout(oracle_policy(settings.task, env.worlds.dynamics.actions), env, 3)
+    flown = rollout(OracleAgent(), env, 3)
     assert bool(flown.success.all())
     env.set_seed(5)
     first = env.reset()["pixels"].numpy()

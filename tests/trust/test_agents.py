@@ -6,10 +6,11 @@ from drone_rl.envs import GrayPixels, Observer
 from drone_rl.envs.fault_models import dead_rows, noise
 from drone_rl.envs.rollout import StepContext
 from drone_rl.policies import ImageNetwork, RecurrentNetwork
+from drone_rl.policies.baselines import OracleAgent, has_visible_oracle
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.tasks import as_task
 from drone_rl.sim.worlds import Worlds
-from drone_rl.trust.agents import OracleAgent, PolicyAgent, has_oracle
+from drone_rl.trust.agents import PolicyAgent
 from drone_rl.trust.paired_evaluation import PairedEvaluator
 from drone_rl.trust.perturbations import Condition
 from tests.trust.subjects import TASK, subject
@@ -94,8 +95,9 @@ def evaluator():
     made.close()
 
 
-def success(evaluator, condition, **kwargs):
-    return float(evaluator.run(condition, agent=OracleAgent(**kwargs)).episodes.success.mean())
+def success(evaluator, condition, only_visible=True):
+    agent = OracleAgent(only_visible=only_visible)
+    return float(evaluator.run(condition, agent=agent).episodes.success.mean())
 
 
 def test_oracle_collects_what_is_visible_and_compensates_delay(evaluator):
@@ -117,5 +119,5 @@ def test_oracle_with_a_narrow_field_of_view(evaluator):
 
 
 def test_oracles_limited_to_visible_cubes():
-    assert has_oracle(as_task(TaskSettings()))
-    assert not has_oracle(as_task(PillarsSettings()))
+    assert has_visible_oracle(as_task(TaskSettings()))
+    assert not has_visible_oracle(as_task(PillarsSettings()))

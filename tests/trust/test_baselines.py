@@ -6,8 +6,9 @@ import torch
 from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.policies.baselines import constant_policy, make_baseline, oracle_policy, random_policy
-from drone_rl.sim.actions import MOVES, Move
+from drone_rl.policies.baselines import ConstantAgent, OracleAgent, RandomAgent, make_baseline
+from drone_rl.sim.actions import Move
+from drone_rl.sim.tasks import as_task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.trust.baselines import BASELINES, run_baselines
 from drone_rl.utils.errors import InputError
@@ -23,8 +24,8 @@ def policies():
     """What each baseline is; random actions follow from the first environment's stream alone."""
     stream = side_stream(world_random_state(5, 0), 5)
     generator = torch.Generator().manual_seed(int(stream.integers(2**63)))
-    fixed = {action.name.lower(): constant_policy(action) for action in Move}
-    return {"oracle": oracle_policy(TASK), "random": random_policy(MOVES, generator), **fixed}
+    fixed = {action.name.lower(): ConstantAgent(action) for action in Move}
+    return {"oracle": OracleAgent(), "random": RandomAgent(generator), **fixed}
 
 
 def test_baselines_run_from_the_same_initial_states(policies, monkeypatch):
@@ -70,10 +71,10 @@ def test_baselines_with_continuous_actions():
 def test_baseline_that_is_no_action_is_refused():
     actions = SimpleNamespace(names=("throttle", "pitch"))
     with pytest.raises(InputError, match=r"baseline=forward of task=.* which have throttle, pitch"):
-        make_baseline("forward", TASK, torch.Generator(), actions)
+        make_baseline("forward", as_task(TASK), actions, torch.Generator())
 
 
 def test_oracle_of_other_actions_is_refused():
     actions = SimpleNamespace(names=("throttle", "pitch"))
     with pytest.raises(InputError, match="acts by forward, left, right, these drones by throttle"):
-        oracle_policy(TASK, actions)
+        make_baseline("oracle", as_task(TASK), actions, torch.Generator())

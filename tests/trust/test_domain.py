@@ -8,8 +8,8 @@ import torch
 
 from drone_rl.config import TaskSettings
 from drone_rl.envs.fault_models import dead_rows
+from drone_rl.policies.baselines import OracleAgent
 from drone_rl.trust import domain
-from drone_rl.trust.agents import OracleAgent
 from drone_rl.trust.axes import AXES, Axis
 from drone_rl.trust.domain import Prober, is_surely_good
 from drone_rl.trust.paired_evaluation import PairedEvaluator
@@ -29,7 +29,7 @@ def make_prober():
         beds.append(evaluator)
         return Prober(
             evaluator,
-            evaluator.run(Condition(), agent=OracleAgent(only_visible=False)).episodes,
+            evaluator.run(Condition(), agent=OracleAgent()).episodes,
             0.9,
         )
 

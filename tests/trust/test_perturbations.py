@@ -14,10 +14,10 @@ from drone_rl.config import (
     TaskSettings,
 )
 from drone_rl.envs.fault_models import dead_rows, late_frames, noise, out_of_focus
+from drone_rl.policies.baselines import OracleAgent
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.worlds import Worlds
-from drone_rl.trust.agents import OracleAgent
 from drone_rl.trust.paired_evaluation import PairedEvaluator
 from drone_rl.trust.perturbations import (
     DRIFT,
@@ -145,7 +145,8 @@ def test_oracle_ignores_distractors():
         subject(task=TaskSettings(num_cubes=1), camera=CameraSettings()), 20
     )
     for count in (0, 16):
-        assert evaluator.run(Condition(clutter=count), agent=OracleAgent()).episodes.success.all()
+        run = evaluator.run(Condition(clutter=count), agent=OracleAgent(only_visible=True))
+        assert run.episodes.success.all()
     evaluator.close()
 
 

@@ -7,7 +7,7 @@ from hypothesis import HealthCheck
 import drone_rl
 from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.policies.baselines import constant_policy, oracle_policy
+from drone_rl.policies.baselines import ConstantAgent, OracleAgent
 from drone_rl.policies.policy import Policy
 from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.collect_cubes import Side
@@ -149,10 +149,10 @@ def test_baselines_have_the_dynamics_of_the_environment(monkeypatch):
     task = TaskSettings(num_cubes=1)
     against = DynamicsSettings(mode="simple_flight", wind=(-2.0, 0.0, 0.0))
     env = DroneEnv(3, task, pixels=False, dynamics=against)
-    verdict = judge_policy(env, constant_policy(Move.FORWARD), 3, sampled=False)
+    verdict = judge_policy(env, ConstantAgent(Move.FORWARD), 3, sampled=False)
     policy, baseline = verdict.greedy, verdict.baselines["forward"]
     assert policy.mean_length == baseline.mean_length
-    still = judge_policy(DroneEnv(3, task, pixels=False), constant_policy(Move.FORWARD), 3)
+    still = judge_policy(DroneEnv(3, task, pixels=False), ConstantAgent(Move.FORWARD), 3)
     assert still.greedy.mean_length < policy.mean_length
 
 
@@ -179,7 +179,7 @@ def test_verdict_repeats():
     verdicts = []
     for _ in range(2):
         env = DroneEnv(16, task, pixels=False)
-        verdicts.append(judge_policy(env, oracle_policy(task), 20, sampled=True))
+        verdicts.append(judge_policy(env, OracleAgent(), 20, sampled=True))
     first, again = verdicts
     assert first == again
     assert first.greedy == first.sampled == first.baselines["oracle"]
@@ -191,7 +191,7 @@ def test_verdict_repeats():
 
 def test_verdict_on_another_task():
     env = DroneEnv(20, Posts(), pixels=False)
-    straight = judge_policy(env, constant_policy(Move.FORWARD), 200, sampled=False)
+    straight = judge_policy(env, ConstantAgent(Move.FORWARD), 200, sampled=False)
     assert (straight.kind, straight.certain) == (VerdictKind.TRIVIAL, True)
     evidence = straight
     assert list(evidence.quantities) == [
@@ -199,7 +199,7 @@ def test_verdict_on_another_task():
         "above random", "above forward", "unsolved by random", "unsolved by forward",
     ]  # fmt: skip
     assert list(evidence.baselines) == ["random", "forward", "oracle"]
-    leaving = judge_policy(env, constant_policy(Move.LEFT), 200, sampled=False)
+    leaving = judge_policy(env, ConstantAgent(Move.LEFT), 200, sampled=False)
     assert (leaving.kind, leaving.certain) == (VerdictKind.POOR, True)
     assert leaving.failures.largest.value in ("left", "right")
 
@@ -215,7 +215,7 @@ def test_task_without_an_oracle_is_refused(monkeypatch):
         monkeypatch.setattr(f"drone_rl.trust.{module}.rollout", refused)
     env = DroneEnv(2, Blind(), pixels=False)
     with pytest.raises(InputError, match="task=fog has no oracle"):
-        judge_policy(env, constant_policy(Move.LEFT), 2)
+        judge_policy(env, ConstantAgent(Move.LEFT), 2)
 
 
 def rounding(fragile, number=400, unexplained=0):

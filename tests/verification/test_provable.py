@@ -14,7 +14,7 @@ from drone_rl.config.commands import ProvableSettings
 from drone_rl.config.learning import Episodes
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.policies.baselines import constant_policy
+from drone_rl.policies.baselines import ConstantAgent
 from drone_rl.sim.actions import Move
 from drone_rl.training import Callback
 from drone_rl.utils.errors import InputError
@@ -308,7 +308,7 @@ TASK = TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60)
 def flown(num_episodes, enough):
     env = DroneEnv(8, TASK, seed=4, pixels=False)
     try:
-        return find_failures(env, constant_policy(Move.FORWARD), num_episodes, enough)
+        return find_failures(env, ConstantAgent(Move.FORWARD), num_episodes, enough)
     finally:
         env.close()
 

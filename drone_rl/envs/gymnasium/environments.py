@@ -63,6 +63,8 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._seeds: list[int | None] = [None] * num_envs
         self._ended: Mask | None = None  # none is running before the first reset
+        space = self.observation_space
+        self._seen = np.zeros(space.shape or (), space.dtype)
 
     @property
     def np_random(self) -> tuple[np.random.Generator, ...]:  # pyright: ignore[reportIncompatibleMethodOverride] (as SyncVectorEnv's)
@@ -95,8 +97,9 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
             if mask[i] and one is not None:
                 self._generators[i], self._seeds[i] = seeding.np_random(one)
         self._start(mask)
+        self._observe_starts(mask)
         self._ended = ~mask if self._ended is None else self._ended & ~mask
-        return self.batch.observe(), _masked(self.batch.info(), mask)
+        return self._seen.copy(), _masked(self.batch.info(), mask)
 
     def step(self, actions: Any) -> tuple[NDArray[Any], NDArray[Any], Mask, Mask, Info]:
         """Step each environment by one of `single_action_space`; reset those that had finished.
@@ -114,13 +117,14 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
             )
         rewards = np.where(self._ended, 0.0, self.batch.step(actions))
         self._start(self._ended)
+        self._seen = self.batch.observe(torch.from_numpy(self._ended))
         flags = self.batch.flags()
         self._ended = flags[0] | flags[1]
         final = {}
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
             final = self._finish(self._ended)
         info = {**_masked(self.batch.info(), np.ones(self.num_envs, bool)), **final}
-        return self.batch.observe(), rewards, *flags, info
+        return self._seen.copy(), rewards, *flags, info
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """Render each drone from behind, (360, 640, 3), if `render_mode` is set."""
@@ -133,14 +137,19 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
 
     def _finish(self, ended: Mask) -> Info:
         """Reset environments that have just finished; return their final information."""
-        state = self.batch.worlds.state[torch.from_numpy(ended).nonzero()[:, 0]]
         last = np.full(self.num_envs, None, object)
-        for i, seen in zip(np.flatnonzero(ended), self.batch.observe(state), strict=True):
-            last[i] = seen
+        for i in np.flatnonzero(ended):
+            last[i] = self._seen[i].copy()
         info = _masked(self.batch.info(), ended)
         self._start(ended)
+        self._observe_starts(ended)
         self._ended = np.zeros_like(ended)
         return _masked({"final_obs": last, "final_info": info}, ended)
+
+    def _observe_starts(self, mask: Mask) -> None:
+        """Observe environments whose episodes start; the others keep their last observation."""
+        if mask.any():
+            self._seen[mask] = self.batch.observe(True, torch.from_numpy(np.flatnonzero(mask)))
 
     def _start(self, mask: Mask) -> None:
         worlds = np.flatnonzero(mask)
@@ -201,9 +210,10 @@ class DroneWorld(gymnasium.Env[NDArray[Any], Any]):
 
     `import drone_rl` registers the name; `"drone_rl:drone_rl/CollectCubes-v0"` needs no import.
 
-    Observations are camera images, RGB bytes (height, width, 3), or, with `observations="state"`,
-    the ground truth as a float32 vector: the entries of `info` except "end_reason" and
-    "is_success", in order. For `info` see `WorldBatch.info`. The task's step limit truncates.
+    Observations are camera images, RGB bytes (height, width, 3), after the `transforms`, if any,
+    among which may be camera faults and stacks of frames. With `observations="state"` they are the
+    ground truth as a float32 vector: the entries of `info` except "end_reason" and "is_success", in
+    order. For `info` see `WorldBatch.info`. The task's step limit truncates.
 
     Episodes are sampled from `np_random` only, so that `reset(seed=7)` starts the same episode in
     any environment, single or vector.
@@ -240,7 +250,7 @@ class DroneWorld(gymnasium.Env[NDArray[Any], Any]):
             raise InputError(f"options={list(options)} are unknown to reset; give none")
         self.batch.reset(_ONLY, [self.np_random])
         self._is_running = True
-        return self.batch.observe()[0], self._info()
+        return self.batch.observe(True)[0], self._info()
 
     def step(self, action: Any) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Step the environment by one of `action_space`.
@@ -254,7 +264,7 @@ class DroneWorld(gymnasium.Env[NDArray[Any], Any]):
         reward = self.batch.step(actions[None])
         terminated, truncated = (bool(flag) for (flag,) in self.batch.flags())
         self._is_running = not (terminated or truncated)
-        return self.batch.observe()[0], float(reward[0]), terminated, truncated, self._info()
+        return self.batch.observe(False)[0], float(reward[0]), terminated, truncated, self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
         """Render the drone from behind, (360, 640, 3), if `render_mode` is set."""

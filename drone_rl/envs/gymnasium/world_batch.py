@@ -11,27 +11,26 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.config import (
-    BaseTaskSettings,
-    CameraSettings,
-    TaskSettings,
-)
+from drone_rl.config import BaseTaskSettings, TaskSettings
 from drone_rl.config.commands import GymnasiumSettings
+from drone_rl.envs.observer import Observer, Starts
 from drone_rl.sim.actions import Actions, Entry
 from drone_rl.sim.composer_task import CONTROL_TIMESTEP_S
 from drone_rl.sim.entities import CHASE
-from drone_rl.sim.tasks import State, Task, as_task
+from drone_rl.sim.tasks import Task, as_task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError, did_you_mean
+from drone_rl.utils.seeding import side_stream
 from drone_rl.utils.settings import Settings
 
 _MOST = float(np.finfo(np.float32).max)
 """Bound of spaces without a limit: Gymnasium's checker requires finite bounds."""
 
 
-def image_space(camera: CameraSettings) -> spaces.Box:
-    """Return the space of RGB images. Shape: (height, width, 3)."""
-    return spaces.Box(0, 255, (camera.height, camera.width, 3), np.uint8)
+def image_space(example: Tensor) -> spaces.Box:
+    """Return the space of images: bytes are from 0 to 255, floats any numbers."""
+    shape, is_bytes = tuple(example.shape), example.dtype == torch.uint8
+    return spaces.Box(0, 255, shape, np.uint8) if is_bytes else spaces.Box(-_MOST, _MOST, shape)
 
 
 def vector_space(entries: Mapping[str, Entry]) -> spaces.Box:
@@ -127,12 +126,24 @@ class WorldBatch:
             device=options.device,
         )
         self._every = torch.arange(num_envs, device=self.worlds.device)
+        self._random_states = [np.random.RandomState(0)] * num_envs
         self.render_mode = options.render_mode
         self.has_images = options.observations == "pixels"
+        if options.transforms and not self.has_images:
+            raise InputError(
+                f"transforms change images, but observations={options.observations}; leave them out"
+            )
+        self._observer = Observer(
+            self.worlds,
+            [transform.make() for transform in options.transforms],
+            streams=lambda rows, key: [
+                side_stream(self._random_states[row], *key) for row in rows.tolist()
+            ],
+        )
         self.names = tuple(name for name in self.worlds.entries if name != END)
         """Entries of `info` that make up the state vector, in order."""
         self.observation_space: spaces.Box = (
-            image_space(options.camera)
+            image_space(self._observer.example()[0])
             if self.has_images
             else vector_space({name: self.worlds.entries[name] for name in self.names})
         )
@@ -141,19 +152,27 @@ class WorldBatch:
     def reset(self, env_ids: Tensor, generators: Sequence[np.random.Generator]) -> None:
         """Reset environments by index, shape (k,), each with its own random generator."""
         # each RandomState shares its generator's bit generator, so both advance together
-        streams = [np.random.RandomState(generator.bit_generator) for generator in generators]
-        self.worlds.reset(env_ids, streams)
+        states = [np.random.RandomState(generator.bit_generator) for generator in generators]
+        for row, state in zip(env_ids.tolist(), states, strict=True):
+            self._random_states[row] = state
+        self.worlds.reset(env_ids, states)
 
     def step(self, actions: Tensor) -> NDArray[np.float64]:
         """Step all environments; return their rewards. Shapes: (num_envs, *) to (num_envs,)."""
         actions = actions.to(self.worlds.device)
         return self.worlds.step(self._every, actions).cpu().numpy()
 
-    def observe(self, state: State | None = None) -> NDArray[Any]:
-        """Return the observations of all environments, or of those in `state`, as a new array."""
-        state = self.worlds.state if state is None else state
+    def observe(self, starts: Starts, env_ids: Tensor | None = None) -> NDArray[Any]:
+        """Return new observations, once after each step and each reset.
+
+        Args:
+            starts: Where episodes start, see `drone_rl.envs.observer.Starts`.
+            env_ids: Indices of environments, (k,); all by default.
+        """
+        state = self.worlds.state if env_ids is None else self.worlds.state[env_ids]
         if self.has_images:
-            return self.worlds.render(state).cpu().numpy()
+            rows = self._every if env_ids is None else env_ids
+            return self._observer.observe(state, rows, starts, None)["pixels"].cpu().numpy()
         info = self.worlds.info(state)
         flat = [info[name][:, None].flatten(1).float().nan_to_num() for name in self.names]
         return torch.cat(flat, 1).cpu().numpy()

@@ -7,15 +7,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import torch
-from gymnasium import Wrapper, spaces
+from gymnasium import Wrapper
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
-from drone_rl.config.transforms import Fault, Stack, Transform, as_transforms
-from drone_rl.envs.observer import Pipeline
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import shown
 
@@ -26,16 +23,11 @@ class Sb3Worlds(VecEnv):
     A step returns infos only for environments whose episode has just ended.
     """
 
-    def __init__(self, env: VectorEnv, transforms: Transform | Sequence[Transform] = ()) -> None:
-        """Wrap a vector environment.
-
-        Args:
-            env: An environment with autoreset mode "SameStep".
-            transforms: Transform of its images, RGB bytes (H, W, 3), or several in order; without
-                any, Stable-Baselines3 moves the channels first and scales to 0 to 1.
+    def __init__(self, env: VectorEnv) -> None:
+        """Wrap a vector environment of autoreset mode "SameStep".
 
         Raises:
-            InputError: The autoreset mode is different, or a transform is unsuitable.
+            InputError: It is none, or the autoreset mode is different.
         """
         if not isinstance(env, VectorEnv):
             raise InputError(
@@ -49,20 +41,9 @@ class Sb3Worlds(VecEnv):
                 f"autoreset_mode={name}, but Stable-Baselines3 needs SameStep; give "
                 "gymnasium.make_vec(..., autoreset_mode='SameStep')"
             )
-        transforms = as_transforms(transforms)
-        if any(isinstance(transform, Stack) for transform in transforms):
-            raise InputError("transforms stack frames; use Stable-Baselines3's VecFrameStack")
-        if strange := [t.name for t in transforms if isinstance(t, Fault)]:
-            raise InputError(f"the transform {strange[0]} needs a TorchRL environment; omit it")
         self.env = env
-        self.transforms = transforms
-        self._transform = Pipeline([transform.make() for transform in transforms])
         self._actions: NDArray[Any] = np.zeros(env.num_envs, np.int64)
-        space = env.single_observation_space
-        if transforms:
-            seen = self.observe(np.zeros((1, *(space.shape or ())), space.dtype))[0]
-            space = spaces.Box(-np.inf, np.inf, seen.shape, np.float32)
-        super().__init__(env.num_envs, space, env.single_action_space)
+        super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
 
     def reset(self) -> NDArray[Any]:
         """Start episodes, with the seeds of `seed`, if any. Shape: (num_envs, *)."""
@@ -71,7 +52,7 @@ class Sb3Worlds(VecEnv):
         seen, info = self.env.reset(seed=self._seeds)  # pyright: ignore[reportArgumentType] (one a world, as SyncVectorEnv)
         self.reset_infos = [_of_world(info, i) for i in range(self.num_envs)]
         self._reset_seeds()
-        return self.observe(seen)
+        return seen
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Store the actions."""
@@ -87,20 +68,13 @@ class Sb3Worlds(VecEnv):
         seen, rewards, terminated, truncated, info = self.env.step(self._actions)
         done = terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in done]
-        if done.any():
-            worlds = np.flatnonzero(done)
-            last = self.observe(np.stack([info["final_obs"][i] for i in worlds]))
-            for i, observation in zip(worlds.tolist(), last, strict=True):
-                infos[i] = {
-                    **_of_world(info["final_info"], i),
-                    "terminal_observation": observation,
-                    "TimeLimit.truncated": bool(truncated[i] and not terminated[i]),
-                }
-        return self.observe(seen), rewards.astype(np.float32), done, infos
-
-    def observe(self, images: NDArray[Any]) -> NDArray[Any]:
-        """Apply the transforms to images, (N, H, W, 3)."""
-        return self._transform(torch.from_numpy(images)).numpy()
+        for i in np.flatnonzero(done).tolist():
+            infos[i] = {
+                **_of_world(info["final_info"], i),
+                "terminal_observation": info["final_obs"][i],
+                "TimeLimit.truncated": bool(truncated[i] and not terminated[i]),
+            }
+        return seen, rewards.astype(np.float32), done, infos
 
     def close(self) -> None:
         """Close the renderer."""

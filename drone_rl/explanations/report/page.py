@@ -40,8 +40,7 @@ PARTS: dict[str, Part] = {
     "asymmetry": response.ASYMMETRY_PART,
     "left_out": behavior.LEFT_OUT_PART,
 }
-"""All parts in the order of the page, by the names of results in `Explanation`; results that no
-part shows are printed as JSON."""
+"""All parts in the order of the page, by the names of results in `Explanation`."""
 STYLES = ("style.css", "report.css")  # files of the page's one style element
 SCRIPTS = ("map.js",)
 """Files of the page's one script element; their data are in elements of type JSON."""
@@ -105,10 +104,6 @@ def render_page(explanations: Sequence[Explanation], folder: Path) -> str:
             html = render_section(name, explanations, folder)
             parts.append({"id": name, "title": part.title, "label": part.label, "html": html})
     environment = _environment()
-    others = {e.name: e.others(PARTS) for e in explanations if e.others(PARTS)}
-    if others:
-        html = environment.get_template("others.html").render(others=others)
-        parts.append({"id": "others", "title": "Other numbers", "label": "Others", "html": html})
     several = len(explanations) > 1
     style, script = static_text(environment, STYLES), static_text(environment, SCRIPTS)
     return environment.get_template("report.html").render(
@@ -132,7 +127,6 @@ def render_section(name: str, explanations: Sequence[Explanation], folder: Path)
     part = PARTS[name]
     results = ((getattr(e, name, None), e) for e in explanations)
     shown = {i: (of, e) for i, (of, e) in enumerate(results) if of}
-    _save(part.compare([e for _, e in shown.values()]), folder, "")
     policies = [
         {
             "name": e.name,

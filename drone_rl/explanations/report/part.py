@@ -1,7 +1,7 @@
 """Parts of the report: how it displays the sections of explanations."""
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from matplotlib.figure import Figure
@@ -45,5 +45,3 @@ class Part:
     """Returns the figures of a result and its explanation by file name."""
     values: Callable[[Any, Explanation], Mapping[str, Any]] = _nothing
     """Returns further values for the template."""
-    compare: Callable[[Sequence[Explanation]], Figures] = _nothing
-    """Returns figures of all policies together; they are saved but not on the page."""

@@ -26,8 +26,8 @@ from drone_rl.config import (
 from drone_rl.config.networks import Lstm, Network
 from drone_rl.config.parts import Part, Parts
 from drone_rl.config.registry import own_place
-from drone_rl.config.training import MOST_TRANSFORMS, TrainSettings
-from drone_rl.config.transforms import Fault, Frame, Stack, Transform
+from drone_rl.config.training import TrainSettings
+from drone_rl.config.transforms import MOST_TRANSFORMS, Fault, Frame, Stack, Transform
 from drone_rl.envs import DroneEnv, with_others
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.environment import EnvOptions

@@ -9,6 +9,7 @@ import pytest
 import torch
 
 import drone_rl
+from drone_rl.config.transforms import Gray, LateFrames, Noise, Stack, Standardize
 from drone_rl.sim.tasks import Task
 from drone_rl.sim.tasks.task import EndReason
 from drone_rl.utils.errors import InputError
@@ -55,10 +56,15 @@ def assert_same(ours, theirs, where=""):
         assert np.array_equal(ours, theirs), where
 
 
-@pytest.mark.parametrize("observations", ["pixels", "state"])
+FAULTY = [Gray(), Noise(strength=0.1), LateFrames(frames=2), Standardize(), Stack()]
+
+
+@pytest.mark.parametrize(
+    "observed", [{}, {"observations": "state"}, {"transforms": FAULTY}], ids=str
+)
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
-def test_batch_equals_gymnasiums_sync_vector_env(make, mode, observations):
-    options = {**SHORT, "observations": observations}
+def test_batch_equals_gymnasiums_sync_vector_env(make, mode, observed):
+    options = {**SHORT, **observed}
     ours = make(autoreset_mode=mode, **options)
     sync = {"vectorization_mode": "sync", "vector_kwargs": {"autoreset_mode": mode}}
     theirs = make(**sync, **options)
@@ -81,6 +87,18 @@ def test_batch_equals_gymnasiums_sync_vector_env(make, mode, observations):
     assert ours.np_random_seed == theirs.np_random_seed
     for one, other in zip(ours.np_random, theirs.np_random, strict=True):
         assert one.bit_generator.state == other.bit_generator.state
+
+
+def test_memory_of_frames_ends_with_the_episode(make_one):
+    env = make_one(transforms=["gray", "noise", "stack"], **SHORT)
+    seen, ended = env.reset(seed=0)[0], False
+    assert np.array_equal(seen[0], seen[1])  # padded at the start
+    while not ended:
+        after, _, terminated, truncated, _ = env.step(0)
+        assert np.array_equal(after[0], seen[1]) and not np.array_equal(after[1], seen[1])
+        seen, ended = after, terminated or truncated
+    again = env.reset()[0]
+    assert np.array_equal(again[0], again[1])
 
 
 def test_disabled_autoreset_requires_a_reset(make):

@@ -51,6 +51,11 @@ def test_options_set_task_and_camera(task):
         ({"camera": {"fov": 3}}, "camera.fov is unknown; valid names: width"),
         ({"camera": 64}, "camera=64: it must be"),
         ({"device": "tpu"}, "device=tpu is unknown"),
+        ({"transforms": ["grey"]}, "transforms.*grey.*did you mean gray"),
+        (
+            {"transforms": ["gray"], "observations": "state"},
+            "transforms change images, but observations=state; leave them out",
+        ),
     ],
 )
 def test_invalid_options_are_named(options, message):
@@ -71,7 +76,7 @@ def test_state_observation_concatenates_the_true_state():
     stage.worlds.state.lateral[0] = torch.tensor([4.0, torch.nan])
     stage.worlds.state.side[0] = torch.tensor([0, -1])
     stage.step(torch.tensor([1]))
-    (seen,) = stage.observe()
+    (seen,) = stage.observe(False)
     wanted = {
         "cubes": [0],
         "collected": [0, 0],

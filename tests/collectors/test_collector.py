@@ -1,4 +1,4 @@
-"""Behavior common to both collectors: TorchRL's interface and rows of a batch."""
+"""Behavior common to both collectors (TorchRL's interface), and collectors in threads."""
 
 import copy
 import itertools
@@ -9,10 +9,11 @@ from tensordict import TensorDict
 from tensordict.nn import TensorDictModule
 from torchrl.collectors import BaseCollector
 
-from drone_rl.collectors import EpisodeCollector, RolloutCollector
+from drone_rl.collectors import EpisodeCollector, RolloutCollector, ThreadedCollector
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.policies.baselines import oracle_policy
+from drone_rl.policies.baselines import OracleAgent
+from tests.collectors.test_episodes import SHORT
 
 TASK = TaskSettings(num_cubes=1, first_distance=3.0, step_limit=12, front_margin=3.0)
 KINDS = {
@@ -26,9 +27,7 @@ def make(request):
     """Return a factory of collectors of each kind, without rendering."""
 
     def build(actor=None, **kwargs):
-        return request.param(
-            DroneEnv(3, TASK, pixels=False), actor or oracle_policy(TASK), **kwargs
-        )
+        return request.param(DroneEnv(3, TASK, pixels=False), actor or OracleAgent(), **kwargs)
 
     return build
 
@@ -50,12 +49,12 @@ def test_stops_at_total_frames(make):
 
 
 def test_set_seed_seeds_the_environments(make):
-    collector = make()
-    first = collector.collect()["info", "cube_positions"]
+    collector = make(info=("cube_positions",))
+    first = collector.collect()["next", "info", "cube_positions"]
     assert collector.set_seed(0, static_seed=True) == 0
-    assert torch.equal(collector.collect()["info", "cube_positions"], first)
+    assert torch.equal(collector.collect()["next", "info", "cube_positions"], first)
     assert collector.set_seed(7) != 7  # the seed for the next collector
-    assert not torch.equal(collector.collect()["info", "cube_positions"][0], first[0])
+    assert not torch.equal(collector.collect()["next", "info", "cube_positions"][0], first[0])
 
 
 def test_update_weights_accepts_actor_state_dict_or_tensordict(make):
@@ -80,3 +79,33 @@ def test_shutdown_can_leave_the_environment_open(make):
     assert not collector.env.is_closed
     collector.shutdown()
     assert collector.env.is_closed
+
+
+def threaded(make_pipeline):
+    shares = [make_pipeline(2, task=SHORT, first_world=i * 2, num_shards=1) for i in range(2)]
+    return ThreadedCollector([EpisodeCollector(*share) for share in shares])
+
+
+def test_threaded_batches_are_deterministic(make_pipeline):
+    first, second = threaded(make_pipeline), threaded(make_pipeline)
+    for _ in range(3):
+        one, two = first.collect(), second.collect()
+        assert torch.equal(one["pixels"], two["pixels"])
+        assert torch.equal(one["action"], two["action"])
+    first.shutdown()
+    second.shutdown()
+
+
+def test_threaded_state_round_trip(make_pipeline):
+    first = threaded(make_pipeline)
+    first.collect()
+    state = first.state_dict()
+    second = threaded(make_pipeline)
+    second.load_state_dict(state)
+    assert second.state_dict() == state
+    for one, two in zip(first.collectors, second.collectors, strict=True):
+        cubes = [c.env.reset()["info", "cube_positions"] for c in (one, two)]
+        assert torch.equal(*cubes)
+    assert second.collectors[0].frames == first.collectors[0].frames
+    first.shutdown()
+    second.shutdown()

@@ -1,9 +1,12 @@
-"""Base class of the collectors of one batch of environments."""
+"""Base class of the collectors of one batch of environments, and threads that run several."""
 
 import abc
-from collections.abc import Callable, Iterable, Iterator
+import contextvars
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypedDict, cast
 
+import torch
 from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import nn
@@ -12,8 +15,9 @@ from torchrl.envs import EnvBase
 
 from drone_rl.envs import base_env
 from drone_rl.envs.drone_env import Entries
-from drone_rl.envs.rollout import ActorAgent, Agent, Step
+from drone_rl.envs.rollout import Agent, Step, as_agent
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.threads import set_torch_threads
 
 
 class BatchOptions(TypedDict, total=False):
@@ -55,7 +59,7 @@ class BatchedCollector(BaseCollector):
         self.total_frames = total_frames
         self.frames = 0
         self.episodes = 0
-        self._agent: Agent = ActorAgent(actor) if isinstance(actor, TensorDictModuleBase) else actor
+        self._agent = as_agent(actor)
         self._info = tuple(name for name in info if name != "end_reason")
         if unknown := [name for name in self._info if name not in self.base_env.worlds.entries]:
             raise InputError(
@@ -113,3 +117,60 @@ class BatchedCollector(BaseCollector):
         self.actor.load_state_dict(
             policy_or_weights.state_dict() if is_module else policy_or_weights
         )
+
+
+class ThreadedCollector:
+    """Join the batches of collectors that run in parallel, each in its own thread.
+
+    Rendering releases the interpreter's lock, so that one collector renders while the policy of
+    another acts. Batches are joined in order, so the result does not depend on the threads' speed.
+    """
+
+    def __init__(
+        self,
+        collectors: Sequence[BatchedCollector],
+        *,
+        postproc: Callable[[TensorDictBase], TensorDictBase] | None = None,
+    ) -> None:
+        """Take over collectors of disjoint environments, each rendered by a single shard.
+
+        `postproc` is applied to each joined batch, such as a return estimator.
+        """
+        self.collectors, self.postproc = list(collectors), postproc
+        self.actor = self.collectors[0].actor
+        """The policy that learns."""
+        # one torch thread each: the collectors are what runs in parallel
+        self._pool = ThreadPoolExecutor(
+            len(self.collectors), "collect", initializer=set_torch_threads, initargs=(1,)
+        )
+
+    def __iter__(self) -> Iterator[TensorDictBase]:
+        """Yield batches without end."""
+        while True:
+            yield self.collect()
+
+    def collect(self) -> TensorDictBase:
+        """Return the batches of the collectors, joined along the first dimension.
+
+        ("collector", "traj_ids") are unique only within the part of one collector.
+        """
+        contexts = [contextvars.copy_context() for _ in self.collectors]  # as in the calling thread
+        parts = list(self._pool.map(lambda c, at: at.run(c.collect), self.collectors, contexts))
+        joined: Any = torch.cat  # its annotation lacks TensorDicts
+        batch = parts[0] if len(parts) == 1 else joined(parts)
+        return batch if self.postproc is None else self.postproc(batch)
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return the collectors' states between two batches."""
+        return {"collectors": [collector.state_dict() for collector in self.collectors]}
+
+    def load_state_dict(self, state_dict: dict[str, Any]) -> None:
+        """Resume from a `state_dict`."""
+        for collector, part in zip(self.collectors, state_dict["collectors"], strict=True):
+            collector.load_state_dict(part)
+
+    def shutdown(self) -> None:
+        """End the threads and close the environments."""
+        self._pool.shutdown()
+        for collector in self.collectors:
+            collector.shutdown()
