@@ -17,7 +17,8 @@ from drone_rl.trust.axes import find_axes
 from drone_rl.trust.domain import Prober
 from drone_rl.trust.judge import judge
 from drone_rl.trust.paired_evaluation import PairedEvaluator
-from drone_rl.trust.shifts import make_evaluated_policy, shifts
+from drone_rl.trust.paired_evaluation import EvaluatedPolicy
+from drone_rl.trust.shifts import shifts
 from drone_rl.trust.shifts_results import Domain, Probe
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent

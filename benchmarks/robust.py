@@ -21,7 +21,7 @@ from drone_rl.policies.zoo import read_checkpoint
 from drone_rl.training.run_folder import settings_of
 from drone_rl.trust.axes import AXES, GROUPS, find_axes
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
-from drone_rl.trust.shifts import make_evaluated_policy
+from drone_rl.trust.paired_evaluation import EvaluatedPolicy
 from drone_rl.utils.files import last_of
 
 DEFAULT, ALL = "default", "all"

@@ -141,9 +141,9 @@ def require_repeatable(
         found = repeat(env, actor, greedy)
     if not found.is_same:
         raise InputError(
-            f"policy={policy.name} acts by more than its observations: called with {found.worst.how}, "
+            f"policy={policy.name} acts by more than its observations: with {found.worst.how}, "
             f"{found.worst.different} of {found.episodes} episodes end otherwise; give a policy "
-            "without state, whose actions depend on no other environment and on no order of sums"
+            "whose actions depend on no other environment, no other episode and no order of sums"
         )
 
 

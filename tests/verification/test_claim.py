@@ -12,7 +12,7 @@ from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.policies.zoo import certificate_path
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes import CubeGoals, CubesEnd
-from drone_rl.trust.results import Proof, Rounding
+from drone_rl.trust.results import Proof
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import RootSeed
 from drone_rl.verification.checker.certificate import Certificate
@@ -75,16 +75,6 @@ def test_placements_rounded_out_of_bounds(good):
     narrow = good.in_task(lateral_bound=5.3)
     found = claim(narrow).quote(flown([[place, 0.0]], [ALL]))
     assert (found.refused, found.agreeing) == (None, 1)
-
-
-@pytest.mark.parametrize(("fragile", "is_refused"), [(20, False), (21, True)])
-def test_certificate_is_not_quoted_if_rounding_decides(good, fragile, is_refused):
-    counts = {"episodes": 5, "fragile_episodes": 1, "compared_episodes": 5, "unexplained": 0}
-    found = Rounding(
-        arithmetic="float32", frames=1000, fragile=fragile, compared="PyTorch", **counts
-    )
-    evidence = claim(good).quote(flown([[0.0, 1.0]], [ALL]), rounding=found)
-    assert (evidence.refused is not None) == is_refused
 
 
 def test_lost_placements(good):
