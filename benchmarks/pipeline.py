@@ -22,7 +22,7 @@ from drone_rl.envs import DroneEnv
 from drone_rl.policies import PolicyNetwork, SmallCNN, make_actor
 from drone_rl.policies.environment import make_env
 from drone_rl.sim.rendering import RendererFactory
-from drone_rl.training.components import make_collector
+from drone_rl.training.train import make_collector
 
 
 def default_collector(

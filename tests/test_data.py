@@ -19,7 +19,7 @@ MUTABLE = {
     "trust.domain:End",
     "sweeps.figures:Layout",
     "training.callbacks:TrainingProgress",
-    "training.learners:ActorCriticLearner",
+    "training.actor_critic:ActorCriticLearner",
     "training.learners:GradientLearner",
     "training.learners:ReinforceLearner",
     "training.trainer:Trainer",

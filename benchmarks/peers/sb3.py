@@ -18,7 +18,7 @@ from drone_rl.envs.gymnasium.environments import DroneWorlds
 from drone_rl.envs.sb3.worlds import Sb3Worlds
 from drone_rl.policies.external_policy import policy_from
 from drone_rl.policies.sb3 import Sb3Trunk
-from drone_rl.training.trainer import running_mean
+from drone_rl.training.metrics import running_mean
 from drone_rl.utils.errors import InputError
 
 ALGORITHMS: Mapping[str, type[OnPolicyAlgorithm]] = MappingProxyType({"ppo": PPO, "a2c": A2C})

@@ -129,8 +129,8 @@ class VerdictCommand(AppearanceCommandSettings, JudgeSettings):
     certificate.json in the folder of a run, NAME.certificate.json next to NAME.safetensors."""
     require: Annotated[str, OneOf(("good", "proved"))] | None = None
     """good or null: exit status 0 only if the policy is certainly good, otherwise one per kind.
-    proved: 0 only if a certificate proves success from every placement and rollouts re-checked it,
-    otherwise 16."""
+    proved: 0 only if there is a certificate of success from every placement, episodes do not refute
+    it, and the proof is computed again (minutes), otherwise 16."""
     shifts: str | None = None
     """File shifts.json to quote; null takes the one next to the policy, otherwise the newest under
     outputs/shifts of this network and task."""
@@ -140,7 +140,7 @@ class VerdictCommand(AppearanceCommandSettings, JudgeSettings):
 
     def run(self, folder: Path) -> tuple[int, str]:
         """Judge one policy; return the exit status and the kind's name."""
-        names = ("dynamics", "appearance", "certificate", "shifts", "require_domain")
+        names = ("dynamics", "appearance", "certificate", "require", "shifts", "require_domain")
         options = {name: getattr(self, name) for name in names}
         result = drone_rl.judge(self.policy, self, **options, **self.shared(), progress=silent)
         finish(result, folder / "verdict.json")

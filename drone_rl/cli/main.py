@@ -27,8 +27,8 @@ examples
   drone-rl train resume=RUN_FOLDER     resume an interrupted run
   drone-rl evaluate                    evaluate the newest policy
   drone-rl explain policy=good         explain a shipped policy
-  drone-rl COMMAND --help              the most used settings of a command, and examples
-  drone-rl COMMAND --help all          every setting of a command
+  drone-rl COMMAND --help              the settings and groups of a command, and examples
+  drone-rl COMMAND --help all          every setting, those inside groups included
   drone-rl COMMAND --help NAME         one setting, or a group of them such as optimizer
   drone-rl --version                   the version
 """.format(commands="\n".join(f"  {name:<12}  {entry['about']}" for name, entry in TABLE.items()))

@@ -13,15 +13,11 @@ from typing import Any
 
 import torch
 from tensordict import TensorDict, TensorDictBase
-from tensordict.nn import TensorDictModuleBase
-from torch import nn
 
 from drone_rl.collectors.episodes import EpisodeCollector
+from drone_rl.policies.actor import DirectActor
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.ray_cluster import connect
-
-WorkerComponents = tuple[EpisodeCollector, nn.Module, torch.Generator]
-"""A worker's collector, the network inside it and the stream of its actions."""
 
 _log = logging.getLogger(__name__)
 
@@ -29,9 +25,11 @@ _log = logging.getLogger(__name__)
 class _RemoteEpisodes:
     """Run an `EpisodeCollector` in a worker, with the parameters and state of each request."""
 
-    def __init__(self, make: Callable[[], WorkerComponents]) -> None:
+    def __init__(self, make: Callable[[], EpisodeCollector]) -> None:
         torch.set_num_threads(1)
-        self._episodes, self._network, self._actions = make()
+        self._episodes = make()
+        actor = self._episodes.actor
+        self._network, self._actions = actor.network, actor.generator
 
     def collect(
         self, weights: dict[str, torch.Tensor], state: dict | None
@@ -58,9 +56,8 @@ class RayEpisodeCollector:
 
     def __init__(
         self,
-        makers: Sequence[Callable[[], WorkerComponents]],
-        actor: TensorDictModuleBase,
-        network: nn.Module,
+        makers: Sequence[Callable[[], EpisodeCollector]],
+        actor: DirectActor,
         *,
         address: str | None = None,
         num_cpus: float = 1.0,
@@ -73,7 +70,6 @@ class RayEpisodeCollector:
         Args:
             makers: One function for each worker, sent to it; makes its collector.
             actor: The policy that learns, in this process.
-            network: Its network.
             address: Address of the cluster; None joins the one known here or starts one.
             num_cpus: Cores of a worker.
             max_lost_workers: Number of workers that may be replaced before training stops.
@@ -84,7 +80,7 @@ class RayEpisodeCollector:
             InputError: Ray isn't installed, or the cluster is out of reach or too small.
         """
         self.actor, self.postproc = actor, postproc
-        self._network, self._device = network, device
+        self._device = device
         self._makers, self._num_cpus = list(makers), num_cpus
         self._ray, is_own = connect(address, "collector=ray")
         try:
@@ -108,7 +104,7 @@ class RayEpisodeCollector:
         Raises:
             InputError: Too many workers were lost.
         """
-        weights = {k: v.detach().cpu() for k, v in self._network.state_dict().items()}
+        weights = {k: v.detach().cpu() for k, v in self.actor.network.state_dict().items()}
         shared = self._ray.put(weights)
         numbers = range(len(self._makers))
         tasks = [self.workers[i].collect.remote(shared, self._states[i]) for i in numbers]
@@ -150,7 +146,7 @@ class RayEpisodeCollector:
             ) from error
         return workers
 
-    def _worker(self, make: Callable[[], WorkerComponents]) -> Any:
+    def _worker(self, make: Callable[[], EpisodeCollector]) -> Any:
         remote = self._ray.remote(_RemoteEpisodes)
         return remote.options(num_cpus=self._num_cpus).remote(make)
 

@@ -45,11 +45,11 @@ class JudgeSettings(HeldOutSettings):
     """Evaluate the policy with sampled actions, too; reported next to the verdict."""
     good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
     """Fraction of the oracle's success rate that a good policy exceeds."""
-    certificate_flights: Annotated[int, Whole(0, 10_000_000, "rollouts")] = 1000
-    """Rollouts that re-check a given certificate like drone-rl check; with 0 it does not count."""
+    certificate_flights: Annotated[int, Whole(0, 10_000_000, "rollouts")] = 3000
+    """Episodes that check a given certificate like drone-rl check; they can refute, not prove it."""
     domain_flights: Annotated[int, Whole(0, 100_000, "episodes")] = 200
-    """New episodes at each re-checked strength of the required domain: both ends of each range and
-    two random strengths within it; with 0 it is not covered."""
+    """New episodes at strengths drawn from all required ranges together, one each; with 0 the
+    required domain is not covered."""
 
 
 BODIES = (
@@ -77,7 +77,7 @@ class BodiesSettings(JudgeSettings):
     sampled: bool = False
     """Evaluate with sampled actions, too."""
     certificate_flights: Annotated[int, Whole(0, 10_000_000, "rollouts")] = 0
-    """Rollouts that re-check a certificate; with 0 the table's verdicts prove nothing."""
+    """Episodes that check a certificate; with 0 it is quoted as not checked."""
     domain_flights: Annotated[int, Whole(0, 100_000, "episodes")] = 0
     """New episodes that check a required operating domain; the table requires none."""
     loop_flights: Annotated[int, Whole(0, 1000, "rollouts")] = 0
@@ -177,8 +177,8 @@ class PathsSettings(Settings):
 class CheckSettings(DeviceSettings):
     """Settings of a certificate check."""
 
-    flights: Annotated[int, Whole(1, 10_000_000, "rollouts")] = 2000
-    """Rollouts from corners, centres, random points and borders of the boxes."""
+    flights: Annotated[int, Whole(1, 10_000_000, "rollouts")] = 3000
+    """Episodes from random placements, boxes, borders, and limits of all placements."""
     seed: Annotated[int, Whole(0)] | None = None
     """Seed of the rollouts' placements; null takes a fresh one from the operating system, which is
     printed and recorded."""

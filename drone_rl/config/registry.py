@@ -14,12 +14,12 @@ classes and functions in higher layers.
 
 import functools
 import inspect
-import math
 import re
-import types
 import typing
 from collections.abc import Callable, Mapping, Sequence, Set
-from typing import Annotated, Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
+
+import pydantic
 
 from drone_rl.config.learning import Collector, Objective, Returns
 from drone_rl.config.networks import Network
@@ -27,7 +27,6 @@ from drone_rl.config.parts import Part
 from drone_rl.config.transforms import Frame, Transform
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.plugins import described, errors_of, place_of
-from drone_rl.utils.schema import Flag, Kind, Real, Several, Text, Whole
 from drone_rl.utils.settings import Settings
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -37,37 +36,21 @@ class _Base(NamedTuple):
     """Base class, or protocol, of one kind of part."""
 
     name: str
-    attribute: str
-    """Attribute that only it and classes derived from it have; "" for a protocol."""
     members: tuple[str, ...]
     """Attributes of its objects."""
-    decorator: str
 
 
 _BASES: dict[type[Part], _Base] = {
-    Network: _Base("PolicyNetwork", "is_recurrent", ("in_shape",), "register_network"),
-    Transform: _Base(
-        "Transform", "set_container", ("_apply_transform", "_parameters"), "register_transform"
-    ),
-    Returns: _Base("ReturnEstimator", "estimate", ("estimate", "_parameters"), "register_returns"),
+    Network: _Base("PolicyNetwork", ("in_shape",)),
+    Transform: _Base("Transform", ("_apply_transform", "_parameters")),
+    Returns: _Base("ReturnEstimator", ("estimate", "_parameters")),
     Objective: _Base(
-        "Learner",
-        "",
-        ("in_keys", "update", "state_dict", "check_state", "load_state_dict"),
-        "register_learner",
+        "Learner", ("in_keys", "update", "state_dict", "check_state", "load_state_dict")
     ),
-    Collector: _Base(
-        "Components", "", ("collector", "network", "generators"), "register_collector"
-    ),
+    Collector: _Base("Components", ("collector", "network", "generators")),
 }
 _KEYS = {"in_keys", "out_keys"}
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,60}")
-_KINDS: dict[Any, Kind] = {
-    int: Whole(-(2**63), 2**63 - 1),
-    float: Real(-math.inf),
-    bool: Flag(),
-    str: Text(),
-}
 
 
 def implements(*variants: type[Part]) -> Callable[[F], F]:
@@ -121,7 +104,7 @@ def register_learner(name: str) -> Callable[[F], F]:
     """Decorate a class or function to register it as a learner, selected by `objective=NAME`.
 
     It is called as `factory(settings, components, **own)`, with the settings of the training run
-    and the result of `drone_rl.training.components.make_collector`, and returns a
+    and the result of `drone_rl.training.train.make_collector`, and returns a
     `drone_rl.training.learners.Learner`. See `register_network` for errors.
     """
     return _decorator(Objective, name, 2)
@@ -132,7 +115,7 @@ def register_collector(name: str) -> Callable[[F], F]:
 
     It is called as `factory(settings, replay, **own)`, with the settings of the training run and
     the task that replays failures (None for the task of the settings), and returns a
-    `drone_rl.training.components.Components`. See `register_network` for errors.
+    `drone_rl.training.train.Components`. See `register_network` for errors.
     """
     return _decorator(Collector, name, 2)
 
@@ -173,17 +156,11 @@ def _decorator(
     """
     kind = part.__name__.lower()
     if not isinstance(name, str):
-        example = f'@drone_rl.{_BASES[part].decorator}("mine")'
-        raise InputError(f"give a name in brackets, as in {example}")
+        raise InputError('give a name in brackets, as in @drone_rl.register_network("mine")')
     if not _NAME.fullmatch(name):
         raise InputError(f"name={name!r} is invalid; give lower-case letters, digits and _")
 
     def register(factory: F) -> F:
-        code, base = cast(Any, factory), _BASES[part]
-        if base.attribute and isinstance(code, type) and not hasattr(code, base.attribute):
-            raise InputError(
-                f"{code.__name__} does not derive from {base.name}; derive it from there"
-            )
         _free_name(part, name, factory.__module__)
         fields = _fields(name, factory, positional, skipped)
         taken = {*dir(part), "target"} - part.model_fields.keys()
@@ -202,10 +179,10 @@ def _decorator(
             "__doc__": (inspect.getdoc(factory) or name).split("\n")[0],
             "__module__": factory.__module__,
             "target": name,
-            "factory": staticmethod(_checked(factory, f"{kind}={name}", base)),
+            "factory": staticmethod(_checked(factory, f"{kind}={name}", _BASES[part])),
             "arguments": lambda self: {n: v for n, v in self.values().items() if n in names},
         }
-        code.Settings = type(name.title().replace("_", ""), (part,), namespace)
+        cast(Any, factory).Settings = type(name.title().replace("_", ""), (part,), namespace)
         return factory
 
     return register
@@ -271,15 +248,13 @@ def _fields(
 
 def _annotated(hint: Any, where: str) -> Any:
     """Return the type of a parameter as that of a setting: lists and sequences are tuples."""
-    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
-    inner = {*arguments} - {types.NoneType}
-    is_optional = origin in (typing.Union, types.UnionType) and len(inner) == 1
-    is_choice = origin is typing.Literal and all(isinstance(text, str) for text in arguments)
-    if origin is Annotated or hint in _KINDS or is_choice or (is_optional and inner <= {*_KINDS}):
-        return hint
-    if origin in (tuple, list, Sequence) and inner <= {*_KINDS, ...} and len(inner - {...}) == 1:
-        return Annotated[tuple[arguments[0], ...], Several(_KINDS[arguments[0]], 0, 1000)]
-    raise InputError(
-        f"{where} is of type {hint}; give int, float, bool, str, a tuple of one of these, Literal, "
-        "or Annotated with a kind of drone_rl.utils.schema"
-    )
+    if typing.get_origin(hint) in (list, Sequence):
+        hint = tuple[typing.get_args(hint)[0], ...]
+    try:
+        pydantic.TypeAdapter(hint).json_schema()  # plain data have one
+    except pydantic.PydanticUserError as error:
+        raise InputError(
+            f"{where} is of type {hint}; give int, float, bool, str, a tuple of one of these, "
+            "Literal, or Annotated with a kind of drone_rl.utils.schema"
+        ) from error
+    return hint

@@ -5,7 +5,7 @@ import io
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, TypedDict, Unpack
+from typing import Annotated, Any
 
 import numpy as np
 import torch
@@ -90,22 +90,12 @@ class ChapterFigure(Result):
         return picture(self.image)
 
 
-class FigureOptions(TypedDict, total=False):
-    """Fields of `FigureSettings` except the number of the figure."""
-
-    frames: int | None
-    episodes: int | None
-    tint: str
-    kernel: str
-    seed: int
-
-
 def reproduce(
     figure: int,
     settings: FigureSettings | None = None,
     *,
     outputs: str | Path = "outputs",
-    **changes: Unpack[FigureOptions],
+    **changes: Any,
 ) -> ChapterFigure:
     """Make a figure of the chapter again, with shipped policies and the chapter's set-up.
 

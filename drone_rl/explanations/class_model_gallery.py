@@ -4,7 +4,7 @@ import dataclasses
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -16,7 +16,6 @@ from drone_rl.explanations.rollouts import collect
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.explanations.settings import (
     ClassModelSettings,
-    ClassModelsOptions,
     ClassModelsSettings,
 )
 from drone_rl.policies.external_network import Logits
@@ -138,7 +137,7 @@ def class_models(
     *,
     task: Mapping[str, Any] | None = None,
     outputs: str | Path = "outputs",
-    **changes: Unpack[ClassModelsOptions],
+    **changes: Any,
 ) -> ClassModels:
     """Optimize an observation for each action of a policy (section 5.2, Eq. 18).
 

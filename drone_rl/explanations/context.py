@@ -17,8 +17,8 @@ from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frame
 from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import ImageNetwork, make_actor
+from drone_rl.trust.results import Proof
 from drone_rl.trust.shifts_results import SavedShifts
-from drone_rl.trust.verdict import CertificateClaim
 from drone_rl.utils.limits import FILM_BYTES, FILM_STEPS
 from drone_rl.utils.seeding import RootSeed, Stream, torch_generator, with_seed
 
@@ -41,7 +41,7 @@ class Context:
         env: EnvBase,
         network: ImageNetwork,
         settings: ExplainSettings,
-        claim: CertificateClaim | None = None,
+        claim: Proof | None = None,
         measured: SavedShifts | None = None,
         unlike: Mapping[str, Any] | None = None,
         seed: RootSeed | None = None,

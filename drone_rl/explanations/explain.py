@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 from torchrl.envs import EnvBase
 
@@ -15,7 +15,7 @@ from drone_rl.explanations import attribution, behavior, class_models, embedding
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.results import Explanation
-from drone_rl.explanations.settings import ExplainOptions, ExplainSettings
+from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
@@ -24,8 +24,9 @@ from drone_rl.sim.vocabulary import shown_actions
 from drone_rl.trust.coverage import find_domain
 from drone_rl.trust.recorded import record_verdict
 from drone_rl.trust.repetition import require_repeatable
+from drone_rl.trust.results import Proof
 from drone_rl.trust.shifts_results import SavedShifts
-from drone_rl.trust.verdict import CertificateClaim, FindClaim
+from drone_rl.trust.verdict import FindClaim
 from drone_rl.utils.display import Result, page
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path, new_run_folder, to_file_name
@@ -93,7 +94,7 @@ def explain(
     progress: Progress | None = None,
     more_sections: Mapping[str, Section] | None = None,
     find_claim: FindClaim | None = None,
-    **changes: Unpack[ExplainOptions],
+    **changes: Any,
 ) -> Explanations:
     """Explain what policies respond to and whether they can be trusted.
 
@@ -173,7 +174,7 @@ def explain_policy(
     provenance: dict[str, Any],
     progress: Callable[[str], None] = lambda _: None,
     sections: Mapping[str, Section] | None = None,
-    claim: CertificateClaim | None = None,
+    claim: Proof | None = None,
     measured: SavedShifts | None = None,
     unlike: Mapping[str, Any] | None = None,
     seed: RootSeed | None = None,

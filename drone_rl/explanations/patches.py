@@ -44,39 +44,35 @@ class PatchGrid:
         """Number of patches."""
         return self.rows * self.columns
 
-    def span(self, patch: int) -> tuple[slice, slice]:
-        """Return rows and columns of pixels of a patch; patches are numbered row by row."""
-        row, column = divmod(patch, self.columns)
-        top, left = self.top + row * self.height, self.left + column * self.width
-        return slice(top, top + self.height), slice(left, left + self.width)
-
     def masks(self, size: tuple[int, ...]) -> Tensor:
         """Return the pixels of each patch in a frame of that size. Shape: (count, h, w), bool."""
-        masks = torch.zeros(self.count, *size, dtype=torch.bool)
-        for i in range(self.count):
-            masks[i][self.span(i)] = True
-        return masks
+        one = torch.eye(self.count, dtype=torch.bool).view(-1, self.rows, self.columns)
+        inside = one.repeat_interleave(self.height, 1).repeat_interleave(self.width, 2)
+        right, below = size[1] - inside.shape[2], size[0] - inside.shape[1]
+        return functional.pad(inside, (self.left, right - self.left, self.top, below - self.top))
 
     def means(self, maps: Tensor) -> NDArray:
         """Return the mean heat of each patch. Shape: (T, h, w) to (T, count), float64."""
-        heat = [maps[:, *self.span(i)].double().mean((1, 2)) for i in range(self.count)]
-        return torch.stack(heat, 1).cpu().numpy()
+        inside = maps[:, None, self.top :, self.left :].double()
+        heat = functional.avg_pool2d(inside, (self.height, self.width))
+        return heat[:, 0, : self.rows, : self.columns].flatten(1).cpu().numpy()
 
 
 def make_grid(height: int, width: int, patches: int = PATCHES) -> PatchGrid:
     """Return about so many patches, nearly square, that leave out few pixels of a frame."""
-    best, cost = PatchGrid(1, 1, height, width), np.inf
+
+    def cost(grid: PatchGrid) -> float:
+        lost = 1 - grid.count * grid.height * grid.width / (height * width)
+        shape = abs(np.log(grid.width / grid.height))
+        return 4 * lost + abs(np.log(grid.count / patches)) + 0.5 * shape
+
+    grids = []
     for rows in range(1, height + 1):
         for columns in range(1, min(width, 2 * patches // rows) + 1):
             down, across = height // rows, width // columns
-            lost = 1 - rows * down * columns * across / (height * width)
-            number = abs(np.log(rows * columns / patches))
-            shape = abs(np.log(across / down))
-            if 4 * lost + number + 0.5 * shape < cost:
-                cost = 4 * lost + number + 0.5 * shape
-                top, left = (height - rows * down) // 2, (width - columns * across) // 2
-                best = PatchGrid(down, across, rows, columns, top, left)
-    return best
+            top, left = (height - rows * down) // 2, (width - columns * across) // 2
+            grids.append(PatchGrid(down, across, rows, columns, top, left))
+    return min(grids, key=cost)
 
 
 @torch.no_grad()

@@ -106,26 +106,6 @@ def check_perplexity(perplexity: float, count: int) -> None:
         )
 
 
-class ClassModelsOptions(TypedDict, total=False):
-    """Fields of `ClassModelsSettings`."""
-
-    maximize: str
-    parameterisation: str
-    initial: str
-    steps: int
-    step: str
-    lr: float
-    normalize: str
-    blur: float
-    clamp: bool
-    l2: float
-    jitter: int
-    starts: int
-    gallery: bool
-    episodes: int
-    seed: int | None
-
-
 class ExplainOptions(TypedDict, total=False):
     """Fields of `ExplainSettings`."""
 

@@ -22,7 +22,6 @@ from drone_rl.config import (
     TaskSettings,
 )
 from drone_rl.config.configuration import Changes, as_changes
-from drone_rl.config.options import DynamicsOptions, TaskOptions
 from drone_rl.config.transforms import (
     Fault,
     Frame,
@@ -78,7 +77,7 @@ class ExternalPolicy(BasePolicy):
         """The policy's name; its training is unknown."""
         return {"policy": self.name, "trained": None}
 
-    def in_task(self, **changes: Unpack[TaskOptions]) -> "ExternalPolicy":
+    def in_task(self, **changes: Any) -> "ExternalPolicy":
         """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`."""
         if not isinstance(self.task, Settings):
             if changes:
@@ -91,7 +90,7 @@ class ExternalPolicy(BasePolicy):
         with prefixed_errors("task"):
             return dataclasses.replace(self, task=self.task.replace(**changed))
 
-    def in_dynamics(self, **changes: Unpack[DynamicsOptions]) -> "ExternalPolicy":
+    def in_dynamics(self, **changes: Any) -> "ExternalPolicy":
         """Return the same policy with other dynamics, such as `in_dynamics(wind=(5, 0, 0))`."""
         changed = Changes(DynamicsSettings).read(changes, "dynamics")
         with prefixed_errors("dynamics"):
@@ -164,6 +163,10 @@ def policy_from(
     name: str | None = None,
 ) -> ExternalPolicy:
     """Return a third-party policy to judge, evaluate and explain.
+
+    A verdict on a callable presumes that it does not look at the program that judges it: Python
+    code can read the simulator's state and count its calls. What comes from strangers can be judged
+    as a policy file (`drone_rl.load_policy`), which holds weights and no code.
 
     A torch module is copied and set to evaluation mode; all explanations support it. Fewer
     explanations support other torch functions, and still fewer support other callables. The policy

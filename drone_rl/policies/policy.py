@@ -21,7 +21,6 @@ from drone_rl.config import (
     DynamicsSettings,
 )
 from drone_rl.config.configuration import Changes
-from drone_rl.config.options import DynamicsOptions, TaskOptions
 from drone_rl.envs import Pipeline
 from drone_rl.policies import ImageNetwork, RecurrentNetwork, make_actor
 from drone_rl.policies.environment import EnvOptions
@@ -101,7 +100,7 @@ class BasePolicy(abc.ABC):
         """Plain values: "policy", its file or name, and how it was "trained"; None if unknown."""
 
     @abc.abstractmethod
-    def in_task(self, **changes: Unpack[TaskOptions]) -> Self:
+    def in_task(self, **changes: Any) -> Self:
         """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`.
 
         Raises:
@@ -109,7 +108,7 @@ class BasePolicy(abc.ABC):
         """
 
     @abc.abstractmethod
-    def in_dynamics(self, **changes: Unpack[DynamicsOptions]) -> Self:
+    def in_dynamics(self, **changes: Any) -> Self:
         """Return the same policy with other dynamics: `policy.in_dynamics(mode="simple_flight")`.
 
         Raises:
@@ -231,14 +230,14 @@ class Policy(BasePolicy):
         trained = {**{key: self.state[key] for key in keys}, "command": self.state.get("command")}
         return {"policy": str(self.path), "trained": trained}
 
-    def in_task(self, **changes: Unpack[TaskOptions]) -> "Policy":
+    def in_task(self, **changes: Any) -> "Policy":
         """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`."""
         changed = Changes(type(self.task)).read(changes, "task")
         described = self.description.as_dict()
         described["task"] |= changed
         return dataclasses.replace(self, description=parse(described))
 
-    def in_dynamics(self, **changes: Unpack[DynamicsOptions]) -> "Policy":
+    def in_dynamics(self, **changes: Any) -> "Policy":
         """Return the same policy with other dynamics, as in `in_dynamics(mode="simple_flight")`."""
         changed = Changes(DynamicsSettings).read(changes, "dynamics")
         described = self.description.as_dict()

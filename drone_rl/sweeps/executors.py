@@ -5,7 +5,6 @@ Each run is a process of its own.
 
 import collections
 import json
-import logging
 import os
 import re
 import signal
@@ -29,7 +28,6 @@ PROGRAM = (sys.executable, "-m", "drone_rl.cli.main")
 """The program of a run."""
 POLL_S = 0.1
 """Seconds between polls of a process."""
-_log = logging.getLogger(__name__)
 
 
 class RunProcess:
@@ -238,19 +236,6 @@ class RayExecutor:
         self._ray, self._started = connect(address, "hydra/launcher=ray")
         remote = self._ray.remote(num_cpus=num_cpus, num_gpus=num_gpus, max_retries=3)
         self._finish_run = remote(finish_run)
-        self._check_room({"cpus": num_cpus, "gpus": num_gpus})
-
-    def _check_room(self, wanted: Mapping[str, float]) -> None:
-        """Warn of runs that fit on no machine; a cluster may grow."""
-        machines = [node["Resources"] for node in self._ray.nodes() if node["Alive"]]
-        for name, count in wanted.items():
-            most = max((machine.get(name[:-1].upper(), 0.0) for machine in machines), default=0.0)
-            if count > most:
-                _log.warning(
-                    "hydra.launcher.num_%s=%g, but no machine has more than %g; runs wait until "
-                    "one joins the cluster",
-                    *(name, count, most),
-                )
 
     def finish(self, runs: Sequence[Run]) -> Iterator[tuple[Run, int]]:
         """See `Executor`."""

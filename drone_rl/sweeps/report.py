@@ -18,7 +18,6 @@ from drone_rl.sweeps.rows import read_rows
 from drone_rl.sweeps.summary import (
     MIN_RUNS,
     RunMedian,
-    RunShare,
     Summary,
     make_groups,
     summarise_sweep,
@@ -29,7 +28,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, last_of, newest, write_atomically
 from drone_rl.utils.models import Seeded
 from drone_rl.utils.readers import read_result
-from drone_rl.utils.text import render
+from drone_rl.utils.text import FILTERS, render
 
 if TYPE_CHECKING:
     from drone_rl.utils.seeding import RootSeed
@@ -155,9 +154,9 @@ def judge_run(
 def render_page(name: str, summary: Summary) -> str:
     """Return the HTML page of a sweep with this name."""
     environment = page_environment("drone_rl.sweeps", "drone_rl.explanations.report")  # for styles
-    environment.filters |= {"median": _median, "share": _share, "number": _number, "code": _code}
+    environment.filters |= {"median": _median, "number": _number, "code": _code, **FILTERS}
     style = static_text(environment, STYLES)
-    parts = ("runs", "verdicts", "best", "settings")
+    parts = ("runs", "verdicts", "best", "curves", "outcome", "settings")
     return environment.get_template("report.html").render(
         name=name,
         summary=summary,
@@ -168,29 +167,18 @@ def render_page(name: str, summary: Summary) -> str:
     )
 
 
-def _plots(summary: Summary) -> list[dict[str, str]]:
-    """Return "title", "text", and data URIs for a "light" and a "dark" page, of each plot."""
-    if not any(group.with_progress for group in summary.groups):
-        return []
-    layout, plots = figures.lay_out(summary.groups), []
-    note = f" {layout.left_out} further panels are left out." if layout.left_out else ""
-    for name, (title, *_) in figures.PLOTS.items():
-        if name in ("curves", "costs") or summary.judged:
-            images = (base64.b64encode(png).decode() for png in figures.draw(layout, name))
-            light, dark = (f"data:image/png;base64,{image}" for image in images)
-            text = text_of(summary, name) + note
-            plots.append({"title": title, "text": text, "light": light, "dark": dark})
-    return plots
-
-
-def _share(share: RunShare) -> str:
-    """Format a fraction of the known runs, with the interval that allows for the unknown ones."""
-    if share.unknown == share.trials:
-        return "not known" if share.trials else ""
-    few = "" if share.certain in (None, share.successes) else f", {share.certain} certain"
-    more = f", {share.unknown} not known" if share.unknown else ""
-    count = f"{share.successes}/{share.trials - share.unknown}{few}{more}"
-    return f"{count} [{share.lower95:.2f}, {share.upper95:.2f}]"
+def _plots(summary: Summary) -> dict[str, tuple[str, str]]:
+    """Return title and data URI of each plot, by the part of the text below it."""
+    layout, plots = figures.lay_out(summary.groups), {}
+    if any(group.ended for group in summary.groups):
+        plots["curves"] = "Learning curves", figures.draw_curves(layout)
+    if summary.judged:
+        plots["outcome"] = "Verdicts, sides and entropies", figures.draw_outcome(layout)
+    note = f" (without {layout.left_out} further panels)" if layout.left_out else ""
+    return {
+        part: (title + note, f"data:image/png;base64,{base64.b64encode(png).decode()}")
+        for part, (title, png) in plots.items()
+    }
 
 
 def _median(median: RunMedian) -> str:

@@ -20,8 +20,6 @@ from drone_rl.utils.readers import read_result, read_table
 Array = NDArray[np.float64]
 LAST_UPDATES = 20
 """Number of last updates over which the entropy is averaged."""
-OLDER_RULE = "judged by an older rule: not counted"
-"""Verdict of a run that was judged by an outdated rule only."""
 _DAMAGE = (ValueError, LookupError, TypeError)
 """Exceptions that reading damaged files raises; `InputError` is a `ValueError`."""
 
@@ -44,9 +42,10 @@ class Row(Model):
     """Its number."""
     settings: dict[str, str]
     """The swept settings and their values, including the seed."""
-    state: Literal["finished", "failed", "damaged", "unfinished"] = "unfinished"
+    state: Literal["finished", "failed", "unfinished"] = "unfinished"
+    """A run whose files can't be read failed, too."""
     verdict: str | None = None
-    """Kind of the last policy by the current rule, or why it was not judged."""
+    """Kind of the last policy by the current rule; None if it was not judged by that."""
     certain: bool | None = None
     """Whether the verdict is statistically certain."""
     reason: str | None = None
@@ -68,7 +67,7 @@ class Row(Model):
     entropy: float | None = None
     """Mean entropy of the policy over the last updates, nats."""
     error: str | None = None
-    """Reason of a failure or damage."""
+    """Reason of a failure."""
     folder: str
     """Path of the run's folder inside the sweep's folder."""
     command: Annotated[str, Field(exclude=True)]
@@ -129,14 +128,13 @@ def _read_row(run: Run, settings: dict[str, str], folder: str) -> Row:
         progress, curve = _read_metrics(run.folder)
         judged = _read_verdict(result.get("verdict"))
     except _DAMAGE as damage:
-        return row.replace(state="damaged", error=f"its files can't be read ({damage})")
+        return row.replace(state="failed", error=f"its files can't be read ({damage})")
     reward, most = figures.running_reward, figures.largest_reward
     return row.replace(
         state="finished",
         **progress | figures.model_dump(exclude={"largest_reward"}),
         curve=(curve[0], curve[1] / most),
         final_share=reward / most,
-        verdict=OLDER_RULE if "verdict" in result else "not judged",
     ).replace(**{} if judged is None else _figures_of(judged))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from drone_rl.sweeps.manifest import Run, Sweep, path_argument
-from drone_rl.sweeps.rows import OLDER_RULE, Array, Row
+from drone_rl.sweeps.rows import Array, Row
 from drone_rl.trust.rule import KINDS
 from drone_rl.utils.intervals import Share, median_bounds, proportion
 from drone_rl.utils.models import Model
@@ -21,15 +21,6 @@ MIN_RUNS = 6
 FAILED = "failed"
 """Pseudo-verdict of a failed run, in addition to `KINDS`."""
 _NEVER = float("inf")
-
-
-class RunShare(Share):
-    """A fraction of all runs with an interval that holds whatever the unknown runs are."""
-
-    unknown: int = 0
-    """Runs that may be successes or not."""
-    certain: int | None = None
-    """Successes with a certain verdict."""
 
 
 class RunMedian(Model):
@@ -52,37 +43,23 @@ class RunGroup(Model):
     settings: dict[str, str]
     """Their values of the swept settings."""
     runs: int
-    ended: int
-    """Runs that are not unfinished: the denominator of fractions."""
     failed: int
-    damaged: int
     unfinished: int
     judged: int
-    solved: RunShare
-    """Runs that reached their target; failed runs did not."""
+    solved: Share
+    """Of the runs that ended; failed runs did not reach their target."""
     frames_to_solve: RunMedian
     seconds_to_solve: RunMedian
     final_share: RunMedian
     entropy: RunMedian
-    verdicts: dict[str, RunShare]
-    """Fraction of each of `KINDS`, and of failures, among the ended runs. A run without a verdict
-    may be of any kind, a damaged one may also be a failure."""
+    verdicts: dict[str, Share]
+    """Fraction of each of `KINDS`, and of failures, among the runs that were judged or failed."""
     rows: Annotated[tuple[Row, ...], Field(exclude=True)]
 
     @property
-    def finished(self) -> list[Row]:
-        """Runs with a result."""
-        return [row for row in self.rows if row.state == "finished"]
-
-    @property
-    def with_progress(self) -> list[Row]:
+    def ended(self) -> list[Row]:
         """Runs that finished or failed."""
-        return [row for row in self.rows if row.state in ("finished", "failed")]
-
-    @property
-    def readable(self) -> int:
-        """Number of ended runs with readable files."""
-        return self.ended - self.damaged
+        return [row for row in self.rows if row.state != "unfinished"]
 
 
 class Best(Row):
@@ -105,20 +82,15 @@ class Summary(Model):
     """The command that judges its runs by the current rule."""
     finished: int
     failed: int
-    damaged: int
     unfinished: int
     judged: int
     """Runs with a verdict by the current rule."""
     certain: int
     """Those with a certain one."""
-    judged_by_older_rule: int
-    never_judged: int
     error_rates: list[float]
     """Error probabilities of the verdicts, ascending."""
     episodes: list[int]
     """Numbers of episodes of the verdicts, ascending."""
-    sides_not_offered: int
-    """Judged runs without goals on a side."""
     best: Best | None
     """None if no run was judged."""
     groups: tuple[RunGroup, ...]
@@ -129,7 +101,6 @@ def summarise_sweep(sweep: Sweep, rows: Sequence[Row]) -> Summary:
     """Return all figures of a sweep."""
     states = [row.state for row in rows]
     judged = [row.judged for row in rows if row.judged is not None]
-    older = sum(row.verdict == OLDER_RULE for row in rows)
     folder = f"folder={_path_argument(sweep.folder)}"
     judge_arguments = (folder, "judge=true", *_plugins(sweep.runs))
     return Summary(
@@ -137,15 +108,11 @@ def summarise_sweep(sweep: Sweep, rows: Sequence[Row]) -> Summary:
         judge_command=shlex.join(["drone-rl", "sweep-report", *judge_arguments]),
         finished=states.count("finished"),
         failed=states.count("failed"),
-        damaged=states.count("damaged"),
         unfinished=states.count("unfinished"),
         judged=len(judged),
         certain=sum(verdict.certain for verdict in judged),
-        judged_by_older_rule=older,
-        never_judged=states.count("finished") - len(judged) - older,
         error_rates=sorted({verdict.error_rate for verdict in judged}),
         episodes=sorted({verdict.greedy.episodes for verdict in judged}),
-        sides_not_offered=sum(row.lean is None for row in rows if row.judged is not None),
         best=_best(sweep, rows),
         groups=tuple(make_groups(rows)),
         runs=tuple(rows),
@@ -208,32 +175,22 @@ def make_groups(rows: Sequence[Row]) -> list[RunGroup]:
 
 
 def _group(settings: dict[str, str], rows: Sequence[Row]) -> RunGroup:
-    states = [row.state for row in rows]
-    failed, damaged, unfinished = map(states.count, ("failed", "damaged", "unfinished"))
-    readable = [row for row in rows if row.state in ("finished", "failed")]
-    judged = [row for row in rows if row.kind is not None]
+    failed = [row for row in rows if row.state == "failed"]
+    ended = [row for row in rows if row.state != "unfinished"]
+    kinds = [row.kind for row in rows if row.kind is not None] + [FAILED] * len(failed)
     entropies = [row.entropy for row in rows if row.entropy is not None and row.state != "failed"]
-    ended = len(rows) - unfinished
-    by_kind = {kind: [row for row in judged if row.kind == kind] for kind in KINDS}
-    unknown = ended - len(judged) - failed
-    verdicts = {
-        kind: share_of_runs(len(some), unknown, ended, sum(bool(row.certain) for row in some))
-        for kind, some in by_kind.items()
-    }
     return RunGroup(
         settings=settings,
         runs=len(rows),
-        ended=ended,
-        failed=failed,
-        damaged=damaged,
-        unfinished=unfinished,
-        judged=len(judged),
-        solved=share_of_runs(sum(row.is_solved for row in rows), damaged, ended),
-        frames_to_solve=_to_solve(readable, [row.frames for row in readable]),
-        seconds_to_solve=_to_solve(readable, [row.seconds for row in readable]),
-        final_share=median_of_runs([row.final_share for row in readable]),
+        failed=len(failed),
+        unfinished=len(rows) - len(ended),
+        judged=len(kinds) - len(failed),
+        solved=proportion(sum(row.is_solved for row in rows), len(ended)),
+        frames_to_solve=_to_solve(ended, [row.frames for row in ended]),
+        seconds_to_solve=_to_solve(ended, [row.seconds for row in ended]),
+        final_share=median_of_runs([row.final_share for row in ended]),
         entropy=median_of_runs(entropies),
-        verdicts={**verdicts, FAILED: share_of_runs(failed, damaged, ended, failed)},
+        verdicts={k: proportion(kinds.count(k), len(kinds)) for k in (*KINDS, FAILED)},
         rows=tuple(rows),
     )
 
@@ -242,15 +199,6 @@ def _to_solve(rows: Sequence[Row], used: Sequence[float]) -> RunMedian:
     """Return the median cost to solve; an unsolved run needs more than it used (censored)."""
     pairs = zip(rows, used, strict=True)
     return median_of_runs([value if row.is_solved else _NEVER for row, value in pairs], used)
-
-
-def share_of_runs(
-    successes: int, unknown: int, trials: int, certain: int | None = None
-) -> RunShare:
-    """Return the fraction of successes; see `RunShare`."""
-    upper = proportion(successes + unknown, trials).upper95
-    share = dict(proportion(successes, trials)) | {"upper95": upper}
-    return RunShare(**share, unknown=unknown, certain=certain)
 
 
 def median_of_runs(values: Sequence[float], used: Sequence[float] | None = None) -> RunMedian:

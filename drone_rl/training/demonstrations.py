@@ -12,7 +12,7 @@ import re
 from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Self, Unpack
+from typing import Any, Self
 
 import numpy as np
 import torch
@@ -26,7 +26,6 @@ from drone_rl.config import (
     DynamicsSettings,
 )
 from drone_rl.config.configuration import from_arguments
-from drone_rl.config.options import UnseededTrainOptions
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.envs.rollout import Recording
@@ -287,7 +286,7 @@ def record_oracle(
     *,
     flights: int = 30,
     seed: int = 0,
-    **changes: Unpack[UnseededTrainOptions],
+    **changes: Any,
 ) -> list[Path]:
     """Record flights of the task's oracle, which acts by the true state.
 

@@ -1,26 +1,20 @@
-"""Learners: what a trainer expects of them, REINFORCE, and learning with a critic."""
+"""Learners: what a trainer expects of them, and REINFORCE."""
 
-import copy
 import dataclasses
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, ClassVar, Protocol
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Protocol
 
 import torch
-from tensordict import TensorDict, TensorDictBase
+from tensordict import TensorDictBase
 from tensordict.utils import NestedKey
 from torch import Tensor, nn
 from torch.nn.utils import clip_grads_with_norm_, get_total_norm
-from torchrl.objectives import A2CLoss, ClipPPOLoss
 
 from drone_rl.config.training import TrainerSettings
-from drone_rl.objectives import Advantages, ReinforceLoss
-from drone_rl.policies import ActorCritic
-from drone_rl.policies.critic import LOG_PROB, PIXELS, VALUE
+from drone_rl.objectives import ReinforceLoss
 from drone_rl.training.restore import check_fits, check_optimizer
 from drone_rl.utils.errors import InputError
-
-ADVANTAGE, TARGET, ENTROPY = "advantage", "value_target", "entropy"
 
 _MODES = threading.Lock()
 """TorchRL's loss modules set modes of the whole process, and restore them afterwards."""
@@ -165,122 +159,6 @@ class ReinforceLearner(GradientLearner):
         return {**losses, "train/learning_rate": self._step_scheduler()}
 
 
-@dataclasses.dataclass(kw_only=True, eq=False, repr=False)
-class ActorCriticLearner(GradientLearner):
-    """Values, advantages, then passes over minibatches, each a step of the optimizer.
-
-    Values and log-probabilities are those of the policy and critic that an update begins with,
-    and are computed once. The next state of a step is that of the next step in its row, except
-    where an episode or the row ends.
-    """
-
-    model: ActorCritic
-    """The network with its critic."""
-    estimator: Advantages
-    """Computes advantages from values."""
-    loss: A2CLoss | ClipPPOLoss
-    """Loss of `model.actor` and `model.critic`, a mean over steps."""
-    generator: torch.Generator
-    """Shuffles the steps, on the CPU."""
-    epochs: int = 1
-    """Passes over a batch."""
-    minibatch_size: int | None = None
-    """Approximate number of steps for one step of the optimizer; None for all."""
-    chunk_frames: int = TrainerSettings().chunk_frames
-    """See `ReinforceLearner`."""
-    in_keys: ClassVar[Sequence[NestedKey]] = (
-        *(PIXELS, "action", LOG_PROB, VALUE),
-        *(ADVANTAGE, TARGET, ENTROPY),
-    )
-
-    def update(self, batch: TensorDictBase) -> dict[str, float]:
-        """Learn from a rollout of shape (num_envs, T), as returned by `estimate`.
-
-        Returns:
-            Means over the minibatches of the terms of the loss, the divergence from the policy that
-            collected, and the gradient's norm; that policy's entropy, and the next learning rate.
-
-        Raises:
-            NotANumberError: A loss or gradient is NaN or infinite.
-        """
-        before = copy.deepcopy(self.state_dict())
-        try:
-            steps = batch.select(*self.in_keys).reshape(-1)
-            entropy = float(steps.pop(ENTROPY).mean())
-            metrics = list(self._descend(steps))
-        except NotANumberError:
-            self.load_state_dict(before)
-            self.optimizer.zero_grad()
-            raise
-        means = {f"loss/{k}": sum(m[k] for m in metrics) / len(metrics) for k in metrics[0]}
-        return {**means, "loss/entropy": entropy, "train/learning_rate": self._step_scheduler()}
-
-    @torch.no_grad()
-    def estimate(self, batch: TensorDictBase) -> TensorDictBase:
-        """Add the entries that the loss reads; the collector's `postproc`.
-
-        They are log-probability, entropy and value of the policy that collected, "advantage" and
-        "value_target". See `check_batch` for errors.
-        """
-        following = [("next", key) for key in (PIXELS, "reward", "done", "terminated")]
-        check_batch(batch, [PIXELS, "action", *following], type(self).__name__)
-        seen = self._evaluate(batch.get(PIXELS).flatten(0, batch.ndim - 1))
-        policy = self.model.actor.get_dist(seen)
-        value = seen.get(VALUE).reshape(*batch.shape, 1)
-        after = batch.get("next").select("reward", "done", "terminated")
-        after.set(VALUE, self._after(batch, value))
-        estimated = self.estimator(TensorDict({VALUE: value, "next": after}, batch.shape))
-        for key in (VALUE, ADVANTAGE, TARGET):
-            batch.set(key, estimated.get(key))
-        log_prob = policy.log_prob(batch.get("action").flatten(0, batch.ndim - 1))
-        batch.set(LOG_PROB, log_prob.reshape(batch.shape))
-        return batch.set(ENTROPY, policy.entropy().reshape(batch.shape))
-
-    def _after(self, batch: TensorDictBase, value: Tensor) -> Tensor:
-        """Return the value after each step; arbitrary after a terminal one. Shape: as `value`."""
-        after = torch.cat([value[..., 1:, :], value[..., -1:, :]], -2)
-        cut = batch.get(("next", "done")).clone()
-        cut[..., -1, :] = True
-        cut = (cut & ~batch.get(("next", "terminated")))[..., 0]
-        after[cut] = self._evaluate(batch.get(("next", PIXELS))[cut]).get(VALUE)
-        return after
-
-    def _evaluate(self, pixels: Tensor) -> TensorDictBase:
-        """Return features and values of frames, without the frames. Shape: (num_frames,)."""
-        chunks = (TensorDict({PIXELS: c}, [len(c)]) for c in pixels.split(self.chunk_frames))
-        seen = [self.model.critic(self.model.trunk(chunk)).exclude(PIXELS) for chunk in chunks]
-        # it takes TensorDicts, too, which its annotation lacks
-        return torch.cat(seen)  # pyright: ignore[reportReturnType]
-
-    def _descend(self, steps: TensorDictBase) -> Iterator[dict[str, float]]:
-        """Take the steps of the optimizer; yield the metrics of each."""
-        # as far as the loss has them
-        logged = ("loss_objective", "loss_critic", "loss_entropy", "clip_fraction", "kl_approx")
-        pieces = max(1, round(len(steps) / (self.minibatch_size or len(steps))))
-        for _ in range(self.epochs):
-            order = torch.randperm(len(steps), generator=self.generator).to(steps.device)
-            for rows in order.chunk(pieces):
-                self.optimizer.zero_grad()
-                minibatch = take_rows(steps, rows)
-                terms = accumulate(minibatch, self._losses, self.chunk_frames)
-                norm = descend(self.optimizer, self.model.named_parameters(), self.max_grad_norm)
-                yield {**{k: terms[k] for k in logged if k in terms}, "grad_norm": norm}
-
-    def _losses(self, chunk: TensorDictBase) -> TensorDictBase:
-        return self.loss(self.model.trunk(chunk))
-
-    def state_dict(self) -> dict[str, Any]:
-        """Return the weights of both and the states of optimizer, scheduler and shuffling."""
-        state = {**super().state_dict(), "critic": self.model.critic.state_dict()}
-        return {**state, "minibatches": self.generator.get_state()}
-
-    def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Resume from a state."""
-        super().load_state_dict(state)
-        self.model.critic.load_state_dict(state["critic"])
-        self.generator.set_state(state["minibatches"])
-
-
 def check_batch(batch: TensorDictBase, keys: Sequence[NestedKey], reader: str) -> None:
     """Raise an `InputError` if a batch lacks one of the entries that `reader` learns from."""
     held = batch.keys(include_nested=True)
@@ -376,9 +254,3 @@ def descend(
         clip_grads_with_norm_(weights.values(), max_norm, norm)
     optimizer.step()
     return float(norm)
-
-
-def take_rows(tensordict: TensorDictBase, rows: Tensor) -> TensorDictBase:
-    """Index the first dimension by rows (k,), faster than tensordict's own indexing."""
-    taken = {key: tensordict.get(key).index_select(0, rows) for key in tensordict.keys(True, True)}
-    return TensorDict(taken, [len(rows)], device=tensordict.device)

@@ -1,38 +1,39 @@
 """A whole training run: environment, policy, collector, returns, loss, optimizer, loop.
 
 `drone-rl train` and `drone_rl.train` run this file; `examples/train_with_torchrl.py` is a plain
-script of the same components. A critic and Ray workers are in `variants.py`, files in
-`run_folder.py`, imitation in `cloning.py`.
+script of the same components. Learners with a critic are in `actor_critic.py`, Ray workers in
+`ray_workers.py`, files in `run_folder.py`, imitation in `cloning.py`.
 """
 
 import contextlib
-import functools
 import logging
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, NamedTuple, Self
 
 import torch
+from torchrl.envs import EnvBase
 
-from drone_rl.acceleration import with_fused_passes
+from drone_rl.acceleration import ActivationRecorder, with_fused_passes
 from drone_rl.collectors import EpisodeCollector, ThreadedCollector
-from drone_rl.config.learning import Episodes, Reinforce
-from drone_rl.config.options import TrainOptions
+from drone_rl.config.learning import Episodes, Ray, Reinforce
 from drone_rl.config.registry import implements, modules_of
 from drone_rl.config.training import TrainSettings
 from drone_rl.objectives import ReinforceLoss
-from drone_rl.policies import make_actor
+from drone_rl.policies import ImageNetwork, make_actor
 from drone_rl.policies.actor import exploring
 from drone_rl.policies.zoo import describe
+from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.tasks import FailureReplayTask, as_task
-from drone_rl.training import components, run_folder
+from drone_rl.training import run_folder
 from drone_rl.training.callbacks import Callback, CollapseCheck, CsvCallback, with_progress
 from drone_rl.training.cloning import clone
-from drone_rl.training.components import Components, EnvGroup
 from drone_rl.training.confirmation import Confirmation
 from drone_rl.training.learners import NotANumberError, ReinforceLearner
 from drone_rl.training.run_folder import Judge, RunFolder, Training
 from drone_rl.training.trainer import Trainer
+from drone_rl.utils.available_memory import require_memory
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress
 from drone_rl.utils.provenance import num_cores
@@ -50,7 +51,7 @@ def train(
     callbacks: Sequence[Callback] = (),
     progress: Progress | None = None,
     judge: Judge | None = None,
-    **changes: Unpack[TrainOptions],
+    **changes: Any,
 ) -> Training:
     """Train one policy, or resume its training.
 
@@ -113,9 +114,9 @@ def learn(
         stack.enter_context(exploring(greedy=False))
         stack.enter_context(torch_threads(limits.num_threads))  # sums depend on it
         with as_global_stream(stream):
-            parts = components.make_collector(settings, replay)
+            parts = make_collector(settings, replay)
             stack.callback(parts.collector.shutdown)
-            learner = components.make_learner(settings, parts)  # by default `reinforce_learner`
+            learner = make_learner(settings, parts)
         confirmation = Confirmation(settings, parts.network) if limits.confirm_episodes else None
         if confirmation is not None:
             stack.callback(confirmation.close)
@@ -152,21 +153,76 @@ def learn(
         return run_folder.result_of(trainer, settings, confirmation, checkpoints) | collapse.result
 
 
+class Components(NamedTuple):
+    """The collector of batches with returns, and the network that learns from them."""
+
+    collector: Any
+    """Has `actor` and `postproc`, in addition to what `Trainer` needs."""
+    network: ImageNetwork
+    generators: dict[str, torch.Generator]
+    """Random streams of this process, by name."""
+    activations: ActivationRecorder | None = None
+    """What a fused collector records, if it alone makes the batches."""
+
+    @classmethod
+    def of(cls, collector: Any, groups: Sequence[tuple[EnvBase, Any]]) -> Self:
+        """Return the components of a training run whose groups are in this process."""
+        generators = {f"actions_{i}": actor.generator for i, (_, actor) in enumerate(groups)}
+        return cls(collector, collector.actor.network, generators)
+
+
+def make_collector(settings: TrainSettings, replay: FailureReplayTask | None = None) -> Components:
+    """Make the collector of the settings, with environments and an untrained network.
+
+    Raises:
+        InputError: There is no such device, too little memory, or an extra isn't installed.
+    """
+    check_device(settings.device)
+    if not settings.device.startswith("cuda"):
+        _require_batch(settings)
+    return settings.collector.make(settings, replay)  # by default `threaded_collector`
+
+
+def _require_batch(settings: TrainSettings) -> None:
+    """Raise an `InputError` unless a batch of frames fits into memory.
+
+    Complete episodes count a quarter of the longest one, which untrained policies reach on average.
+    """
+    chosen, frame = settings.collector, describe(settings).input
+    longest = getattr(settings.task, "step_limit", 1)
+    steps = getattr(settings.objective, "num_steps", max(1, longest // 4))
+    needed = chosen.num_envs * steps * math.prod(frame.shape) * (4 if frame.is_float else 1)
+    setting = f"collector.num_envs={chosen.num_envs}, batches of about {steps} steps of each,"
+    require_memory(needed, setting, "give fewer environments, steps or pixels")
+
+
 @implements(Episodes)
 def threaded_collector(
     settings: TrainSettings, replay: FailureReplayTask | None = None
 ) -> Components:
     """Make `collector=episodes`: complete episodes, with returns, from threads of this process."""
-    sizes = components.group_sizes(settings)
-    estimator = settings.returns.make().to(settings.device)
-    groups = make_groups(settings, sizes, replay)
-    options = components.episode_options(settings, max(1, num_cores() // len(sizes)))
-    collectors = [EpisodeCollector(group.env, group.actor, **options) for group in groups]
+    chosen = settings.collector
+    assert isinstance(chosen, Episodes)
+    groups = make_groups(settings, group_sizes(settings), replay)
+    cores = max(1, num_cores() // len(groups))
+    collectors = [
+        EpisodeCollector(env, actor, compiled=chosen.compiled, num_threads=cores)
+        for env, actor in groups
+    ]
     _log.info("%s", collectors[0].name)
-    made = components.joined(ThreadedCollector(collectors, postproc=estimator), groups)
+    returns = settings.returns.make().to(settings.device)
+    made = Components.of(ThreadedCollector(collectors, postproc=returns), groups)
     if len(collectors) > 1:  # whose batches are copied
         return made
     return made._replace(activations=getattr(collectors[0].fused, "activations", None))
+
+
+def group_sizes(settings: TrainSettings) -> list[int]:
+    """Return the number of environments of each thread or worker; on a GPU there is one thread."""
+    chosen = settings.collector
+    has_one_group = settings.device.startswith("cuda") and not isinstance(chosen, Ray)
+    groups = 1 if has_one_group else min(chosen.num_envs, chosen.num_threads)
+    return [chosen.num_envs // groups + (i < chosen.num_envs % groups) for i in range(groups)]
 
 
 def make_groups(
@@ -174,10 +230,11 @@ def make_groups(
     sizes: list[int],
     replay: FailureReplayTask | None = None,
     numbers: Iterable[int] | None = None,
-) -> list[EnvGroup]:
+) -> list[tuple[EnvBase, Any]]:
     """Make the environments of threads or workers, and the policy that acts in them.
 
     `sizes` are the numbers of environments of the groups, `numbers` the indices of those to make.
+    The actors share a network and have a random stream each.
     """
     description, seed, device = describe(settings), settings.seed, settings.device
     network = description.build_network(torch_generator(seed, Stream.POLICY_INIT)).to(device)
@@ -193,29 +250,40 @@ def make_groups(
             renderer=settings.renderer,
         )
         generator = torch_generator(seed, Stream.ACTIONS, number=number, device=device)
-        actor = make_actor(network, env.action_spec, generator)
-        groups.append(EnvGroup(env, actor, network, generator))
+        groups.append((env, make_actor(network, env.action_spec, generator)))
     return groups
+
+
+def make_learner(settings: TrainSettings, components: Components) -> Any:
+    """Make the learner; raise an `InputError` if no policy could be read from its state."""
+    learner = settings.objective.make(settings, components)  # by default `reinforce_learner`
+    saved = learner.state_dict().get("policy")
+    if not isinstance(saved, Mapping) or saved.keys() != components.network.state_dict().keys():
+        raise InputError(
+            f"objective={settings.objective.name}: state_dict of {type(learner).__name__} lacks "
+            'the policy\'s weights; add "policy": components.network.state_dict()'
+        )
+    return learner
 
 
 @implements(Reinforce)
 def reinforce_learner(
-    settings: TrainSettings, parts: Components, *, entropy_coeff: float, reduction: str
+    settings: TrainSettings, components: Components, *, entropy_coeff: float, reduction: str
 ) -> ReinforceLearner:
     """Make the learner without a critic; its loss has the last two settings."""
-    limits, network, actor = settings.trainer, parts.network, parts.collector.actor
-    may_fuse = limits.compiled and not network.is_recurrent
-    fused = functools.partial(with_fused_passes, activations=parts.activations)
-    learning = fused(network, limits.num_threads) if may_fuse else network
+    limits, network, actor = settings.trainer, components.network, components.collector.actor
+    learning = network
+    if limits.compiled and not network.is_recurrent:
+        activations = components.activations
+        learning = with_fused_passes(network, limits.num_threads, activations=activations)
     is_fused = learning is not network  # its kernel has `limits.num_threads` threads
     if is_fused:
         actor = make_actor(learning, actor.spec["action"])
+    loss = ReinforceLoss(actor, entropy_coeff=entropy_coeff, reduction=reduction)
     optimizer = settings.optimizer.make(network.parameters())
     return ReinforceLearner(
         network=network,
-        loss=ReinforceLoss(actor, entropy_coeff=entropy_coeff, reduction=reduction).to(
-            settings.device
-        ),
+        loss=loss.to(settings.device),
         optimizer=optimizer,
         scheduler=settings.scheduler.make(optimizer),
         max_grad_norm=limits.max_grad_norm,

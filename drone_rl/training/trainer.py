@@ -4,83 +4,28 @@ import contextlib
 import dataclasses
 import enum
 import signal
-import threading
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from types import FrameType
-from typing import Any, cast
+from typing import Any
 
 import torch
 from tensordict import TensorDictBase
-from torch import Tensor
 
 from drone_rl.objectives import ReturnEstimator
 from drone_rl.training.callbacks import Callback, TrainingProgress
 from drone_rl.training.learners import Learner, NotANumberError, check_batch
+from drone_rl.training.metrics import (
+    batch_metrics,
+    check_rewards,
+    episode_rewards,
+    running_mean,
+)
 from drone_rl.training.restore import check_fits
+from drone_rl.training.signals import noted_signals
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.memory import return_freed_memory
 from drone_rl.utils.plugins import place_of
 from drone_rl.utils.seeding import as_global_stream
-
-_REPEAT_S = 1.0
-"""Seconds in which another SIGTERM is the same request: a cluster and a sweep may both send it."""
-
-
-def episode_rewards(batch: TensorDictBase) -> Tensor:
-    """Return the rewards of the episodes that end in a batch, in order. Shape: (num_episodes,).
-
-    Each row (*batch, T) holds complete episodes, or has ("next", "episode_reward"), which
-    `RolloutCollector` and TorchRL's `RewardSum` write; otherwise raise an `InputError`.
-    """
-    done, reward = (cast(Tensor, batch["next", name]) for name in ("done", "reward"))
-    totals = batch.get(("next", "episode_reward"), None)
-    if totals is not None:
-        return totals[done].double()
-    if not bool(done[..., -1, :].all()):
-        raise InputError(
-            "a batch ends within an episode, whose reward is not known; give collector=episodes or "
-            "collector=rollouts, or add TorchRL's RewardSum to the environment's transforms"
-        )
-    ends = done.flatten().nonzero()[:, 0]
-    cumulative = reward.flatten().double().cumsum(0)[ends]
-    return torch.diff(cumulative, prepend=cumulative.new_zeros(1))
-
-
-def check_rewards(batch: TensorDictBase) -> None:
-    """Raise an `InputError` unless the reward of each episode that ends in a batch is finite."""
-    rewards = episode_rewards(batch)
-    if not bool(rewards.isfinite().all()):
-        raise InputError("the reward of an episode is NaN or infinite; scale the rewards down")
-
-
-def running_mean(old: float, values: Tensor, decay: float) -> float:
-    """Update a mean with each value: m <- decay * m + (1 - decay) * value."""
-    for value in values.tolist():
-        old = decay * old + (1 - decay) * value
-    return old
-
-
-def batch_metrics(batch: TensorDictBase, ends: Iterable[enum.IntEnum] = ()) -> dict[str, float]:
-    """Return means over the episodes that end in a batch; NaN where none ends.
-
-    With `ends` (`Task.ends`), also the rate of each ("next", "info", "end_reason") but 0, running.
-    """
-    rewards = episode_rewards(batch)
-    done, lengths = batch["next", "done"], batch.get(("next", "step_count"), None)
-    metrics = {"train/reward": float(rewards.mean())}
-    if lengths is not None:
-        metrics["train/length"] = float(lengths[done].double().mean())
-    else:
-        metrics["train/length"] = batch.numel() / len(rewards) if len(rewards) else float("nan")
-    named = [end for end in ends if end]
-    if named:
-        reasons = cast(Tensor, batch["next", "info", "end_reason"])
-        final = reasons[cast(Tensor, done)]
-        for end in named:
-            metrics[f"end/{end.name.lower()}"] = float((final == end).float().mean())
-    return metrics
-
 
 TRIM_INTERVAL = 16
 """Updates between releases of freed memory; a release makes the next update 10% slower."""
@@ -153,7 +98,7 @@ class Trainer:
             NotANumberError: A loss or gradient was NaN or infinite.
             InputError: A batch lacks an entry that the learner reads.
         """
-        with self._signals():
+        with noted_signals(self._note):
             self._notify("on_start")
             try:
                 with contextlib.closing(self._batches()) as batches:
@@ -248,45 +193,12 @@ class Trainer:
         progress.seconds += time.perf_counter() - begin
         return is_confirmed
 
+    def _note(self, number: int) -> None:
+        self.stop_signal = signal.Signals(number)
+
     def _notify(self, hook: str, *args: object) -> None:
         for callback in self.callbacks:
             getattr(callback, hook)(self, *args)
-
-    @contextlib.contextmanager
-    def _signals(self) -> Iterator[None]:
-        """Record the first Ctrl-C or SIGTERM; the next one acts at once.
-
-        Another SIGTERM within `_REPEAT_S` counts as the same one. A signal that the process
-        ignores, as Ctrl-C in the background, stops a training, too.
-        """
-        if threading.current_thread() is not threading.main_thread():
-            yield
-            return
-        watched = (signal.SIGINT, signal.SIGTERM)
-        handlers = {number: signal.getsignal(number) for number in watched}
-        before = {n: handler for n, handler in handlers.items() if handler is not None}
-
-        first_s = 0.0
-
-        def restore() -> None:
-            for number, handler in before.items():
-                signal.signal(number, handler)
-
-        def note(number: int, frame: FrameType | None) -> None:
-            nonlocal first_s
-            del frame
-            if self.stop_signal is None:
-                self.stop_signal, first_s = signal.Signals(number), time.monotonic()
-            elif number == signal.SIGINT or time.monotonic() - first_s > _REPEAT_S:
-                restore()
-                signal.raise_signal(number)
-
-        for number in before:  # one set outside Python can't be restored, so it is left alone
-            signal.signal(number, note)
-        try:
-            yield
-        finally:
-            restore()
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything that the next update depends on."""

@@ -4,7 +4,7 @@ import itertools
 import textwrap
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 import pydantic
 from matplotlib.figure import Figure
@@ -13,7 +13,6 @@ from matplotlib.transforms import Bbox
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.commands import BodiesSettings, JudgeSettings
 from drone_rl.config.configuration import from_arguments
-from drone_rl.config.options import BodiesOptions
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.trust.judge import Judgement, judge_one
@@ -88,7 +87,7 @@ def bodies(
     progress: Progress | None = None,
     judge: Callable[..., Judgement] = judge_one,
     in_the_loop: Callable[[BasePolicy, int, RootSeed], Figures] | None = None,
-    **changes: Unpack[BodiesOptions],
+    **changes: Any,
 ) -> Bodies:
     """Judge policies in computer-vision mode, in flight, in wind, and with worse drones.
 

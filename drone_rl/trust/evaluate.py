@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any, ClassVar, Unpack
+from typing import Any, ClassVar
 
 import pydantic
 from tensordict.nn import TensorDictModuleBase
@@ -12,7 +12,6 @@ from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import AppearanceSettings
 from drone_rl.config.commands import EvaluateSettings, HeldOutSettings
 from drone_rl.config.configuration import from_arguments
-from drone_rl.config.options import EvaluateOptions
 from drone_rl.envs import base_env, worlds_of
 from drone_rl.policies.baselines import check_baselines
 from drone_rl.policies.external_network import Logits
@@ -111,7 +110,7 @@ def evaluate(
     appearance: AppearanceSettings | str | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
-    **changes: Unpack[EvaluateOptions],
+    **changes: Any,
 ) -> Evaluation:
     """Evaluate a policy, greedily and with sampled actions, and the baselines, on held-out states.
 

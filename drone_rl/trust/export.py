@@ -75,7 +75,7 @@ def export(
         # the card names the copied file, without its folder
         measured = measured.replace(path=shifts_path(target).name)
     if claim is not None and judged.quoted:
-        carried[certificate_path(target)] = read_bytes(claim.path, CERTIFICATE_BYTES)
+        carried[certificate_path(target)] = read_bytes(Path(claim.path), CERTIFICATE_BYTES)
     about: dict[str, Any] = {"verdict": judged, "seed": seed.value, "chosen": chosen}
     about |= {"command": command, "shifts": measured, "carried": carried}
     export_policy(target, policy.state, **about)

@@ -3,14 +3,13 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Unpack, cast, overload
+from typing import Any, cast, overload
 
 from torchrl.envs import EnvBase
 
 from drone_rl.config import AppearanceSettings, DynamicsSettings, TaskSettings
 from drone_rl.config.commands import HeldOutSettings, JudgeSettings
 from drone_rl.config.configuration import Changes, as_changes, from_arguments
-from drone_rl.config.options import JudgeOptions
 from drone_rl.envs import DroneEnv
 from drone_rl.envs.rollout import Agent
 from drone_rl.policies.baselines import make_baseline
@@ -19,17 +18,18 @@ from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.zoo import fingerprint, parse
 from drone_rl.trust.baselines import BASELINES
-from drone_rl.trust.coverage import find_domain, check_required
+from drone_rl.trust.coverage import check_required, find_domain
 from drone_rl.trust.evaluate import held_out_environments
-from drone_rl.trust.results import Verdict
+from drone_rl.trust.results import Proof, Verdict
 from drone_rl.trust.rule import Rule
 from drone_rl.trust.shifts_results import Coverage, SavedShifts
-from drone_rl.trust.verdict import CertificateClaim, FindClaim, judge_policy
+from drone_rl.trust.verdict import FindClaim, judge_policy
 from drone_rl.utils.display import Result, TableResult, paragraph
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import NOT_COVERED, PROOF_MISSING
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import Provenance, provenance
+from drone_rl.utils.schema import Maybe, OneOf
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator, with_seed
 from drone_rl.utils.text import rate
 
@@ -59,8 +59,8 @@ class Judgement(Result, Verdict, Provenance):
         """Return the exit code of `drone-rl verdict`.
 
         Args:
-            require: "proved" for a re-checked proof of every placement, "good" or None for the
-                verdict's own code; a required domain has to be covered, too.
+            require: "proved" for a proof of every placement that was computed here (see `judge`),
+                "good" or None for the verdict's own code; a required domain has to be covered, too.
         """
         if require == "proved" and not self.is_proved:
             return PROOF_MISSING
@@ -95,43 +95,26 @@ class Judgements(TableResult, tuple[Judgement, ...]):
         return rows
 
 
-class JudgeArguments(JudgeOptions, total=False):
-    """Arguments of `judge`: those of `judge_one`."""
-
-    task: Mapping[str, Any] | None
-    dynamics: Mapping[str, Any] | None
-    appearance: AppearanceSettings | str | None
-    certificate: str | Path | None
-    shifts: str | Path | None
-    require_domain: str | Path | None
-    outputs: str | Path
-    progress: Progress | None
-    drawn_seed: RootSeed | None
-    find_claim: FindClaim | None
-
-
 Given = str | Path | BasePolicy | Logits
 """A policy, or something that `as_policy` converts to one."""
 
 
 @overload
-def judge(
-    policy: Given, settings: JudgeSettings | None = None, **options: Unpack[JudgeArguments]
-) -> Judgement: ...
+def judge(policy: Given, settings: JudgeSettings | None = None, **options: Any) -> Judgement: ...
 
 
 @overload
 def judge(
     policy: Sequence[Given],
     settings: JudgeSettings | None = None,
-    **options: Unpack[JudgeArguments],
+    **options: Any,
 ) -> Judgements: ...
 
 
 def judge(
     policy: Given | Sequence[Given],
     settings: JudgeSettings | None = None,
-    **options: Unpack[JudgeArguments],
+    **options: Any,
 ) -> Judgement | Judgements:
     """Judge one policy, or a list or tuple of policies in the same environments.
 
@@ -172,7 +155,8 @@ def judge_one(
     progress: Progress | None = None,
     drawn_seed: RootSeed | None = None,
     find_claim: FindClaim | None = None,
-    **changes: Unpack[JudgeOptions],
+    require: str | None = None,
+    **changes: Any,
 ) -> Judgement:
     """Judge the kind of a policy, see `drone_rl.trust.rule`, and whether it is certain.
 
@@ -193,6 +177,8 @@ def judge_one(
         drawn_seed: Seed of a larger analysis of which this is a part.
         find_claim: Finds and checks certificates; by default none is quoted. `drone_rl.judge`
             passes `drone_rl.verification.claim.find_claim`.
+        require: "proved" computes the proof again if a certificate states success from every
+            placement (minutes); without this no policy counts as proved, since files can be forged.
         changes: Settings to change, as in `judge("good", episodes=1000)`.
 
     Raises:
@@ -201,13 +187,14 @@ def judge_one(
     settings = from_arguments(JudgeSettings, settings, changes, judge_one)
     settings, seed = with_seed(settings, drawn_seed)
     progress = as_progress(progress)
+    require = Maybe(OneOf(("good", "proved"))).read(require, "require")
     changed = {"task": task, "dynamics": dynamics, "appearance": appearance}
     loaded = _loaded(policy, outputs, changed)
     progress("policy and baselines", 0, 1)
     name = str(policy) if loaded is None or isinstance(policy, str | Path) else loaded.name
     if isinstance(loaded, Policy) and policy == "latest":  # which changes with the next run
         name = str(loaded.path)
-    claim: CertificateClaim | None = None
+    claim: Proof | None = None
     measured: SavedShifts | None = None
     coverage: Coverage | None = None
     if loaded is None:
@@ -232,7 +219,15 @@ def judge_one(
         where = {"device": settings.device, "renderer": settings.renderer}
         flights = settings.certificate_flights
         if find_claim is not None:
-            claim = find_claim(loaded, certificate, flights=flights, seed=seed, **where)
+            claim = find_claim(
+                loaded,
+                certificate,
+                flights=flights,
+                prove_again=require == "proved",
+                seed=seed,
+                progress=progress,
+                **where,
+            )
         worlds = held_out_environments(loaded, settings, seed)
     with worlds as (env, actor):
         verdict = judge_policy(
@@ -250,7 +245,7 @@ def judge_one(
         **dict(verdict),
         policy=name,
         weights=identify(loaded),
-        certificate=None if claim is None else str(claim.path),
+        certificate=None if claim is None else claim.path,
         shifts=None if measured is None else measured.path,
         domain=None if measured is None else measured.text(verdict, brief=True),
         required_domain=coverage,

@@ -10,8 +10,6 @@ from drone_rl.utils.intervals import Mean, Share
 from drone_rl.utils.models import Seeded, Stored
 from drone_rl.utils.text import render
 
-MAX_WRONG = 0.01
-"""Largest fraction of placements with a wrong statement in a proof, with 95% confidence."""
 FREQUENT = 0.02
 """Fraction of episodes above which the text mentions an end."""
 NEEDED_EPISODES = 50
@@ -158,9 +156,14 @@ def _is_outside(difference: Mean) -> bool:
     return difference.lower95 > SAME or difference.upper95 < -SAME
 
 
-class Proof(Stored):
-    """What a certificate of the policy states, or why a verdict does not quote it."""
+class Proof(Seeded):
+    """What a certificate of the policy states and how it was checked, or why it is refused.
 
+    The seed is that of the placements of the episodes that checked it.
+    """
+
+    path: str = ""
+    """The file."""
     refused: str | None = None
     """The reason; None if it is quoted."""
     every: bool = False
@@ -173,20 +176,17 @@ class Proof(Stored):
     finished: bool = True
     """Whether the proof was not stopped early."""
     checked: int = 0
-    """Rollouts that re-checked it."""
+    """Episodes that checked it, all of which ended as it states."""
     wrong_at_most: float | None = None
     """Upper bound on the fraction of placements with a wrong statement, with 95% confidence; None
-    without rollouts."""
-    seed: int | None = None
-    """Of the rollouts' placements."""
-    seed_is_fixed: bool = True
-    agreeing: int = 0
-    """The verdict's own episodes with a stated end."""
+    without episodes."""
+    computed: bool = False
+    """Whether the proof of success from every placement was computed again by this program."""
 
     @property
-    def is_enough(self) -> bool:
-        """Whether enough rollouts re-checked it."""
-        return self.wrong_at_most is not None and self.wrong_at_most <= MAX_WRONG
+    def status(self) -> str:
+        """How far the certificate is to be believed, as text."""
+        return render("drone_rl.trust", "certificate.j2", p=self)
 
 
 class Difference(Stored):
@@ -250,8 +250,8 @@ class Verdict(Seeded):
 
     @property
     def is_proved(self) -> bool:
-        """Whether a re-checked certificate states success from every placement."""
-        return self.quoted is not None and self.quoted.every and self.quoted.is_enough
+        """Whether success from every placement was proved here, not only read from a file."""
+        return self.quoted is not None and self.quoted.computed
 
     @property
     def failing_side(self) -> str | None:

@@ -5,14 +5,13 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 import yaml
 from matplotlib.figure import Figure
 
 from drone_rl.config.commands import ShiftSettings
 from drone_rl.config.configuration import from_arguments
-from drone_rl.config.options import ShiftOptions
 from drone_rl.policies.baselines import OracleAgent, check_baselines
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
@@ -73,7 +72,7 @@ def shifts(
     dynamics: Mapping[str, Any] | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
-    **changes: Unpack[ShiftOptions],
+    **changes: Any,
 ) -> Shifts:
     """Evaluate a policy under perturbations, one axis at a time and all combined.
 

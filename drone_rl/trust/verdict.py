@@ -24,28 +24,11 @@ from drone_rl.trust.results import NEEDED_EPISODES, CameraUse, Proof, Repetition
 from drone_rl.trust.rule import Quantity, Rule, VerdictKind, decide, kinds_within
 from drone_rl.utils.exit_codes import NOT_CERTAIN
 from drone_rl.utils.intervals import mean_bounds, proportion
+from drone_rl.utils.progress import Progress
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed
 
 MANY = (2, 3, 5, 10, 20, 50, 100)
 """Multiples of the number of episodes for which certainty is extrapolated."""
-
-
-class CertificateClaim(Protocol):
-    """A certificate of the policy; `drone_rl.verification.claim` has the implementation."""
-
-    @property
-    def path(self) -> Path:
-        """Its file."""
-        ...
-
-    @property
-    def refused(self) -> str | None:
-        """Why it is refused, in one line; None if it is not."""
-        ...
-
-    def quote(self, greedy: CompleteEpisodes) -> Proof:
-        """Return what a verdict on these greedy episodes may quote."""
-        ...
 
 
 class FindClaim(Protocol):
@@ -57,10 +40,12 @@ class FindClaim(Protocol):
         certificate: str | Path | None = None,
         *,
         flights: int = ...,
+        prove_again: bool = ...,
         seed: RootSeed | None = None,
         device: str = ...,
         renderer: str = ...,
-    ) -> CertificateClaim | None:
+        progress: Progress = ...,
+    ) -> Proof | None:
         """Return the certificate at a path, by default the one next to the policy, if any."""
         ...
 
@@ -72,7 +57,7 @@ def judge_policy(
     *,
     sampled: bool = True,
     rule: Rule | None = None,
-    claim: CertificateClaim | None = None,
+    claim: Proof | None = None,
     unlike: Mapping[str, Any] | None = None,
     seed: RootSeed | None = None,
 ) -> Verdict:
@@ -151,7 +136,7 @@ def apply_rule(
     *,
     rule: Rule | None = None,
     sampled: CompleteEpisodes | None = None,
-    claim: CertificateClaim | None = None,
+    claim: Proof | None = None,
     unlike: Mapping[str, Any] | None = None,
     seed: RootSeed | None = None,
     repetition: Repetition | None = None,
@@ -186,9 +171,6 @@ def apply_rule(
     if kind is VerdictKind.GOOD and camera is not None:
         certain &= camera.is_used is not None
         kind = VerdictKind.TRIVIAL if camera.is_used is False else kind
-    proof = None if claim is None else claim.quote(greedy)
-    if proof is not None and repetition is not None and not repetition.is_same:
-        proof = Proof(refused="the policy acts by more than its observations")
     return Verdict(
         kind=kind,
         certain=certain,
@@ -201,7 +183,7 @@ def apply_rule(
         num_cubes=greedy.goals.reached.shape[-1],
         repetition=repetition,
         camera=camera,
-        proof=proof,
+        proof=_unless_contradicted(claim, greedy),
         greedy=summarise(greedy),
         sampled=None if sampled is None else summarise(sampled),
         baselines={name: summarise(of) for name, of in baselines.items()},
@@ -216,6 +198,15 @@ def apply_rule(
         enough=_enough(greedy, baselines, rule),
         unlike=dict(unlike or {}),
     )
+
+
+def _unless_contradicted(claim: Proof | None, greedy: CompleteEpisodes) -> Proof | None:
+    """Return the certificate, refused if it states success from everywhere and episodes failed."""
+    failed = int((greedy.success < 1).sum())
+    if claim is None or not (claim.every and failed):
+        return claim
+    why = f"{failed} of {len(greedy)} greedy episodes of this verdict failed, contrary to it"
+    return Proof(path=claim.path, refused=why)
 
 
 def measure(

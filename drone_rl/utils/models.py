@@ -109,7 +109,8 @@ def input_error(error: pydantic.ValidationError, cls: Any = None, where: str = "
     if details["type"] == "extra_forbidden":
         names = _names(cls, details["loc"][:-1])
         meant = did_you_mean(details["loc"][-1], names)
-        return InputError(f"{place} is unknown; valid names: {', '.join(names) or '-'}{meant}")
+        valid = f"valid names: {', '.join(names)}{meant}" if names else "leave it out"
+        return InputError(f"{place} is unknown; {valid}")
     if details["type"] == "json_invalid":
         return InputError(f"{place} is damaged: {details['msg']}; write the file again")
     if details["type"] == "missing":

@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any, ClassVar, Unpack
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
@@ -14,7 +14,6 @@ from torch import Tensor
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ChanceSettings, ProveSettings
 from drone_rl.config.configuration import as_changes, from_arguments
-from drone_rl.config.options import ChanceOptions
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, CubesEnd
 from drone_rl.utils.display import TableResult
@@ -159,7 +158,7 @@ def chances(
     task: Mapping[str, Any] | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
-    **changes: Unpack[ChanceOptions],
+    **changes: Any,
 ) -> Chances:
     """Compute the exact probability of each end of an episode with sampled actions, as in training.
 

@@ -5,11 +5,10 @@ import functools
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 from drone_rl.config.commands import CheckSettings
 from drone_rl.config.configuration import as_changes, from_arguments
-from drone_rl.config.options import CheckOptions
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import policy_names
 from drone_rl.utils.display import Result, table
@@ -103,7 +102,7 @@ def check(
     task: Mapping[str, Any] | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
-    **changes: Unpack[CheckOptions],
+    **changes: Any,
 ) -> Check:
     """Check a certificate independently of the prover: exact sums, and simulated episodes.
 

@@ -6,14 +6,13 @@ import time
 from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from drone_rl.config.commands import PlacesSettings
 from drone_rl.config.configuration import as_changes, from_arguments
-from drone_rl.config.options import PlacesOptions
 from drone_rl.envs import Pipeline
 from drone_rl.explanations.report.places import chart, describe, rows
 from drone_rl.explanations.results import ExactMap
@@ -90,7 +89,7 @@ def places(
     task: Mapping[str, Any] | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
-    **changes: Unpack[PlacesOptions],
+    **changes: Any,
 ) -> Places:
     """Map a greedy policy's action over all positions of one cube, exactly.
 

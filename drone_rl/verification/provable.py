@@ -5,7 +5,7 @@ import io
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Self, Unpack
+from typing import Any, Self
 
 import numpy as np
 import torch
@@ -17,7 +17,6 @@ from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ProvableSettings, ProveSettings
 from drone_rl.config.configuration import check_same_config, from_arguments
-from drone_rl.config.options import TrainOptions
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs.rollout import Agent
 from drone_rl.policies.policy import Policy, load_policy
@@ -187,7 +186,7 @@ def train_until_proved(
     resume: bool = False,
     callbacks: Sequence[Callback] = (),
     progress: Progress | None = None,
-    **changes: Unpack[TrainOptions],
+    **changes: Any,
 ) -> Training:
     """Train as usual, then in rounds, until the policy succeeds from every placement.
 

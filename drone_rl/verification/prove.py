@@ -7,13 +7,12 @@ import time
 from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
 
 from drone_rl.config.commands import ProveSettings
 from drone_rl.config.configuration import as_changes, from_arguments
-from drone_rl.config.options import ProveOptions
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import fingerprint
 from drone_rl.utils.display import TableResult
@@ -46,6 +45,8 @@ class Proof(TableResult):
     """What is proved."""
     folder: Path | None = None
     """The folder of the certificate."""
+    is_computed: bool = True
+    """Whether it was computed, not only read from a file."""
 
     @property
     def success(self) -> float:
@@ -64,8 +65,8 @@ class Proof(TableResult):
 
     @property
     def is_proved(self) -> bool:
-        """Whether the policy succeeds from every placement."""
-        return self.certificate.is_proved
+        """Whether it was computed that the policy succeeds from every placement."""
+        return self.is_computed and self.certificate.is_full_success
 
     def losing(self) -> np.ndarray:
         """Return the boxes of certain failure. Shape: (N, num_cubes, 2), metres."""
@@ -89,7 +90,7 @@ class Proof(TableResult):
 
     def notes(self) -> list[str]:
         """Return the statement about all placements."""
-        return [render("drone_rl.verification", "proof.j2", proof=self.certificate)]
+        return [render("drone_rl.verification", "proof.j2", of=self, proof=self.certificate)]
 
 
 def prove(
@@ -100,7 +101,7 @@ def prove(
     task: Mapping[str, Any] | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
-    **changes: Unpack[ProveOptions],
+    **changes: Any,
 ) -> Proof:
     """Verify a greedy policy exhaustively over all cube placements.
 
@@ -192,4 +193,4 @@ def load_proof(path: str | Path) -> Proof:
         InputError: There is none, or it is damaged or too large.
     """
     path = certificate_file(path)
-    return Proof(read_certificate(path), path.parent)
+    return Proof(read_certificate(path), path.parent, is_computed=False)

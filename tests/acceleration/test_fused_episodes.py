@@ -147,13 +147,6 @@ def test_cropped_frames_and_a_network_with_pooling_are_fused(is_cropped_first):
     assert one["pixels"].shape[1:] == (1, 20, 64)
 
 
-def test_stepping_collector_returns_entries_of_the_same_types():
-    one, other = make().collect(), make(compiled=False).collect()
-    assert {*one.keys(True, True)} == {*other.keys(True, True)}
-    for key in one.keys(True, True):
-        assert one[key].dtype == other[key].dtype and one[key].shape[1:] == other[key].shape[1:]
-
-
 @pytest.mark.parametrize("how", [{"num_threads": 2}, {"num_threads": 3}])
 def test_batches_do_not_depend_on_the_number_of_cores(how):
     one, other = make(num_envs=35), make(num_envs=35, **how)

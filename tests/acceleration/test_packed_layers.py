@@ -7,8 +7,6 @@ from torch import nn
 
 from drone_rl.acceleration.layers_kernel import WIDTH, Layers, run_convolutions, run_linear
 from drone_rl.acceleration.packed_layers import (
-    OutputOffsets,
-    PackedLayer,
     PackedNetwork,
     packed_layers,
     unsupported,
@@ -123,33 +121,3 @@ def test_other_networks_are_not_packed():
 def small():
     network = SmallCNN((1, 8, 8), 3, patch=4, channels=(2,), hidden=(5,))
     return network, packed_layers(network)
-
-
-def test_geometry_matches_hand_computed_values():
-    _, (conv, hidden, logits) = small()
-    # 2x2 positions; the row stride is 4 rows of 8 pixels, the column stride 4 pixels
-    names = ("num_patches", "patches_per_row", "row_stride", "column_stride", "kernel_rows")
-    names += ("kernel_row_length", "kernel_row_stride", "num_outs", "output_stride", "pool_size")
-    assert conv.geometry == dict(zip(names, (4, 2, 32, 4, 4, 4, 8, 16, 16, 0), strict=True))
-    # 2x2 positions of 16 channels
-    assert hidden.geometry == dict(zip(names, (1, 1, 64, 16, 1, 64, 0, 16, 16, 0), strict=True))
-    assert logits.geometry == dict(zip(names, (1, 1, 16, 16, 1, 16, 0, 16, 16, 0), strict=True))
-    assert [layer.output_size for layer in (conv, hidden, logits)] == [64, 16, 16]
-    assert [layer.is_convolution for layer in (conv, hidden, logits)] == [True, False, False]
-
-
-def test_outputs_after_pooling_follow_those_before():
-    layers = packed_layers(OriginalCNN((1, 10, 12), 3, channels=(2,), hidden=()))
-    # 6x8 and 3x4 positions of 16 channels: 48 and 12 cache lines, and one more of each
-    assert OutputOffsets.of(layers) == ([0, 16 * (49 + 13), 16 * (49 + 13 + 1)], [16 * 49, 992])
-    assert layers[0].pooled_shape == (3, 4) and layers[1].num_inputs == 3 * 4 * 16
-
-
-def test_order_matches_hand_computed_indices():
-    layer = PackedLayer(torch.nn.Conv2d(2, 3, (1, 2)), 2, (1, 2, 2), (1, 2), 1)
-    order = layer.order(10)
-    assert order.shape == (1 + 4, WIDTH)
-    # 12 weights from index 10, at 10 + 4 o + 2 c + w for output o, channel c, column w; 3 biases
-    assert order[0].tolist() == [22, 23, 24] + [0] * 13
-    assert order[1:, 0].tolist() == [10, 12, 11, 13] and order[1:, 2].tolist() == [18, 20, 19, 21]
-    assert not order[:, 3:].any()

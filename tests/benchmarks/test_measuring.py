@@ -7,7 +7,7 @@ import yaml
 
 from benchmarks import pipeline, revisions, scaling, speed, startup, training
 from benchmarks.memory import growth
-from benchmarks.pipeline import make_drone_env, paired, random_walk, rate
+from benchmarks.pipeline import paired, rate
 from drone_rl.config import AppearanceSettings
 from drone_rl.utils.settings import conf_dir
 
@@ -39,12 +39,6 @@ def test_a_drift_of_the_machine_does_not_change_the_ratio(clock):
     slower = (1.0, 2.0, 4.0)
     first, second, ratio = paired(clock(30, *slower), clock(10, *slower), seconds=0.5, rounds=3)
     assert (first, second, ratio) == (15.0, 5.0, 3.0)
-
-
-def test_random_walk_continues_after_the_end_of_an_episode():
-    env = make_drone_env(2, "cpu", num_cubes=1)
-    assert random_walk(env, 40) == 80
-    env.close()
 
 
 def test_memory_growth_ignores_samples_before_settling():

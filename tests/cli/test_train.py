@@ -1,9 +1,7 @@
 """`drone-rl train`: repeated, killed, resumed, refused."""
 
-import errno
 import json
 import logging
-import os
 import re
 import shlex
 import shutil
@@ -17,7 +15,7 @@ from drone_rl.config import TaskSettings
 from drone_rl.config.training import TrainSettings
 from drone_rl.training import CsvCallback
 from drone_rl.training.demonstrations import record_oracle
-from drone_rl.utils.checkpoint import load_checkpoint, save_checkpoint
+from drone_rl.utils.checkpoint import load_checkpoint
 from drone_rl.utils.overrides import read_overrides
 from tests.cli.running import TINY, error_line
 
@@ -31,21 +29,6 @@ def test_files_of_a_training(run):
     state = load_checkpoint(run / "checkpoints" / "last.pt")
     assert state["config"]["collector"]["num_envs"] == 4
     assert state["provenance"]["versions"]["torch"] == torch.__version__
-
-
-def test_a_training_with_a_critic_is_resumed(in_process, tmp_path):
-    words = ["train", *TINY, "objective=ppo", "objective.num_steps=10", "returns.gamma=0.9"]
-    for name, frames in (("whole", 80), ("half", 40)):
-        run = [f"hydra.run.dir={name}", f"trainer.total_frames={frames}"]
-        assert in_process(*words, *run).returncode == 0
-    assert in_process("train", "resume=half", "trainer.total_frames=80").returncode == 0
-    one, two = (
-        load_checkpoint(tmp_path / name / "checkpoints" / "last.pt") for name in ("whole", "half")
-    )
-    assert one["config"]["collector"]["_target_"] == "rollouts"
-    assert one["progress"]["frames"] == two["progress"]["frames"] == 80
-    for key in ("policy", "critic"):
-        assert all(torch.equal(one[key][name], two[key][name]) for name in one[key])
 
 
 @pytest.mark.parametrize(
@@ -127,28 +110,6 @@ def test_nan_names_the_last_good_checkpoint(in_process, tmp_path):
     assert "nan/checkpoints/last.pt" in line
     state = load_checkpoint(tmp_path / "nan" / "checkpoints" / "last.pt")
     assert all(v.isfinite().all() for v in state["policy"].values())
-
-
-def test_full_disk_while_saving_keeps_the_previous_checkpoint(in_process, tmp_path):
-    saved = []
-
-    def save(path, state):
-        if len(saved) == 2:
-            patch.setattr(os, "fsync", full)
-        saved.append(path)
-        save_checkpoint(path, state)
-
-    def full(number):
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("drone_rl.training.callbacks.save_checkpoint", save)
-        settings = [*TINY, "hydra.run.dir=full", "trainer.checkpoint_interval_s=0"]
-        done = in_process("train", *settings)
-    assert "previous checkpoint is intact" in error_line(done)
-    folder = tmp_path / "full" / "checkpoints"
-    assert sorted(p.name for p in folder.iterdir()) == ["best.pt", "last.pt"]
-    assert load_checkpoint(folder / "last.pt")["progress"]["updates"] == 0
 
 
 def test_demonstrations_are_cloned_and_the_run_continues(in_process, tmp_path):

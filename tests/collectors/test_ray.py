@@ -8,8 +8,8 @@ import torch
 from drone_rl.config import TaskSettings
 from drone_rl.config.learning import Episodes, Ray
 from drone_rl.config.training import TrainSettings
-from drone_rl.training.components import make_collector
-from drone_rl.training.trainer import episode_rewards
+from drone_rl.training.metrics import episode_rewards
+from drone_rl.training.train import make_collector
 from drone_rl.utils.errors import InputError
 
 pytestmark = pytest.mark.slow

@@ -1,7 +1,5 @@
 """Camera faults: their effect on frames, seeds, batches, resets, partial steps, saved states."""
 
-import copy
-
 import pytest
 import torch
 from torchrl.envs import Compose, TransformedEnv
@@ -190,16 +188,6 @@ def test_collectors_resume_bit_for_bit(how, kind, tmp_path):
         other = second.collect()
         for key in one.keys(True, True):
             assert torch.equal(one[key], other[key]), key
-
-
-def test_saved_state_resumes_within_an_episode():
-    env, moves = make_env(), torch.zeros(4, dtype=torch.int64)
-    state = env.step(env.reset().set("action", moves))["next"]
-    saved = copy.deepcopy(env.running_state())
-    expected = env.step(state.clone().set("action", moves))["next"]["pixels"]
-    other = make_env(seed=9)
-    other.load_running_state(saved)
-    assert torch.equal(other.step(state.set("action", moves))["next"]["pixels"], expected)
 
 
 def test_images_outside_0_to_1_raise():

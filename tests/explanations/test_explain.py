@@ -156,16 +156,6 @@ def posts():
     env.close()
 
 
-def test_frames_of_another_task_are_recorded(posts):
-    data = posts.dataset
-    assert {"posts", "next_target"} < set(data.arrays) and "cubes" not in data.arrays
-    state = data.state(posts.scenes.task)
-    again = posts.scenes.frames(state).numpy()
-    np.testing.assert_array_equal(again, data.frames)  # the recalled worlds look as they did
-    assert data.offset(posts.scenes.task).shape == (40, 2)
-    assert data.next_target.max() <= NUM_POSTS
-
-
 def test_all_sections_work_with_another_task(posts, tmp_path):
     """Nothing of an explanation needs cubes, only targets."""
     with quick():

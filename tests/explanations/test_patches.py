@@ -13,7 +13,6 @@ from drone_rl.explanations.patches import (
     patch_effects,
     placebo_maps,
     pointing,
-    replaced,
     scores,
     shuffled_networks,
 )
@@ -36,19 +35,6 @@ def test_the_grid_has_about_forty_nearly_square_patches(size, grid):
 def test_means_by_hand():
     maps = torch.tensor([[[1.0, 3.0, 0.0, 0.0], [5.0, 7.0, 0.0, 2.0]]])
     assert PatchGrid(2, 2, 1, 2).means(maps).tolist() == [[4.0, 0.5]]
-
-
-def test_only_parts_that_differ_are_replaced():
-    network = MLP((1, 2, 2), 2, hidden=())
-    with torch.no_grad():
-        network.layers.logits.weight.copy_(torch.tensor([[0.0] * 4, [1.0, 2.0, 4.0, 8.0]]))
-    x, other = torch.zeros(2, 1, 2, 2), torch.zeros(2, 1, 2, 2)
-    other[0, 0, 0, 1] = 1.0  # in picture 0 the first row differs, in picture 1 nothing does
-    other[1, 0, 1, 0] = 0.0
-    masks = PatchGrid(1, 2, 2, 1).masks((2, 2))
-    ((frames, parts, after),) = replaced(network, x, other, masks)
-    assert (frames.tolist(), parts.tolist()) == ([0], [0])
-    assert after[0, 1].item() == pytest.approx(torch.sigmoid(torch.tensor(2.0)).item())
 
 
 GRID = PatchGrid(1, 1, 2, 2)

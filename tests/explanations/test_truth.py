@@ -16,7 +16,6 @@ from drone_rl.explanations.truth import (
     intervene,
     measure_outcomes,
     run_to_target,
-    section,
     to_the_middle,
 )
 from drone_rl.sim.actions import Move
@@ -162,17 +161,6 @@ def test_following_by_hand():
     assert followed(right, left).tolist() == [-3.0 / 4.0]
     assert followed(left, left).tolist() == [0.0]
     assert followed(rollout_of(1, [0.0, 9.0]), rollout_of(1, [0.0, 0.0])).tolist() == [1.0]
-
-
-@pytest.mark.slow
-def test_the_section_has_tests_and_changes(context):
-    found = section(context)
-    assert set(found.methods) >= {"grad_cam", "saliency"}
-    assert found.trusted is None or found.methods[found.trusted].trusted
-    assert found.changed.shape == (len(found.interventions), *context.dataset.frames.shape[1:])
-    assert 0 <= found.shown_frame < len(context.dataset)
-    assert found.frames + found.frames_unmoved == len(context.dataset)
-    assert (found.patch_effects >= 0).all() and np.isfinite(found.patch_effects).all()
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ from torch import nn
 from torchrl.data import Categorical
 from torchrl.modules import ProbabilisticActor
 
-from drone_rl.envs.three_state import SUCCESS_PROBABILITY, ThreeStateEnv
 from drone_rl.objectives import ReinforceLoss, returns
 from drone_rl.policies.actor import RandomSource, SeededCategorical
 from drone_rl.utils.errors import InputError
@@ -98,62 +97,6 @@ def test_algorithm_4_matches_a_hand_computed_step():
     torch.testing.assert_close(network.theta.detach(), torch.tensor([[step, -step]]))
 
 
-def test_mean_gradients_are_exact_for_the_process_of_fig_3():
-    """Eq. 12 and, undiscounted, Eq. 15 are unbiased estimates of the gradient of J.
-
-    With p the probability of action 1 in state 0, J = 3/4 (1 - (1 - p)^H), so with respect to the
-    logit of action 1, dJ = 3/4 H (1 - p)^(H - 1) p (1 - p).
-
-    test_bias.py enumerates all outcomes instead of sampling them, so a difference
-    of a third is enough here: it is at least 5.5 standard errors, so 4 detect it in 93% of samples.
-    """
-    horizon, episodes, repeats = 3, 500, 12
-    network, actor = make(features=3)
-    with torch.no_grad():
-        network.theta[0] = torch.tensor([0.4, -0.3])
-    p = float(network.theta[0].detach().softmax(-1)[1])
-    derivative = SUCCESS_PROBABILITY * horizon * (1 - p) ** (horizon - 1) * p * (1 - p)
-    env = ThreeStateEnv(episodes, horizon=horizon, seed=1)
-    loss = ReinforceLoss(actor, reduction="sum", entropy_coeff=0.0)
-    estimates = []
-    for _ in range(repeats):
-        with torch.no_grad():
-            batch = env.rollout(horizon, actor, break_when_any_done=False)
-        ends = batch["next", "done"][..., 0].int()
-        batch = batch[ends.cumsum(-1) == ends]  # the first episode of each environment
-        reward, done = batch["next", "reward"], batch["next", "done"]
-        weights = returns.total_reward(reward, done), returns.reward_to_go(reward, done, 1.0)
-        both = [gradient(loss, network, batch.set("return_to_go", w))[0, 1] for w in weights]
-        estimates.append(-torch.stack(both) / episodes)
-    estimates = torch.stack(estimates)
-    error = estimates.std(0) / repeats**0.5
-    assert (error < 0.06 * derivative).all()
-    assert ((estimates.mean(0) - derivative).abs() < 4 * error).all()
-
-
-def test_constant_added_to_returns_keeps_the_expected_gradient():
-    """The expectation is enumerated over both actions."""
-    network, actor = make()
-    with torch.no_grad():
-        network.theta.copy_(torch.tensor([[0.3, -0.2], [0.1, 0.4]]))
-    observation = torch.tensor([[1.0, -2.0]])
-    probabilities = (observation @ network.theta.detach()).softmax(-1)[0]
-    loss = ReinforceLoss(actor, reduction="sum", entropy_coeff=0.0)
-
-    def expected(shift):
-        total = torch.zeros(2, 2)
-        for action, value in ((0, 1.0), (1, 3.0)):
-            entries = {
-                "observation": observation,
-                "action": torch.tensor([action]),
-                "return_to_go": torch.tensor([[value + shift]]),
-            }
-            total += probabilities[action] * gradient(loss, network, TensorDict(entries, [1]))
-        return total
-
-    torch.testing.assert_close(expected(0.0), expected(17.0), atol=1e-5, rtol=1e-5)
-
-
 def test_values_match_hand_computed_ones():
     """-log pi is log 2 at every step; returns are 1, 2, 3, so the sum is 6 log 2."""
     _, actor = make()
@@ -194,20 +137,6 @@ def test_returns_are_detached():
     batch["return_to_go"] = batch["return_to_go"].clone().requires_grad_()
     assert torch.equal(gradient(ReinforceLoss(actor, entropy_coeff=0.0), network, batch), plain)
     assert batch["return_to_go"].grad is None
-
-
-def test_stored_action_is_used():
-    _, actor = make()
-    batch = make_batch()
-    first = ReinforceLoss(actor, entropy_coeff=0.0)(batch)["loss_actor"]
-    assert torch.equal(first, ReinforceLoss(actor, entropy_coeff=0.0)(batch)["loss_actor"])
-    flipped = batch.clone().set("action", 1 - batch["action"])
-    with torch.no_grad():
-        actor.module[0].module.theta.copy_(torch.tensor([[1.0, 0.0], [0.0, 1.0]]))
-    assert (
-        ReinforceLoss(actor, entropy_coeff=0.0)(flipped)["loss_actor"]
-        != ReinforceLoss(actor)(batch)["loss_actor"]
-    )
 
 
 def test_masked_loss_equals_sliced_loss():

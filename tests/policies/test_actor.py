@@ -10,9 +10,6 @@ from torchrl.modules import ProbabilisticActor
 
 from drone_rl.policies import make_actor
 from drone_rl.policies.actor import (
-    SeededCategorical,
-    SquashedNormal,
-    distribution_of,
     exploring,
 )
 
@@ -35,11 +32,6 @@ def test_samples_by_the_probabilities_by_default():
     expected = torch.tensor([0.1, 0.7, 0.2])
     deviation = (expected * (1 - expected) / 20_000).sqrt()
     assert ((shares - expected).abs() < 4 * deviation).all()
-
-
-def test_deterministic_exploration_takes_the_most_probable_action():
-    with set_exploration_type(ExplorationType.DETERMINISTIC):
-        assert (act(build()) == 1).all()
 
 
 @pytest.mark.parametrize("how", [ExplorationType.RANDOM, ExplorationType.DETERMINISTIC])
@@ -103,8 +95,3 @@ def test_continuous_actions_are_sampled_from_squashed_normals():
     assert (normal.std(0) - math.exp(-0.5)).abs().max() < 0.02
     with set_exploration_type(ExplorationType.DETERMINISTIC):
         torch.testing.assert_close(act(lean(), 2)[1].double(), expected.tanh(), atol=1e-6, rtol=0)
-
-
-def test_distribution_follows_from_the_action_type():
-    assert distribution_of(torch.int64) is SeededCategorical
-    assert distribution_of(torch.float32) is SquashedNormal

@@ -64,14 +64,6 @@ def test_opposition_is_the_smaller_change_of_left_and_right(probs, other, expect
     assert FIVE.opposition(np.array(probs), np.array(other)) == pytest.approx(expected)
 
 
-def test_opposite_actions_undo_each_other():
-    action = torch.tensor([1, 0, 3, 2, 4, 2, 0])
-    before = torch.tensor([0, 1, 2, 3, 4, 2, 2])
-    assert FIVE.undoes(action, before).tolist() == [True] * 4 + [False] * 3
-    assert FIVE.can_be_undone(torch.arange(5)).tolist() == [True] * 4 + [False]
-    assert MOVES.can_be_undone(torch.arange(3)).tolist() == [False, True, True]
-
-
 def test_as_dict_returns_plain_values():
     assert MOVES.as_dict() == {
         "names": ["forward", "left", "right"],

@@ -67,28 +67,6 @@ def test_part_probabilities_match_hand_computed_ones():
     assert probs.tolist() == pytest.approx(both) and probs.sum().item() == pytest.approx(1)
 
 
-def test_part_probabilities_match_sampled_actions():
-    given = outputs(1.0, 0.3, -0.4)
-    mean, deviation = normal_of(given)
-    draws = torch.randn(100_000, 3, generator=torch.Generator().manual_seed(0), dtype=mean.dtype)
-    drawn = (mean + deviation * draws).tanh()
-    aside, turned = drawn[:, 1].abs() > 1 / 3, drawn[:, 2].abs() > 1 / 3
-    weight = torch.where(aside & turned, 0.5, 1.0)
-    shares = torch.stack(
-        [
-            (~aside & ~turned).double(),
-            weight * (drawn[:, 1] > 1 / 3),
-            weight * (drawn[:, 1] < -1 / 3),
-            weight * (drawn[:, 2] > 1 / 3),
-            weight * (drawn[:, 2] < -1 / 3),
-        ],
-        -1,
-    )
-    assert (
-        shares.mean(0) - ALL.probabilities(given)
-    ).abs().max() < 0.007  # 4 standard errors of 0.5 / 316
-
-
 def test_part_of_an_action():
     action = torch.tensor(
         [[1, 0, 0], [1, 0.5, 0], [-1, -0.5, 0], [1, 0.5, -0.6], [0, 0.2, 0.9], [1, 0.3, -0.3]]

@@ -21,35 +21,6 @@ from drone_rl.sim.rendering.appearance import rotate
 KINDS = [np.array, lambda rows: torch.tensor(rows, dtype=torch.float64)]
 
 
-def earth_centred(place):
-    """Return the position in m from the center of the Earth, by the definition of the ellipsoid."""
-    latitude, longitude = np.radians(place[..., 0]), np.radians(place[..., 1])
-    squared = FLATTENING * (2 - FLATTENING)
-    across = EQUATOR_RADIUS / np.sqrt(1 - squared * np.sin(latitude) ** 2)
-    out = (across + place[..., 2]) * np.cos(latitude)
-    up = (across * (1 - squared) + place[..., 2]) * np.sin(latitude)
-    return np.stack([out * np.cos(longitude), out * np.sin(longitude), up], -1)
-
-
-def tangent_plane(place):
-    """Return north, west and up on the plane tangent to the ellipsoid at home."""
-    latitude, longitude = np.radians(HOME.latitude), np.radians(HOME.longitude)
-    sin_n, cos_n, sin_e, cos_e = (
-        np.sin(latitude),
-        np.cos(latitude),
-        np.sin(longitude),
-        np.cos(longitude),
-    )
-    axes = np.array(
-        [
-            [-sin_n * cos_e, -sin_n * sin_e, cos_n],
-            [sin_e, -cos_e, 0.0],
-            [cos_n * cos_e, cos_n * sin_e, sin_n],
-        ]
-    )
-    return (earth_centred(place) - earth_centred(np.array(HOME))) @ axes.T
-
-
 @pytest.mark.parametrize("kind", KINDS, ids=["numpy", "torch"])
 def test_round_trip_within_1_km(kind):
     random = np.random.default_rng(0)
@@ -65,17 +36,6 @@ def test_lengths_of_degrees_match_tables():
     np.testing.assert_allclose(north, [111.179, 0.0, 0.0], atol=0.01)
     east = world_from_geo(np.array([HOME.latitude, HOME.longitude + 0.001, 130.0]))
     np.testing.assert_allclose(east, [0.0, -75.14, 8.0], atol=0.01)
-
-
-def test_positions_match_the_tangent_plane():
-    """The error is below 10 cm at 1 km, except for the height due to curvature."""
-    turns = np.linspace(0.0, 2 * np.pi, 17)
-    ring = 1000.0 * np.stack([np.cos(turns), np.sin(turns), 0 * turns], -1)
-    exact = tangent_plane(geo_from_world(ring))
-    assert np.abs(exact - ring)[:, :2].max() < 0.1
-    np.testing.assert_allclose(exact[:, 2], -(1000.0**2) / (2 * 6.38e6), atol=0.005)
-    near = tangent_plane(geo_from_world(0.1 * ring))
-    assert np.abs(near - 0.1 * ring).max() < 0.002
 
 
 def test_longitudes_continue_across_the_date_line():

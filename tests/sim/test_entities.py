@@ -4,15 +4,9 @@ import numpy as np
 import pytest
 from dm_control import mjcf
 
-from drone_rl.config import CameraSettings
 from drone_rl.sim import entities
 from drone_rl.sim.entities import (
-    BODY_GROUP,
-    CHASE,
-    DRONE_CAMERAS,
     FLOOR_COLOR,
-    Cube,
-    DroneEntity,
     Field,
     make_distractors,
 )
@@ -62,34 +56,8 @@ def test_arena_has_a_floor_and_a_sun_without_shadows():
     np.testing.assert_allclose(model.light_ambient[0] + 0.75, 1.1)  # full light is white
 
 
-def test_cube_is_a_box_without_collisions():
-    cube = Cube(2.5, (0.1, 0.2, 0.3), name="cube_7")
-    model = mjcf.Physics.from_mjcf_model(cube.mjcf_model).model
-    assert model.geom_size[0].tolist() == [1.25] * 3  # half edges
-    np.testing.assert_allclose(model.geom_rgba[0, :3], (0.1, 0.2, 0.3), atol=1e-6)
-    assert not model.geom_contype.any() and not model.geom_conaffinity.any()
-    assert cube.mjcf_model.model == "cube_7" and cube.semantic_class is SemanticClass.TARGET
-    assert cube.geom is cube.mjcf_model.find("geom", "geom")
-
-
 def test_distractors_cycle_through_all_shapes():
     made = make_distractors(4)
     assert [d.geom.type for d in made] == ["box", "sphere", "cylinder", "box"]
     assert all(d.semantic_class is SemanticClass.DISTRACTOR and d.geom.size[0] == 0.5 for d in made)
     assert len({d.mjcf_model.model for d in made}) == 4
-
-
-def test_drone_has_hull_four_rotors_and_six_cameras():
-    drone = DroneEntity(size=0.8, camera=CameraSettings(width=40, height=40, horizontal_fov=90.0))
-    model = mjcf.Physics.from_mjcf_model(drone.mjcf_model).model
-    names = {model.geom(i).name for i in range(model.ngeom)}
-    rotors = {f"rotor_{end}_{side}" for end in ("front", "rear") for side in ("left", "right")}
-    assert names == {"hull"} | rotors
-    assert model.geom("rotor_front_left").pos[:2].round(6).tolist() == [0.24, 0.24]
-    assert (model.geom_group == BODY_GROUP).all() and model.body_mass.sum() == 1.0
-    found = [model.camera(i).name for i in range(model.ncam)]
-    assert found == [spec.name for spec in (*DRONE_CAMERAS, CHASE)]
-    assert (
-        model.camera("front_center").fovy.round(6) == 90.0
-        and drone.semantic_class is SemanticClass.DRONE
-    )

@@ -178,15 +178,6 @@ def test_distractors_fill_their_ranges():
     assert (y[:, 0] > 0).all() and (y[:, 1] < 0).all()  # alternating sides
 
 
-def test_middle_positions_follow_the_golden_section():
-    """Positions start at half of 48 m, alternate sides, and advance by 0.618 per pair."""
-    turn = 0.6180339887498949
-    shares = [(0.5 + pair * turn + side * 0.5) % 1.0 for pair in range(3) for side in (0, 1)][:5]
-    rows = drawn(SOME, None)
-    assert rows[:, 0].tolist() == pytest.approx([48 * share for share in shares], rel=1e-6)
-    assert rows[:, 1].tolist() == [sign * (6 + 4.5 + 0.75) for sign in (1, -1, 1, -1, 1)]
-
-
 def test_fixed_settings_draw_no_random_numbers():
     fixed = AppearanceSettings(distractors=3, distractor_size=2.0, distractor_distance=4.0)
     source, other = np.random.RandomState(0), np.random.RandomState(0)

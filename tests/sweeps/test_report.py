@@ -12,7 +12,6 @@ import drone_rl
 from drone_rl.sweeps.manifest import Run, Sweep
 from drone_rl.sweeps.report import (
     _median,
-    _share,
     find_sweep,
     judge_run,
     terminal_lines,
@@ -20,8 +19,9 @@ from drone_rl.sweeps.report import (
     write_picture,
     write_sweep_report,
 )
-from drone_rl.sweeps.summary import median_of_runs, share_of_runs
+from drone_rl.sweeps.summary import median_of_runs
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.intervals import proportion
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import RootSeed
 from tests.training.test_train import TINY
@@ -33,8 +33,9 @@ def test_report_escapes_what_it_shows(sweep):
     page = write_sweep_report(sweep)[0].read_text()
     assert "<b>NaN</b>" not in page
     assert "&lt;b&gt;NaN" in page
-    assert "are left out." not in page
-    assert page.count("data:image/png;base64,") == 10  # five figures, light and dark
+    assert "further panels" not in page
+    assert page.count("data:image/png;base64,") == 2
+    assert "1 of 2 (1.3% to 98.7%)" in page  # failed at the high rate
     assert "drone-rl train optimizer.lr=1e-3 seed=0" in page
     assert 'href="./2/"' in page
     assert "http:" not in page
@@ -65,7 +66,7 @@ def test_a_sweep_that_has_hardly_begun_has_a_page(begin_sweep):
 def test_panels_that_are_not_plotted_are_counted(begin_sweep):
     choices = [f"objective={i} optimizer.lr={lr}" for i in range(8) for lr in ("1e-3", "1e-2")]
     page = write_sweep_report(begin_sweep({choice: {} for choice in choices}))[0].read_text()
-    assert page.count("2 further panels are left out.") == 2  # curves and costs
+    assert "Learning curves (without 2 further panels)" in page
 
 
 def test_cells():
@@ -74,10 +75,7 @@ def test_cells():
     assert _median(median_of_runs([float("inf")], [500.0])) == ">500"
     six = [1.0, 2, 3, 4, 5, float("inf")]
     assert _median(median_of_runs(six, [1.0, 2, 3, 4, 5, 9])) == "3.5 [1, more]"
-    assert _median(median_of_runs([])) == _share(share_of_runs(0, 0, 0)) == ""
-    assert _share(share_of_runs(0, 3, 3)) == "not known"  # nothing was judged
-    assert _share(share_of_runs(1, 2, 3)) == "1/1, 2 not known [0.01, 1.00]"
-    assert _share(share_of_runs(2, 0, 2, certain=1)) == "2/2, 1 certain [0.16, 1.00]"
+    assert _median(median_of_runs([])) == ""
 
 
 def begun(folder):
@@ -102,10 +100,10 @@ def test_no_sweep(tmp_path):
 
 def test_terminal_lines(sweep):
     lines = terminal_lines(write_sweep_report(sweep)[1]).splitlines()
-    assert lines[0].startswith("4 runs: 3 finished, 1 failed, 0 damaged, 0 unfinished. Failed")
+    assert lines[0].startswith("4 runs: 3 finished, 1 failed, 0 unfinished. Failed")
     low, high = (line.split(maxsplit=1) for line in lines[2:4])
     assert low == ["optimizer.lr=1e-3", "solved 2 of 2; verdicts: good 2"]
-    assert high[1] == "solved 0 of 2; verdicts: one-sided 1 (0 certain), failed 1"
+    assert high[1] == "solved 0 of 2; verdicts: one-sided 1, failed 1"
     assert lines[4] == "run 3 failed: <b>NaN</b>"
     assert lines[5].startswith(
         "best run: Run 0: good, which reaches 100% of its goals in 200 episodes"
@@ -124,18 +122,13 @@ def six(begin_sweep, make_verdict):
     ("part", "text", "change"),
     [
         ("runs", "count as not solved", {"failed": 1}),
-        ("runs", "can't be read", {"damaged": 2}),
         ("runs", "are left out of every", {"unfinished": 1}),
-        ("runs", "1 of 1 settings have fewer than 6", {"groups": {"ended": 5}}),
-        ("runs", "1 of 1 settings have fewer than 6", {"groups": {"damaged": 1}}),
+        ("runs", "1 of 1 settings have fewer than 6", {"groups": {"solved": proportion(1, 5)}}),
         ("runs", "at least half", {"groups": {"frames_to_solve": median_of_runs([INF], [9.0])}}),
         ("verdicts", "2 of 6 verdicts are not certain", {"certain": 4}),
-        ("verdicts", "older rule", {"judged_by_older_rule": 2}),
-        ("verdicts", "finished and not judged", {"never_judged": 1}),
+        ("verdicts", "without a verdict by the present rule", {"judged": 5}),
         ("best", "No run has been judged", {"best": None}),
-        ("curves", "Thin lines", {"groups": {"ended": 3}}),
-        ("sides", "without a dot", {"sides_not_offered": 1}),
-        ("costs", "Open triangles", {"failed": 1}),
+        ("curves", "Thin lines", {"groups": {"solved": proportion(1, 3)}}),
     ],
 )
 def test_what_makes_a_sentence(six, part, text, change):
@@ -149,12 +142,9 @@ def test_what_makes_a_sentence(six, part, text, change):
         ("verdicts", "All are certain", {"certain": 5}),
         ("best", "reaches 100% of its goals", {"best": None}),
         ("best", "optimistic", {"judged": 1}),
-        ("curves", "Thick line", {"groups": {"ended": 5}}),
-        ("shares", "bars", {"judged": 0}),
-        ("sides", "Each dot", {"sides_not_offered": 6}),
-        ("entropies", "Each dot", {"runs": ()}),
-        ("costs", "Each dot", {"groups": {"solved": share_of_runs(0, 0, 6)}}),
-        ("settings", "exact 95% intervals", {"unfinished": 6}),
+        ("curves", "Thick line", {"groups": {"solved": proportion(1, 5)}}),
+        ("outcome", "Each dot", {"judged": 0}),
+        ("settings", "exact 95% intervals", {"finished": 0}),
     ],
 )
 def test_what_takes_a_sentence_away(six, part, text, change):

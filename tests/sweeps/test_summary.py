@@ -9,12 +9,10 @@ import pytest
 
 from drone_rl.sweeps.rows import read_rows
 from drone_rl.sweeps.summary import (
-    RunShare,
     make_groups,
     median_band,
     median_of_runs,
     on_grid,
-    share_of_runs,
     summarise_sweep,
     to_csv,
 )
@@ -46,7 +44,7 @@ def test_the_best_of_equal_runs_took_the_fewest_frames(begin_sweep, make_verdict
 def test_no_run_is_best_without_a_verdict(begin_sweep):
     summary = summary_of(begin_sweep({"seed=0": {}, "seed=1": {"verdict": {"rule": "another"}}}))
     assert summary.best is None
-    assert (summary.judged_by_older_rule, summary.never_judged) == (1, 1)
+    assert (summary.finished, summary.judged) == (2, 0)
 
 
 def test_commands_of_the_summary(sweep, monkeypatch):
@@ -59,8 +57,8 @@ def test_commands_of_the_summary(sweep, monkeypatch):
 
 def test_counts_of_the_summary(sweep):
     summary = summary_of(sweep)
-    states = ("finished", "failed", "damaged", "unfinished", "judged", "certain")
-    assert [getattr(summary, state) for state in states] == [3, 1, 0, 0, 3, 2]
+    states = ("finished", "failed", "unfinished", "judged", "certain")
+    assert [getattr(summary, state) for state in states] == [3, 1, 0, 3, 2]
     assert summary.episodes == [200]
     assert summary.groups[1].solved.successes == 0
 
@@ -81,7 +79,7 @@ def test_groups_are_runs_that_differ_in_their_seed_alone(sweep):
     assert low.seconds_to_solve.median == 2
     assert low.verdicts["good"].share == 1.0
     assert low.verdicts["good"].lower95 == pytest.approx(0.025**0.5)  # exact, 2 of 2
-    assert (high.ended, high.failed, high.runs) == (2, 1, 2)
+    assert (high.failed, high.unfinished, high.runs) == (1, 0, 2)
 
 
 def test_failed_runs_count(begin_sweep, make_verdict):
@@ -90,9 +88,9 @@ def test_failed_runs_count(begin_sweep, make_verdict):
             {f"seed={i}": "NaN" for i in range(9)} | {"seed=9": {"verdict": make_verdict()}}
         )
     )
-    assert group.solved == share_of_runs(1, 0, 10)
+    assert group.solved == proportion(1, 10)
     assert group.verdicts["good"].share == 0.1
-    assert group.verdicts["good"].upper95 == proportion(1, 10).upper95  # all is known
+    assert group.verdicts["good"].upper95 == proportion(1, 10).upper95
     assert group.verdicts["failed"].share == 0.9
     assert group.frames_to_solve.median is None
     assert group.frames_to_solve.more_than == 1000  # what they had when they failed
@@ -107,32 +105,19 @@ def test_unsolved_runs_are_censored(begin_sweep):
     assert group.frames_to_solve.more_than == 5000
 
 
-def test_runs_that_are_not_judged_may_be_of_any_kind(begin_sweep, make_verdict):
-    old = {"verdict": {"rule": "another"}}
-    (group,) = groups(begin_sweep({"seed=0": {"verdict": make_verdict()}, "seed=1": old}))
-    for kind, hits in {"good": 1, "poor": 0}.items():
-        share = group.verdicts[kind]
-        assert share.lower95 == proportion(hits, 2).lower95
-        assert share.upper95 == proportion(hits + 1, 2).upper95
-    assert group.verdicts["failed"].unknown == 0  # it did not fail
-    assert group.solved.share == 1.0
+def test_verdicts_are_fractions_of_runs_that_were_judged_or_failed(begin_sweep, make_verdict):
+    runs = {"seed=0": {"verdict": make_verdict()}, "seed=1": {"verdict": {"rule": "another"}}}
+    (group,) = groups(begin_sweep(runs | {"seed=2": "NaN"}))
+    fractions = {kind: share.share for kind, share in group.verdicts.items() if share.successes}
+    assert fractions == {"good": 0.5, "failed": 0.5}
+    assert group.solved == proportion(2, 3)
 
 
-def test_a_damaged_run_may_be_anything_and_an_unfinished_one_is_left_out(begin_sweep):
+def test_a_run_with_unreadable_files_failed_and_an_unfinished_one_is_left_out(begin_sweep):
     sweep = begin_sweep({"seed=0": {}, "seed=1": {"frames": "many"}, "seed=2": None})
     (group,) = groups(sweep)
-    assert (group.runs, group.ended, group.unfinished) == (3, 2, 1)
-    assert group.solved == RunShare(**dict(proportion(1, 2)) | {"upper95": 1.0}, unknown=1)
-    assert group.verdicts["failed"].unknown == 1
-    assert group.frames_to_solve.runs == 1
-
-
-def test_an_unknown_run_may_be_a_success_or_none():
-    figure = share_of_runs(3, 2, 10)
-    assert figure.share == 0.3
-    assert figure.lower95 == proportion(3, 10).lower95
-    assert figure.upper95 == proportion(5, 10).upper95
-    assert share_of_runs(0, 4, 4).upper95 == 1.0
+    assert (group.runs, group.failed, group.unfinished) == (3, 1, 1)
+    assert group.solved == proportion(1, 2)
 
 
 def test_the_median_has_an_interval_from_six_runs_on():

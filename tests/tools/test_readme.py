@@ -8,21 +8,15 @@ import pytest
 from benchmarks.benchmark import Benchmark
 from benchmarks.ledger import Ledger, Origin, digest_code, make_origin
 from benchmarks.registry import BENCHMARKS
-from benchmarks.robust import ARMS
-from drone_rl.trust.axes import AXES, GROUPS
 from tools.readme import __main__ as readme
 from tools.readme import rows
 from tools.readme.__main__ import ROOT, keep, main, make_blocks, make_files, replace_blocks
-from tools.readme.axes import list_axes
 from tools.readme.notebook import make_notebook
-from tools.readme.packages import list_contracts
 from tools.readme.tables import (
     UNKNOWN,
     Row,
     fill,
     list_origins,
-    make_peers,
-    make_robust,
     make_table,
 )
 
@@ -86,52 +80,6 @@ def test_cells(template, text):
 def test_a_missing_figure_is_marked_as_unmeasured():
     table = make_table([Row("moon", "tide", "{tide_m:.1f} m", "3 m")], {})
     assert table.splitlines()[2:] == [f"| tide | {UNKNOWN} | 3 m | `moon` |"]
-
-
-def test_learners_that_did_not_solve_the_task_are_marked():
-    measured = {
-        "seconds": [9.04, 10.0],
-        "seconds_without_imports": [5.0, 6.0],
-        "frames": [12_000, 9_000],
-        "is_solved": [False, True],
-        "success_lower95": [0.996, 0.98],
-    }
-    lines = make_peers({"peers": {"torchrl": measured}}).splitlines()[2:]
-    assert lines[-1].endswith(
-        "num_envs 32, steps 150, lr 0.003 | 9.0, 10.0 | 5.0, 6.0 | 12,000, 9,000 (1 not solved) | "
-        "99.6%, 98.0% |"
-    )
-    assert lines[0].count(UNKNOWN) == 4
-
-
-def test_randomized_training_has_a_row_for_each_group():
-    arm = {"plain": [1.0, 0.99], "untouched": [0.5, 0.75], "all_kinds": [0.4, 0.6]}
-    arm |= {group: [0.8, 0.9] for group in GROUPS}
-    table = make_robust({"robust_arms": {"all": arm}, "robust_untouched": ["dynamics"]})
-    head, _, plain, *groups, untouched, _ = table.splitlines()
-    assert head == f"| success rate, % | {' | '.join(ARMS)} |"
-    assert plain.endswith(f"| {UNKNOWN} | 100 (99 to 100) |")
-    assert len(groups) == len(GROUPS)
-    assert groups[-1].startswith("| **dynamics** |") and groups[-1].endswith("| 85 (80 to 90) |")
-    assert untouched.endswith("| 62 (50 to 75) |")
-
-
-def test_axes_have_units_and_strengths():
-    lines = list_axes().splitlines()
-    assert len(lines) == 2 + len(AXES)
-    fog = "| `fog` | fog | visibility, metres | clear air | 100, 60, 40, 25, 15 | m of sight |"
-    assert fog in lines
-
-
-def test_forbidden_imports_are_listed():
-    contract = {
-        "type": "forbidden",
-        "name": "no water inside",
-        "source_modules": ["drone_rl.top", "drone_rl.left"],
-        "forbidden_modules": ["sea", "rain"],
-    }
-    listed = list_contracts([contract, {"type": "acyclic_siblings"}])
-    assert listed == "- No water inside: top, left may not import sea, rain."
 
 
 def add(ledger, name, code, **figures):

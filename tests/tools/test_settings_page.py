@@ -9,7 +9,7 @@ from drone_rl.cli.main import COMMANDS, find_command
 from drone_rl.config import DynamicsSettings
 from drone_rl.utils.schema import OneOf, Real, Several, Whole
 from drone_rl.utils.settings import Settings, meanings
-from tools.readme.settings import list_commands, make_table
+from tools.readme.settings import make_table
 
 
 class Sea(Settings):
@@ -31,13 +31,6 @@ class Sea(Settings):
     """Whether."""
 
 
-class Pond(Sea):
-    """Less water."""
-
-    depth: Annotated[float, Real(0.0, 3.0, unit="m")] = 1.0
-    """How shallow."""
-
-
 def test_a_row_has_allowed_values_unit_default_and_meaning():
     assert make_table(Sea, "sea.").splitlines()[2:] == [
         "| `sea.depth` | a number above 0 up to 11000 | m | `100.0` | "
@@ -47,12 +40,6 @@ def test_a_row_has_allowed_values_unit_default_and_meaning():
         "| `sea.wind` | `none` or `storm` |  | `none` | How it blows. |",
         "| `sea.is_salty` | true or false |  | `true` | Whether. |",
     ]
-
-
-def test_a_subclass_overrides_meanings():
-    first, second, *_ = make_table(Pond).splitlines()[2:]
-    assert first == "| `depth` | a number from 0 to 3 | m | `1.0` | How shallow. |"
-    assert second.startswith("| `tides` |")
 
 
 def commands():
@@ -75,12 +62,3 @@ def test_every_setting_has_a_meaning_and_seconds_a_suffix(cls):
         assert may_be
         is_physics = cls is DynamicsSettings  # SI throughout
         assert (unit == "s") == name.endswith("_s") or is_physics, name
-
-
-def test_commands_link_to_their_groups():
-    train = list_commands().partition("### drone-rl train")[2].partition("### ")[0]
-    assert "| `camera` | [camera](#camera) |  |  |" in train
-    assert (
-        "| `transforms` | [transforms](#transforms) |  | `gray`, `resize`, `standardize`" in train
-    )
-    assert "changes to the policy's [task](#task)" in list_commands()

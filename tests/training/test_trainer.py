@@ -1,14 +1,10 @@
-import enum
 import signal
 
 import pytest
 import torch
-from tensordict import TensorDict
 
-from drone_rl.sim.tasks.collect_cubes import CubesEnd
-from drone_rl.training import Callback, CheckpointCallback, NotANumberError
-from drone_rl.training import trainer as trainer_module
-from drone_rl.training.trainer import batch_metrics, episode_rewards, running_mean
+from drone_rl.training import Callback, CheckpointCallback, NotANumberError, signals
+from drone_rl.training.metrics import episode_rewards, running_mean
 from drone_rl.utils.checkpoint import load_checkpoint
 from drone_rl.utils.errors import InputError
 from tests.training_loop import run
@@ -45,48 +41,6 @@ def test_seed_determines_parameters_bit_for_bit(make_trainer):
     assert not torch.equal(parameters(first), parameters(other))
 
 
-def test_resumed_run_equals_an_uninterrupted_one_bit_for_bit(make_trainer, tmp_path):
-    whole = make_trainer(total_frames=400)
-    run(whole)
-    half = make_trainer(total_frames=150, callbacks=[CheckpointCallback(tmp_path)])
-    run(half)
-    torch.rand(17)  # changes the global random state
-    resumed = make_trainer(seed=5, total_frames=400)
-    resumed.load_state_dict(load_checkpoint(tmp_path / "last.pt"))
-    assert resumed.progress.updates == half.progress.updates
-    run(resumed)
-    assert torch.equal(parameters(resumed), parameters(whole))
-    assert resumed.progress.frames == whole.progress.frames
-    assert resumed.progress.running_reward == whole.progress.running_reward
-    lr = [t.learner.optimizer.param_groups[0]["lr"] for t in (resumed, whole)]
-    assert lr[0] == lr[1]
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_signal_saves_and_stops_after_the_update(make_trainer, tmp_path, number):
-    before = signal.getsignal(number)
-    kill = At(3, lambda _: signal.raise_signal(number))
-    trainer = make_trainer(callbacks=[kill, CheckpointCallback(tmp_path)])
-    assert run(trainer) == number.name
-    assert trainer.progress.updates == 3
-    assert load_checkpoint(tmp_path / "last.pt")["progress"]["updates"] == 3
-    assert signal.getsignal(number) == before
-
-
-def test_signal_during_confirmation_stops_after_it(make_trainer):
-    """It stops even if the confirmation succeeds, so the signal is reported."""
-    calls = []
-
-    def confirm(update):
-        calls.append(update)
-        signal.raise_signal(signal.SIGTERM)
-        return True
-
-    trainer = make_trainer(target=-1e6, confirm=confirm)
-    assert run(trainer) == "SIGTERM"
-    assert calls == [0]
-
-
 class Terminated(BaseException):
     """Raised by the handler of SIGTERM that the caller of a training had set."""
 
@@ -114,7 +68,7 @@ def test_sigterm_of_a_cluster_and_of_its_sweep_lets_the_update_finish(make_train
 def test_a_later_sigterm_aborts_at_once(make_trainer, sigterm_raises, monkeypatch):
     def twice(_):
         signal.raise_signal(signal.SIGTERM)
-        monkeypatch.setattr(trainer_module, "_REPEAT_S", -1.0)
+        monkeypatch.setattr(signals, "_REPEAT_S", -1.0)
         signal.raise_signal(signal.SIGTERM)
 
     with pytest.raises(Terminated):
@@ -207,95 +161,3 @@ def test_rewards_that_overflow_end_the_training(make_trainer, reward):
     with pytest.raises(InputError, match="the reward of an episode is NaN or infinite"):
         run(trainer)
     assert trainer.progress.updates == 0
-
-
-def test_running_mean_matches_hand_computed_value():
-    assert running_mean(0.0, torch.tensor([1.0, 2.0]), 0.9) == pytest.approx(0.29)
-
-
-def test_episode_rewards_and_batch_metrics_match_hand_computed_values():
-    batch = TensorDict(
-        {
-            "next": {
-                "reward": torch.tensor([0.0, 1.0, 1.0])[:, None],
-                "done": torch.tensor([0, 1, 1]).bool()[:, None],
-                "info": {"end_reason": torch.tensor([0, 2, 1])[:, None]},
-            }
-        },
-        [3],
-    )
-    assert episode_rewards(batch).tolist() == [1.0, 1.0]
-    assert batch_metrics(batch, CubesEnd) == {
-        "train/reward": 1.0,
-        "train/length": 1.5,
-        "end/all_cubes": 0.5,
-        "end/front_boundary": 0.5,
-        "end/side_boundary": 0.0,
-        "end/step_limit": 0.0,
-        "end/lost_control": 0.0,
-    }
-
-
-def make_batch(episodes):
-    reward = torch.tensor([float(r) for episode in episodes for r in episode])[:, None]
-    done = torch.zeros(len(reward), 1, dtype=torch.bool)
-    done[torch.tensor([len(e) for e in episodes]).cumsum(0) - 1] = True
-    return TensorDict({"next": {"reward": reward, "done": done}}, [len(reward)])
-
-
-class End(enum.IntEnum):
-    FLYING = 0
-    THROUGH = 2
-    LOST = 3
-
-
-def test_end_metrics_are_those_of_the_task():
-    """Three episodes: two end for one reason, one for the other."""
-    batch = make_batch([[0, 1], [1], [0]])
-    batch["next", "info"] = TensorDict({"end_reason": torch.tensor([0, 2, 3, 2])[:, None]}, [4])
-    metrics = batch_metrics(batch, End)
-    shares = {k: v for k, v in metrics.items() if k.startswith("end/")}
-    assert shares == {"end/through": pytest.approx(2 / 3), "end/lost": pytest.approx(1 / 3)}
-    assert not any(name.startswith("end/") for name in batch_metrics(batch))
-
-
-def test_partial_episodes_use_reward_sums():
-    """Two environments, three steps: one episode began earlier, and one continues later."""
-    batch = TensorDict(
-        {
-            "next": {
-                "reward": torch.tensor([[1.0, 0.0, 1.0], [0.0, 1.0, 0.0]])[..., None],
-                "episode_reward": torch.tensor([[3.0, 3.0, 1.0], [0.0, 1.0, 1.0]])[..., None],
-                "done": torch.tensor([[0, 1, 0], [0, 0, 1]]).bool()[..., None],
-                "info": {"end_reason": torch.tensor([[0, 3, 0], [0, 0, 4]])[..., None]},
-            }
-        },
-        [2, 3],
-    )
-    assert episode_rewards(batch).tolist() == [3.0, 1.0]
-    metrics = batch_metrics(batch, CubesEnd)
-    assert (metrics["train/reward"], metrics["train/length"]) == (2.0, 3.0)
-    assert (metrics["end/side_boundary"], metrics["end/all_cubes"]) == (0.5, 0.0)
-    del batch["next", "episode_reward"]
-    with pytest.raises(InputError, match="RewardSum"):
-        episode_rewards(batch)
-
-
-def test_lengths_use_the_step_count():
-    """In a batch of 4 frames, episodes of 7 and 2 steps end."""
-    batch = make_batch([[0.0, 1.0], [0.0, 1.0]])
-    batch["next", "episode_reward"] = torch.tensor([1.0, 2.0, 0.0, 1.0])[:, None]
-    batch["next", "step_count"] = torch.tensor([6, 7, 1, 2])[:, None]
-    assert batch_metrics(batch) == {"train/reward": 1.5, "train/length": 4.5}
-    batch["next", "done"][:] = False
-    assert all(value != value for value in batch_metrics(batch).values())  # NaN
-
-
-def test_end_reason_is_read_at_the_last_frame():
-    batch = make_batch([[0, 1], [1, 1, 0], [0]])
-    reasons = torch.tensor([4, 1, 4, 4, 2, 3])[:, None]
-    batch["next", "info"] = TensorDict({"end_reason": reasons}, [6])
-    metrics = batch_metrics(batch, CubesEnd)
-    assert [metrics[f"end/{end.name.lower()}"] for end in CubesEnd if end] == pytest.approx(
-        [1 / 3] * 3 + [0, 0]
-    )

@@ -73,12 +73,12 @@ def test_card_quotes_and_copies_a_certificate(tmp_path):
     export(policy, target, FEW, certificate=made, find_claim=find_claim)
     card = (tmp_path / "mine.md").read_text()
     assert "it collects every cube from every placement" in card
-    assert "1,000 rollouts from fresh placements" in card
+    assert "not refuted by 3,000 episodes from fresh placements" in card
     assert "All figures except those of the certificate are from 4 episodes" in card
     beside = tmp_path / "mine.certificate.json"
     assert beside.read_bytes() == made.read_bytes()
     again = drone_rl.load_policy(target)
-    assert find_claim(again, flights=20).flights == 20
+    assert find_claim(again, flights=20).checked == 20
 
 
 @pytest.mark.parametrize(("name", "is_good"), [("good", True), ("right_and_forward", False)])

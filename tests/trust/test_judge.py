@@ -57,17 +57,17 @@ def test_verdict_with_a_certificate(good, tmp_path):
     path = tmp_path / "certificate.json"
     path.write_text(json.dumps(of_every_place(good.in_task(num_cubes=1))))
     how = {"certificate": path, "episodes": 8, "sampled": False, "progress": silent}
-    done = drone_rl.judge(good, task={"num_cubes": 1}, certificate_flights=400, **how)
-    assert done.verdict.is_proved
-    assert "it collects every cube from every placement." in str(done)
-    assert "400 rollouts from fresh placements" in str(done)
-    assert (done.certificate, done.proof.agreeing) == (str(path), 8)
-    again = drone_rl.judge(good, task={"num_cubes": 1}, certificate_flights=50, **how)
-    seeds = [one.proof.seed for one in (done, again)]
-    assert seeds[0] != seeds[1]
-    unchecked = drone_rl.judge(good, task={"num_cubes": 1}, certificate_flights=0, **how)
-    assert not unchecked.verdict.is_proved
-    assert "not re-checked, so it proves nothing here" in str(unchecked)
+    one = {**how, "task": {"num_cubes": 1}, "certificate_flights": 50}
+    read = drone_rl.judge(good, **one)
+    assert "it collects every cube from every placement." in str(read)
+    assert "is not refuted by 50 episodes from fresh placements" in str(read)
+    assert (read.certificate, read.is_proved, read.status("proved")) == (str(path), False, 16)
+    proved = drone_rl.judge(good, require="proved", **one)
+    assert "The certificate is proved: computed here" in str(proved)
+    assert (proved.is_proved, proved.status("proved")) == (True, 0)
+    assert read.proof.seed != proved.proof.seed
+    with pytest.raises(InputError, match="require='prooved'"):
+        drone_rl.judge(good, require="prooved", **one)
     with pytest.raises(InputError, match="another task: num_cubes=1, not 3"):
         drone_rl.judge(good, **how)
     with pytest.raises(InputError, match="policy=oracle has no network; give certificate= with"):

@@ -1,4 +1,4 @@
-"""Repeated episodes of policies that act by their images, and of some that act by something else."""
+"""Repeated episodes of policies that act by their images, or by something else."""
 
 import pytest
 import torch

@@ -1,8 +1,6 @@
 """Colors that readers with a color vision deficiency can tell apart, and text that is legible."""
 
 import itertools
-import re
-from importlib import resources
 
 import numpy as np
 import pytest
@@ -68,13 +66,3 @@ def test_text_on_areas_of_a_verdict_is_legible():
         assert contrast(palette.FAINT, palette.light(color, 0.2)) > 4.5
     assert palette.light((0, 100, 255), 0.5) == (128, 178, 255)
     assert palette.css((0, 158, 115)) == "#009e73"
-
-
-def test_text_of_pages_is_legible_by_day_and_by_night():
-    style = resources.files("drone_rl.explanations.report") / "templates" / "style.css"
-    day, night = style.read_text().split("@media")[:2]
-    for text in (day, night):
-        colors = {name: rgb(c) for name, c in re.findall(r"--(\w+): (#[0-9a-f]{6})", text)}
-        for name in ("ink", "soft", "link", "good", "bad", "warn"):
-            for paper in ("back", "card"):
-                assert contrast(colors[name], colors.get(paper, (255, 255, 255))) > 4.5, name

@@ -4,6 +4,7 @@ import pytest
 import torch
 
 import drone_rl
+from drone_rl.config import AppearanceSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.verification.chances import Chances, _row
@@ -79,6 +80,17 @@ def test_row_of_small_probabilities():
 def test_unusable_arguments_are_refused(good, cubes, change):
     with pytest.raises(InputError, match=r"cubes=|placements=0|num_cubes=20|count is unknown"):
         drone_rl.chances(good, cubes, progress=silent, **change)
+
+
+def test_unsupported_policies_are_refused(good):
+    """Of an appearance with ranges only the middle would be rendered."""
+    foggy = good.in_appearance(AppearanceSettings(fog_visibility=(5.0, 1000.0)))
+    for policy, message in (
+        (foggy, "exact probabilities support only appearances without ranges"),
+        (good.in_dynamics(mode="simple_flight"), "support only dynamics=computer_vision"),
+    ):
+        with pytest.raises(InputError, match=message):
+            drone_rl.chances(policy, [6.0], task=ONE, progress=silent)
 
 
 def test_tables_and_bounds(good):

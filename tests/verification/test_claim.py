@@ -1,118 +1,16 @@
-"""What a verdict quotes of a certificate, held against the verdict's own flights, by hand."""
+"""Certificates of policies: what episodes refute, and what only counts once it is proved here."""
 
 import json
 import shutil
-from pathlib import Path
 
 import pytest
-import torch
 
 import drone_rl
-from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.policies.zoo import certificate_path
-from drone_rl.sim.tasks import CollectCubes
-from drone_rl.sim.tasks.collect_cubes import CubeGoals, CubesEnd
-from drone_rl.trust.results import Proof
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import RootSeed
-from drone_rl.verification.checker.certificate import Certificate
-from drone_rl.verification.claim import Claim, find_claim
+from drone_rl.verification.claim import find_claim
 from tests.verification.checker.making import of_every_place, of_one_cube
-
-PATH = Path("certificate.json")
-
-
-def flown(places, ends):
-    """Episodes of two cubes at these places, which collected all if they ended so."""
-    y = torch.tensor(places, dtype=torch.float64)
-    world = torch.stack([torch.tensor([15.0, 24.0]).expand_as(y), y, torch.full_like(y, 2.5)], -1)
-    end = torch.tensor(ends)
-    won = (end == CubesEnd.ALL_CUBES)[:, None].expand_as(y)
-    goals = CubeGoals(
-        reached=won,
-        stratum=torch.zeros_like(won, dtype=torch.long),
-        world=world.flatten(1),
-        lateral=y,
-        height=torch.zeros_like(y),
-    )
-    return CompleteEpisodes(CollectCubes(), goals, end, torch.full((len(y),), 30))
-
-
-@pytest.fixture(scope="module")
-def good():
-    return drone_rl.load_policy("good").in_task(num_cubes=2)
-
-
-def claim(policy, **how):
-    return Claim(PATH, Certificate.read(of_every_place(policy, **how)))
-
-
-ALL, BEHIND = CubesEnd.ALL_CUBES.value, CubesEnd.FRONT_BOUNDARY.value
-
-
-def test_certificate_of_every_placement(good):
-    found = claim(good).quote(flown([[0.0, 1.0], [-6.0, 5.0], [2.0, 2.0]], [ALL] * 3))
-    assert found == Proof(every=True, share=1.0, agreeing=3)
-
-
-def test_undecided_placements(good):
-    some = claim(good, undecided=True).quote(flown([[0.0, 1.0], [4.0, 5.0]], [ALL, BEHIND]))
-    assert (some.every, some.share, some.undecided) == (False, 0.75, 0.25)
-    assert some.agreeing == 1
-
-
-def test_placements_at_a_border_do_not_count(good):
-    """The cube stands at 3.0000001 m, where nothing is stated; the episode records 3 m."""
-    place = float(torch.tensor(3.0000001, dtype=torch.float32))
-    assert place == 3.0
-    found = claim(good, undecided=True).quote(flown([[place, 0.0], [2.0, 0.0]], [BEHIND, ALL]))
-    assert (found.refused, found.agreeing) == (None, 1)
-
-
-def test_placements_rounded_out_of_bounds(good):
-    place = float(torch.tensor(5.3, dtype=torch.float32))
-    assert place > 5.3
-    narrow = good.in_task(lateral_bound=5.3)
-    found = claim(narrow).quote(flown([[place, 0.0]], [ALL]))
-    assert (found.refused, found.agreeing) == (None, 1)
-
-
-def test_lost_placements(good):
-    found = claim(good, end="front_boundary").quote(flown([[0.0, 1.0]], [BEHIND]))
-    assert (found.every, found.share, found.lost) == (False, 0, 1.0)
-
-
-def test_one_other_end_refuses_the_certificate(good):
-    places = [[0.0, 1.0], [1.0, 5.0], [2.0, 2.0]]
-    found = claim(good).quote(flown(places, [ALL, BEHIND, ALL]))
-    why = "1 of 3 greedy flights of this verdict ended otherwise than it states"
-    assert found == Proof(refused=why)
-    side = CubesEnd.SIDE_BOUNDARY.value
-    lost = claim(good, end="front_boundary").quote(flown(places[:1], [side]))
-    assert lost.refused is not None
-
-
-def test_other_cubes_are_another_end(good):
-    episodes = flown([[0.0, 1.0]], [BEHIND])
-    episodes.goals.reached = torch.tensor([[True, False]])
-    assert claim(good, end="front_boundary").quote(episodes).refused is not None
-
-
-def test_rechecking_rollouts_are_reported(good):
-    checked = Claim(
-        PATH, claim(good).certificate, flights=7, uniform=5, seed=3, seed_is_fixed=False
-    )
-    told = checked.quote(flown([[0.0, 1.0]], [ALL]))
-    assert (told.checked, told.seed, told.seed_is_fixed) == (7, 3, False)
-    assert told.wrong_at_most == pytest.approx(0.4507, abs=1e-4)  # 0.5493 ** 5 is 0.05
-
-
-def test_bound_of_rechecking():
-    """Of certificates that are wrong about the bound 5% pass: 1 - (1 - 0.00299) ** 1000 is 95%."""
-    checked = Claim(PATH, None, flights=1200, uniform=1000)
-    assert checked.wrong_at_most == pytest.approx(0.00299, abs=1e-5)
-    assert (1 - checked.wrong_at_most) ** 1000 == pytest.approx(0.05)
-    assert Claim(PATH, None).wrong_at_most is None
 
 
 @pytest.fixture(scope="module")
@@ -135,13 +33,14 @@ def test_policy_without_a_certificate(poor):
 def test_certificate_next_to_a_policy(poor, truth, tmp_path):
     path = tmp_path / "mine.certificate.json"
     path.write_text(json.dumps(truth))
-    claim = find_claim(poor)
-    assert claim.path == path
-    assert (claim.certificate.outcomes[0].share, claim.refused) == (1.0, None)
-    assert claim.flights == 1000 and claim.uniform >= 900 and not claim.seed_is_fixed
-    assert claim.wrong_at_most < 0.0034
+    claim = find_claim(poor, flights=1000)
+    assert (claim.path, claim.refused, claim.computed) == (str(path), None, False)
+    assert (claim.every, claim.share, claim.lost) == (False, 0.0, 1.0)
+    assert claim.checked == 1000 and not claim.seed_is_fixed
+    # at most 20 episodes are at the box's 4 x 4 places, 62 at limits: 1 - 0.05 ** (1 / 918) = 0.33%
+    assert 0.00299 < claim.wrong_at_most < 0.0034
     unchecked = find_claim(poor, flights=0)
-    assert (unchecked.flights, unchecked.wrong_at_most) == (0, None)
+    assert (unchecked.checked, unchecked.wrong_at_most) == (0, None)
 
 
 def test_certificate_in_the_folder_of_a_run(tmp_path):
@@ -151,8 +50,7 @@ def test_certificate_in_the_folder_of_a_run(tmp_path):
 def test_invalid_certificate_next_to_a_policy_is_refused(poor, truth, tmp_path):
     path = tmp_path / "mine.certificate.json"
     path.write_text(json.dumps(truth))
-    other = find_claim(poor.in_task(num_cubes=2))
-    assert other.certificate is None and "another task: num_cubes=1, not 2" in other.refused
+    assert "another task: num_cubes=1, not 2" in find_claim(poor.in_task(num_cubes=2)).refused
     path.write_text("{")
     assert "is damaged" in find_claim(poor).refused
 
@@ -160,8 +58,8 @@ def test_invalid_certificate_next_to_a_policy_is_refused(poor, truth, tmp_path):
 def test_given_certificate_must_be_valid(poor, truth, tmp_path):
     path = tmp_path / "certificate.json"
     path.write_text(json.dumps(truth))
-    assert find_claim(poor, path, flights=20).path == path
-    assert find_claim(poor, tmp_path, flights=20).path == path
+    assert find_claim(poor, path, flights=20).path == str(path)
+    assert find_claim(poor, tmp_path, flights=20).path == str(path)
     with pytest.raises(InputError, match="another task"):
         find_claim(poor.in_task(num_cubes=2), path)
     with pytest.raises(InputError, match="network with hash"):
@@ -170,21 +68,37 @@ def test_given_certificate_must_be_valid(poor, truth, tmp_path):
         find_claim(poor, tmp_path / "none.json")
 
 
-def test_rollouts_contradict_a_consistent_lie(poor, truth, tmp_path):
+def test_episodes_contradict_a_consistent_lie(poor, truth, tmp_path):
     path = tmp_path / "certificate.json"
     path.write_text(json.dumps(truth))
-    assert find_claim(poor, path, flights=20).flights == 20
     fixed = find_claim(poor, path, flights=20, seed=RootSeed(5, True))
-    assert (fixed.seed, fixed.seed_is_fixed) == (5, True)
+    assert (fixed.checked, fixed.seed, fixed.seed_is_fixed) == (20, 5, True)
     path.write_text(json.dumps(of_every_place(poor)))
-    assert find_claim(poor, path, flights=0).certificate is not None  # only rollouts can tell
+    assert find_claim(poor, path, flights=0).every  # only episodes can tell
     with pytest.raises(InputError, match=r"does not hold: from y=.* ended otherwise") as error:
         find_claim(poor, path, flights=20)
     assert "\n" not in str(error.value)
 
 
-def test_certificate_next_to_a_policy_is_rechecked(poor, tmp_path):
+def test_certificate_next_to_a_policy_is_checked(poor, tmp_path):
     """A forged one, with numbers of steps as frequent as they are, next to the policy."""
     path = tmp_path / "mine.certificate.json"
     path.write_text(json.dumps(of_every_place(poor)))
     assert "ended otherwise than stated" in find_claim(poor).refused
+
+
+def test_only_a_proof_computed_here_counts(poor, tmp_path):
+    """The file states success from everywhere, and no episode tests it: the proof refutes it."""
+    path = tmp_path / "mine.certificate.json"
+    path.write_text(json.dumps(of_every_place(poor)))
+    forged = find_claim(poor, flights=0, prove_again=True)
+    assert not forged.computed and "a proof finds 0% of them" in forged.refused
+    with pytest.raises(InputError, match="does not hold: it states success from every placement"):
+        find_claim(poor, path, flights=0, prove_again=True)
+    good = drone_rl.load_policy("good").in_task(num_cubes=1)
+    path.write_text(json.dumps({**of_every_place(good), "computed": True}))
+    with pytest.raises(InputError, match="computed is unknown"):  # no mark in a file counts
+        find_claim(good, path, flights=0)
+    path.write_text(json.dumps(of_every_place(good)))
+    assert not find_claim(good, path, flights=20).computed
+    assert find_claim(good, path, flights=20, prove_again=True).computed

@@ -68,13 +68,6 @@ PARTS: dict[str, type[Part]] = {
 """Groups whose choices are the variants of a part."""
 SEVERAL: dict[str, type[Part]] = {"transforms": Transform, "logger": Logger}
 """Groups whose files name several variants, each by `schema@<name>: <the variant's name>`."""
-
-_TEXTS = re.compile(
-    r"[+~]*(hydra|paths|policy|policies|resume|certificate|explanations|folder|name|shifts|require|"
-    r"demonstrations)(?=[=.@/]|$)"
-)
-"""Settings whose values are names and paths."""
-_EXPONENT = re.compile(r"(?<=[=,\[(\s])(\d+(?:\.\d+)?[eE]\+?\d+)(?=[,\])]|$)")
 _LARGEST_WHOLE = 10**15
 
 
@@ -156,16 +149,6 @@ def _check_module(name: str) -> None:
         )
 
 
-def whole_numbers(override: str) -> str:
-    """Write whole numbers such as 1e5 without an exponent, as whole-number settings need them."""
-
-    def plain_number(number: re.Match[str]) -> str:
-        value = float(number[1])
-        return str(int(value)) if value.is_integer() and value < _LARGEST_WHOLE else number[1]
-
-    return override if _TEXTS.match(override) else _EXPONENT.sub(plain_number, override)
-
-
 def run_command(name: str, command: type[CommandSettings], overrides: Sequence[str]) -> int:
     """Compose the settings of one command and run it; return the exit status.
 
@@ -174,7 +157,7 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
     is_help = bool({"--help", "-h"} & set(overrides))
     topics = [word for word in overrides if is_help and re.fullmatch(r"[A-Za-z_][\w.]*", word)]
     words = [word for word in overrides if word not in topics]
-    words = spare_run(command.prepare([*map(whole_numbers, words)]))
+    words = spare_run(command.prepare(words))
     words = [re.sub(r"^(\+{0,2}plugins)=([\w.]+)$", r"\1=[\2]", word) for word in words]
     words.sort(key=lambda word: word not in OPTIONS)  # Hydra needs options before settings
     import_plugins(words)
@@ -225,9 +208,19 @@ def _explained(name: str, words: Sequence[str]) -> Iterator[None]:
 
 def read_settings(cls: type[S], config: DictConfig) -> S:
     """Resolve composed settings and check them as those of a command."""
-    values: Any = OmegaConf.to_container(config, resolve=True)
+    values: Any = _whole_numbers(OmegaConf.to_container(config, resolve=True))
     values.pop("plugins", None)
     return cls.read(values)
+
+
+def _whole_numbers(value: Any) -> Any:
+    """Return values with numbers such as 1e5, which Hydra reads as floats, as whole ones."""
+    if isinstance(value, dict):
+        return {name: _whole_numbers(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [*map(_whole_numbers, value)]
+    is_whole = isinstance(value, float) and value.is_integer() and abs(value) < _LARGEST_WHOLE
+    return int(value) if is_whole else value
 
 
 def _job(

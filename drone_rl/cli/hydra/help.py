@@ -26,8 +26,6 @@ from drone_rl.utils.settings import (
     unit_of,
 )
 
-_NOT_SHOWN = ("hydra", "paths")
-"""Groups without choices for users."""
 _WIDTH = 100
 _LONGEST_VALUE = 60
 _PLUGINS = "Modules that register parts of your own: networks, transforms and so on."
@@ -40,7 +38,7 @@ def show_help(
     settings: type[Settings],
     topics: Sequence[str] = (),
 ) -> None:
-    """Print the most used settings of a command, or those that `topics` names, and examples.
+    """Print the settings and groups of a command, or what `topics` names, and examples.
 
     `command` is its name with "_", `settings` its class. The topic "all" is all settings.
 
@@ -53,16 +51,16 @@ def show_help(
     del values["hydra"]
     selected = {g: c for g, c in config.hydra.runtime.choices.items() if "@" not in g}
     names = {g: [n for n in choices(g) if n != "basic"] for g in selected}
-    groups = {g: names[g] for g in names if names[g] and g not in _NOT_SHOWN}
-    keys = [*(group for group in groups if group not in values), *flattened(values)]
+    groups = {g: names[g] for g in names if len(names[g]) > 1 and g != "hydra"}
+    keys = [*flattened(values), *(g for g in groups if g not in values), "hydra.run.dir"]
     described = {key: (text, unit) for key, text, unit in _described(settings, values)}
     described |= {g: (f"One of: {', '.join(names)}.", "") for g, names in groups.items()}
     described |= {"hydra.run.dir": (_RUN_FOLDER, ""), "plugins": (_PLUGINS, "")}
     name = command.replace("_", "-")
     print(f"drone-rl {name} [setting=value ...]\n\n{inspect.getdoc(settings)}\n")
     if not topics:
-        print(f"Most used settings, with their values (drone-rl {name} --help all lists all):")
-        keys = TABLE[name]["settings"]
+        print(f"Settings, with their values; drone-rl {name} --help GROUP lists those of a group:")
+        keys = [key for key in keys if "." not in key or key == "hydra.run.dir"]
     else:
         print("Settings, as they would be used now:")
         if "all" not in topics:

@@ -1,6 +1,5 @@
 """Report user errors in one line, whichever library raised them."""
 
-import errno
 import logging
 import os
 import select
@@ -19,19 +18,6 @@ from drone_rl.utils.exit_codes import INTERRUPTED, USER_ERROR
 
 MISTAKES = (InputError, HydraException, OmegaConfBaseException, OSError)
 """Errors of a user; any other is a bug and keeps its traceback."""
-
-_FOLDER = "choose another folder with hydra.run.dir=..."
-_REMEDIES = {
-    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), f"free some space or {_FOLDER}"),
-    **dict.fromkeys(
-        (errno.EACCES, errno.EPERM, errno.EROFS), f"check who may write there, or {_FOLDER}"
-    ),
-    **dict.fromkeys(
-        (errno.EISDIR, errno.ENOTDIR, errno.EEXIST, errno.ELOOP, errno.ENOTEMPTY),
-        f"move it away or {_FOLDER}",
-    ),
-}
-"""What to do about an error of the file system, by its number."""
 
 
 def guarded(command: Callable[[], int]) -> int:
@@ -98,9 +84,11 @@ def file_error(error: OSError) -> str:
             runtime = HydraConfig.get().runtime
             is_known = not OmegaConf.is_missing(runtime, "output_dir")
             where += f" in {runtime.output_dir}" if is_known else ""
-    remedy = _REMEDIES.get(error.errno or 0, f"check the path or {_FOLDER}")
     where = os.fsdecode(where) if isinstance(where, bytes) else where
-    text = f"{where} can't be opened or written ({reason}); {remedy}"
+    text = (
+        f"{where} can't be opened or written ({reason}); check the path, free some space, or "
+        "choose another folder with hydra.run.dir=..."
+    )
     return "".join(c if c.isprintable() else "?" for c in text)
 
 

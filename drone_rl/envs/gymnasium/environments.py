@@ -1,7 +1,7 @@
 """The Gymnasium environments: `DroneWorld`, and `DroneWorlds` stepped and rendered as a batch."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Unpack
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -11,7 +11,6 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from drone_rl.config.options import GymnasiumOptions
 from drone_rl.envs.gymnasium.world_batch import METADATA, Chosen, WorldBatch, read_action
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Whole
@@ -35,7 +34,7 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         task: Chosen = None,
         *,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        **options: Unpack[GymnasiumOptions],
+        **options: Any,
     ) -> None:
         """Create the environments.
 
@@ -221,7 +220,7 @@ class DroneWorld(gymnasium.Env[NDArray[Any], Any]):
 
     metadata = METADATA
 
-    def __init__(self, task: Chosen = None, **options: Unpack[GymnasiumOptions]) -> None:
+    def __init__(self, task: Chosen = None, **options: Any) -> None:
         """Create the environment.
 
         `options` are `drone_rl.config.commands.GymnasiumSettings` and settings of the task.

@@ -1,24 +1,22 @@
 """Servers from settings, in a thread of this process."""
 
-import asyncio
-import contextlib
 import logging
-import threading
+from collections.abc import Callable
 from pathlib import Path
-from typing import Self, Unpack
+from typing import Any
 
 from drone_rl.config.commands import ServeSettings
 from drone_rl.config.configuration import from_arguments
-from drone_rl.config.options import ServeOptions
 from drone_rl.flight.airsim.server import AirsimServer
 from drone_rl.flight.airsim.settings_file import AirsimSettings, parse_settings, read_settings
 from drone_rl.flight.airsim.simulation import Simulation
+from drone_rl.flight.server_thread import ServerThread
 from drone_rl.utils.files import as_path
 
 _log = logging.getLogger(__name__)
 
 
-class RunningServer:
+class RunningServer(ServerThread):
     """A server in a thread of this process; a context manager that stops it."""
 
     def __init__(self, simulation: Simulation, address: str, port: int, patience_s: float) -> None:
@@ -27,67 +25,31 @@ class RunningServer:
         """The simulation, which only the server's thread may touch while it runs."""
         self.address = ("", 0)
         """Address and port at which it listens."""
-        self.loop: asyncio.AbstractEventLoop
-        """The event loop of its thread."""
-        self._task: asyncio.Task[None] | None = None
-        self._error: Exception | None = None
-        self._ready, self._ended = threading.Event(), threading.Event()
-        # Ctrl-C during `Thread.join` would mark the thread as ended, hence the events
-        self._thread = threading.Thread(
-            target=self._main, args=(address, port, patience_s), daemon=True
-        )
-        self._thread.start()
-        self._ready.wait()
-        if self._error is not None:
-            self._thread.join()
+
+        async def serve(ready: Callable[[], None]) -> None:
+            server = AirsimServer(simulation, patience_s)
+            await server.start(address, port)
+            self.address = server.address
+            ready()
+            await server.serve()
+
+        try:
+            super().__init__(serve)
+        except BaseException:
             simulation.close()
-            raise self._error
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self.close()
-
-    def wait(self) -> None:
-        """Wait until the server ends; raise the error that ended it, if one did."""
-        self._ended.wait()
-        if self._error is not None:
-            raise self._error
+            raise
 
     def close(self) -> None:
         """Stop it; calls that wait are answered with an error."""
-        if self._task is not None and not self._ended.is_set():
-            self.loop.call_soon_threadsafe(self._task.cancel)
-            self._ended.wait()
+        super().close()
         self.simulation.close()
-
-    def _main(self, address: str, port: int, patience_s: float) -> None:
-        try:
-            with contextlib.suppress(asyncio.CancelledError):
-                asyncio.run(self._serve(address, port, patience_s))
-        except Exception as error:  # raised again in the thread that started this one
-            self._error = error
-            if self._ready.is_set():
-                _log.error("the server failed: %s", error)
-        finally:
-            self._ended.set()
-            self._ready.set()
-
-    async def _serve(self, address: str, port: int, patience_s: float) -> None:
-        self.loop, self._task = asyncio.get_running_loop(), asyncio.current_task()
-        server = AirsimServer(self.simulation, patience_s)
-        await server.start(address, port)
-        self.address = server.address
-        self._ready.set()
-        await server.serve()
 
 
 def serve(
     settings: str | Path | AirsimSettings | None = None,
     *,
     recordings: str | Path | None = None,
-    **changes: Unpack[ServeOptions],
+    **changes: Any,
 ) -> RunningServer:
     """Start a server for AirSim's clients in a thread of this process.
 

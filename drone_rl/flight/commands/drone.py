@@ -7,14 +7,13 @@ import copy
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import Self, Unpack
+from typing import Any, Self
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.config.options import VehicleOptions
 from drone_rl.config.sensors import SensorSettings
 from drone_rl.flight.commands import checks
 from drone_rl.flight.commands.command import (
@@ -101,7 +100,7 @@ class Drone:
         obstacles: Obstacles | None = None,
         worlds: Worlds | None = None,
         sensors: SensorSettings | None = None,
-        **changes: Unpack[VehicleOptions],
+        **changes: Any,
     ) -> None:
         """Put a disarmed drone on the ground.
 

@@ -7,8 +7,9 @@ import struct
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import pydantic
 import torch
 from PIL import Image
 from torch import Tensor
@@ -25,22 +26,32 @@ from drone_rl.sim.dynamics import BodyState
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.trust.plots.images import heated, shown_picture
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Flag, OneOf, Real, Record, Several, as_mapping
+from drone_rl.utils.models import Model
+from drone_rl.utils.schema import OneOf, Real, Several, as_mapping
 
 LIMITS = {"speed": (0.5, 10.0), "wind": (0.0, 12.0), "wind_from": (0.0, 360.0), "light": (0.2, 2.0)}
 """Lowest and highest values of the sliders: m/s, m/s, degrees, factor."""
-_MESSAGES: Mapping[str, Record] = {
-    "hold": Record({"controls": Several(OneOf(CONTROLS), 0, len(CONTROLS))}),
-    "sticks": Record({"values": Several(Real(-1.0, 1.0), 4, 4)}),
-    "pilot": Record({"pilot": OneOf(("person", "policy"))}),
-    "mode": Record({"mode": OneOf(FLY_MODES)}),
-    "camera": Record({"camera": OneOf(CAMERAS)}),
-    "set": Record({"name": OneOf(tuple(LIMITS)), "value": Real(-1e6, 1e6)}),
-    "record": Record({"on": Flag()}),
-    "saliency": Record({"on": Flag()}),
-    "reset": Record({}),
-    "take_off": Record({}),
-    "land": Record({}),
+Camera = Annotated[str, OneOf(CAMERAS)]
+
+
+def message(**fields: Any) -> type[Model]:
+    """Return the kind of a browser's messages with these fields, each of a type."""
+    kinds: dict[str, Any] = {name: (kind, ...) for name, kind in fields.items()}
+    return pydantic.create_model("Message", __base__=Model, **kinds)
+
+
+_MESSAGES = {
+    "hold": message(controls=tuple[Annotated[str, OneOf(CONTROLS)], ...]),
+    "sticks": message(values=Annotated[Axes, Several(Real(-1.0, 1.0), 4, 4)]),
+    "pilot": message(pilot=Annotated[str, OneOf(("person", "policy"))]),
+    "mode": message(mode=Annotated[str, OneOf(FLY_MODES)]),
+    "camera": message(camera=Camera),
+    "set": message(name=Annotated[str, OneOf(tuple(LIMITS))], value=float),
+    "record": message(on=bool),
+    "saliency": message(on=bool),
+    "reset": message(),
+    "take_off": message(),
+    "land": message(),
 }
 """Fields of each type of message, which are the arguments of a method of `Flight`."""
 _PAUSE = 2.0
@@ -108,7 +119,7 @@ class Flight:
         """Do what a browser's message says; an `InputError` if it is wrong or impossible."""
         values = dict(as_mapping(message, "message"))
         kind = OneOf(tuple(_MESSAGES)).read(values.pop("type", None), "type")
-        getattr(self, f"_{kind}")(**_MESSAGES[kind].read(values, kind))
+        getattr(self, f"_{kind}")(**dict(_MESSAGES[kind].read(values, kind)))
 
     def _hold(self, controls: Sequence[str]) -> None:
         self.controls.hold(controls)

@@ -11,14 +11,10 @@ const CONTROLS = { // name: [label, keys]
 };
 const GROUPS = [["yaw_left", "forward", "yaw_right", "left", "backward", "right"],
   ["up", "pitch_up", "roll_left", "down", "pitch_down", "roll_right"], ["t", "g"]];
-const COMMANDS = { // key: [label, function]; those of simple flight are buttons, too
-  p: ["hand over, or take back", () => handOver()],
-  n: ["new episode", () => send({ type: "reset" })],
-  c: ["next camera", () => nextCamera()],
-  v: ["record on or off", () => toggleRecord()],
-  m: ["your next controls", () => nextMode()],
-  t: ["take off", () => send({ type: "take_off" })],
-  g: ["land", () => send({ type: "land" })],
+const BUTTONS = { t: "take off", g: "land" };
+const COMMANDS = { // key: function
+  p: () => handOver(), n: () => send({ type: "reset" }), c: () => nextCamera(), v: () => toggleRecord(),
+  m: () => nextMode(), t: () => send({ type: "take_off" }), g: () => send({ type: "land" }),
 };
 const SHOWN_KEYS = { ArrowUp: "↑", ArrowDown: "↓", ArrowLeft: "←", ArrowRight: "→", PageUp: "PgUp", PageDown: "PgDn" };
 const SLIDERS = {
@@ -144,7 +140,7 @@ function nextMode() { send({ type: "mode", mode: following(["actions", "computer
 
 function usable(control) {
   if (!state || state.pilot === "policy") return false;
-  if (state.mode === "computer_vision") return !COMMANDS[control];
+  if (state.mode === "computer_vision") return !BUTTONS[control];
   if (state.mode === "simple_flight") return !/pitch|roll/.test(control);
   return hello.discrete ? hello.actions.includes(control) : /forward|left|right/.test(control) && !/roll/.test(control);
 }
@@ -161,7 +157,7 @@ $("deck").addEventListener("keydown", event => {
     if (!event.repeat) hold(`key ${key}`, byKey[key]);
   } else if (COMMANDS[key] && !event.repeat) {
     event.preventDefault();
-    COMMANDS[key][1]();
+    COMMANDS[key]();
   }
 });
 document.addEventListener("keyup", event => letGo(`key ${keyOf(event)}`));
@@ -200,7 +196,6 @@ function begin() {
   document.body.classList.toggle("watching", Boolean(hello.watch));
   if (hello.watch) return;
   build();
-  document.querySelector("details").open = matchMedia("(min-width: 34rem)").matches;
   $("deck").focus({ preventScroll: true });
   hint();
 }
@@ -210,14 +205,12 @@ function keyCaps(keys) { return joined(keys, key => `<kbd>${SHOWN_KEYS[key] || k
 
 function build() {
   $("pad").innerHTML = joined(GROUPS, group => `<div class="group">${joined(group, name => {
-    const [label, keys] = CONTROLS[name] || [COMMANDS[name][0], [name]];
+    const [label, keys] = CONTROLS[name] || [BUTTONS[name], [name]];
     return `<button type="button" data-control="${name}">${label}<br>${keyCaps(keys)}</button>`;
   })}</div>`);
   $("sliders").innerHTML = joined(Object.entries(SLIDERS), ([name, [label, , step]]) => `<div class="slider">
     <label for="s-${name}">${label}</label><input type="range" id="s-${name}" name="${name}" step="${step}"
-    min="${hello.limits[name][0]}" max="${hello.limits[name][1]}"><output></output><small></small></div>`);
-  const rows = Object.entries(COMMANDS).map(([key, [label]]) => [label, [key]]);
-  $("keys").innerHTML = joined([...Object.values(CONTROLS), ...rows], ([label, keys]) => `<dt>${keyCaps(keys)}</dt><dd>${label}</dd>`);
+    min="${hello.limits[name][0]}" max="${hello.limits[name][1]}"><output></output></div>`);
   $("bars").innerHTML = joined(hello.order, () => '<div class="share"><span></span><span class="track"><i></i></span><span></span></div>');
 }
 
@@ -239,7 +232,7 @@ onPad("keydown", (source, name, event) => {
   event.preventDefault();
   hold(source, name);
 });
-onPad("click", (source, name) => { if (COMMANDS[name]) COMMANDS[name][1](); });
+onPad("click", (source, name) => { if (BUTTONS[name]) COMMANDS[name](); });
 $("sliders").addEventListener("input", ({ target }) => {
   send({ type: "set", name: target.name, value: Number(target.value) });
   slider(target.name, Number(target.value));
@@ -257,21 +250,10 @@ function pad() {
 }
 
 function slider(name, given) {
-  const input = $(`s-${name}`), row = input.parentElement, [, unit] = SLIDERS[name];
+  const input = $(`s-${name}`), [, unit] = SLIDERS[name];
   const value = given === undefined ? state.settings[name] : given;
   if (given === undefined && document.activeElement !== input) input.value = value;
-  const shown = name === "wind_from" ? `${Math.round(value)}° ${compass(value)}` :
-    name === "light" ? `${Math.round(100 * value)}%` : `${value.toFixed(1)} ${unit}`;
-  set(row.querySelector("output"), shown);
-  const isFlying = hello.dynamics || state.mode === "simple_flight" && state.pilot === "person";
-  const why = name === "wind" && !isFlying ? "moves only drones with dynamics: simple flight" :
-    name === "speed" && hello.dynamics && (state.pilot === "policy" || state.mode === "actions") ?
-      "the policy's actions have speeds of their own" : "";
-  set(row.querySelector("small"), why);
-}
-
-function compass(degrees) {
-  return ["ahead", "ahead right", "right", "behind right", "behind", "behind left", "left", "ahead left"][Math.round(degrees / 45) % 8];
+  set(input.nextElementSibling, `${value.toFixed(1)} ${unit}`);
 }
 
 function drawBars() {
@@ -290,7 +272,7 @@ function drawBars() {
 // Drawing
 
 function drawMap() {
-  const { clientWidth: width, clientHeight: height } = $("map"), { objects, settings } = state;
+  const { clientWidth: width, clientHeight: height } = $("map"), { objects } = state;
   const [ahead, aside] = state.position, shown = [[0, 0], [ahead, aside], ...places.filter(Boolean)];
   const low = Math.min(...shown.map(p => p[0])) - 3, high = Math.max(...shown.map(p => p[0])) + 3;
   const side = Math.max(8, ...shown.map(p => Math.abs(p[1]))) + 3;
@@ -300,10 +282,6 @@ function drawMap() {
   const edge = Math.max(6, hello.size * scale), parts = [];
   for (let x = Math.ceil(low / step) * step; x <= high; x += step) {
     parts.push(`<path class="line" d="M0 ${v(x)}H${width}"/><text x="4" y="${v(x) - 3}">${x} m</text>`);
-  }
-  if (settings.wind > 0) {
-    parts.push(`<g transform="translate(${width - 26} 26)"><text class="wind" y="24">${settings.wind.toFixed(1)} m/s</text>
-      <path class="wind" d="M0-10V10L-5 4M0 10L5 4" transform="rotate(${settings.wind_from})"/></g>`);
   }
   parts.push(`<polyline points="${trail.map(([x, y]) => `${u(y)},${v(x)}`).join(" ")}"/>`);
   places.forEach(([x, y], i) => parts.push(`<rect class="${objects[i] ? "there" : ""}" x="${u(y) - edge / 2}"
@@ -319,8 +297,6 @@ function drawNumbers() {
   const rows = { roll, pitch, yaw, height: `${state.position[2].toFixed(1)} m`, speed: `${state.velocity.toFixed(1)} m/s` };
   if (hello.watch) rows.time = `${state.time.toFixed(2)} s`; else rows.steps = state.steps;
   $("numbers").innerHTML = joined(Object.entries(rows), ([name, value]) => `<dt>${name}</dt><dd>${value}</dd>`);
-  $("horizon").setAttribute("aria-label", `Artificial horizon: roll ${roll}, pitch ${pitch}`);
-  $("tilt").setAttribute("transform", `rotate(${-state.attitude[0]}) translate(0 ${2.2 * state.attitude[1]})`);
 }
 
 // Gamepad: left stick climbs and turns, right stick flies forward and sideways

@@ -7,9 +7,7 @@ import importlib
 import logging
 import multiprocessing
 import os
-import pickle
 from collections.abc import Sequence
-from multiprocessing.connection import Connection
 from typing import Any
 
 import torch
@@ -22,7 +20,6 @@ from drone_rl.explanations.scenes import empty_scene
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.flight.fly_page.world import Seen, World
 from drone_rl.policies.policy import Policy
-from drone_rl.utils.errors import InputError
 from drone_rl.utils.plugins import IMPORTED
 from drone_rl.utils.seeding import root_seed
 
@@ -51,15 +48,13 @@ def find_trusted(policy: Policy) -> str | None:
     return trust.check_maps(trial, trust.method_maps(context.explainer)).trusted
 
 
-def _work(connection: Connection, policy: Policy, plugins: Sequence[str]) -> None:
+def _work(policy: Policy, plugins: Sequence[str]) -> str | None:
+    """Call `find_trusted` in a process of its own."""
     os.nice(_NICE)
     torch.set_num_threads(1)
     for module in plugins:  # which may register the policy's task
         importlib.import_module(module)
-    try:
-        connection.send((find_trusted(policy), None))
-    except InputError as error:
-        connection.send((None, str(error)))
+    return find_trusted(policy)
 
 
 class LiveSaliency:
@@ -74,45 +69,28 @@ class LiveSaliency:
         """The trusted method."""
         self.problem: str | None = None
         """Why the tests failed."""
-        self._process: Any = None
-        self._connection: Connection | None = None
+        self._pool: Any = None
+        self._result: Any = None
         self._explainer: Explainer | None = None
 
     def start(self) -> None:
         """Begin the tests, unless they have begun."""
-        if self.state != "off":
-            return
-        context = multiprocessing.get_context("spawn")
-        self._connection, theirs = context.Pipe(duplex=False)
-        policy = self._world.policy
-        process = context.Process(target=_work, args=(theirs, policy, [*IMPORTED]), daemon=True)
-        try:
-            process.start()
-        except (pickle.PicklingError, AttributeError, TypeError):  # as of a task object
-            self._fail("its task, or another part, can't be sent to another process")
-        else:
-            self._process, self.state = process, "testing"
-        theirs.close()
-
-    def _fail(self, problem: str) -> None:
-        self.state, self.problem = "failed", problem
-        name = self._world.policy.name
-        _log.warning("the heat maps of policy %s can't be tested: %s", name, problem)
-        self.close()
+        if self.state == "off":
+            self._pool = multiprocessing.get_context("spawn").Pool(1)
+            self._result = self._pool.apply_async(_work, (self._world.policy, [*IMPORTED]))
+            self.state = "testing"
 
     def poll(self) -> None:
         """Take the result of the tests, if they have ended."""
-        if self._connection is None or not self._connection.poll():
+        if self._result is None or not self._result.ready():
             return
         try:
-            method, problem = self._connection.recv()
-        except EOFError:
-            method, problem = None, "the process ended early"
-        self.trust(method)
-        if problem is not None:
-            self._fail(problem)
-        else:
-            self.close()
+            self.trust(self._result.get())
+        except Exception as error:  # any of the process; also of a task that can't be sent there
+            self.state, self.problem = "failed", str(error)
+            name = self._world.policy.name
+            _log.warning("the heat maps of policy %s can't be tested: %s", name, error)
+        self.close()
 
     def trust(self, method: str | None) -> None:
         """Show the maps of a method, None for none."""
@@ -135,10 +113,6 @@ class LiveSaliency:
 
     def close(self) -> None:
         """End the tests."""
-        if self._process is not None:
-            self._process.terminate()
-            self._process.join()
-            self._process = None
-        if self._connection is not None:
-            self._connection.close()
-            self._connection = None
+        if self._pool is not None:
+            self._pool.terminate()
+        self._pool = self._result = None

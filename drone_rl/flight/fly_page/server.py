@@ -5,24 +5,22 @@ own name: other pages in the same browser can't fly the drone.
 """
 
 import asyncio
-import contextlib
 import hmac
 import http
 import json
 import logging
 import queue
 import secrets
-import socket
 import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol, Self, Unpack
+from typing import Any, Protocol
 
 from drone_rl.config.commands import FlySettings
 from drone_rl.config.configuration import from_arguments
-from drone_rl.config.options import FlyOptions
 from drone_rl.flight.fly_page.flight import Flight
+from drone_rl.flight.server_thread import ServerThread
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.utils.errors import InputError, extra
 from drone_rl.utils.files import as_path
@@ -38,7 +36,7 @@ _IN_FLIGHT = 3
 _CLOSED = object()
 """The message that a page was closed."""
 _PATIENCE_S = 30.0
-"""Seconds to wait for the server to start, and for its threads to end."""
+"""Seconds to wait for the simulation to end."""
 _FILES = {"": "text/html", "fly.js": "text/javascript", "fly.css": "text/css"}
 _HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; "
@@ -118,7 +116,7 @@ class Shown(Protocol):
         ...
 
 
-class FlyPage:
+class FlyPage(ServerThread):
     """A page in threads of this process; a context manager that closes it."""
 
     def __init__(
@@ -126,76 +124,59 @@ class FlyPage:
     ) -> None:
         """Start the server and a thread that lets what `make` returns pass; see `fly`."""
         self._websockets = extra("websockets.asyncio.server", "fly", _ASKED_BY)
-        self._period, self._socket = 1.0 / frames_per_second, _listen(port)
-        port = self._socket.getsockname()[1]
-        self._hosts = [f"{name}:{port}" for name in (ADDRESS, "localhost")]
+        self._port, self._period = port, 1.0 / frames_per_second
         self._start = f"/{secrets.token_urlsafe(24)}/"
-        self.url = f"http://{ADDRESS}:{port}{self._start}"
-        """Address of the page, with its token."""
         self._pages: set[_Page] = set()
         self._messages: queue.SimpleQueue[tuple[Any, _Page]] = queue.SimpleQueue()
         self._holder: _Page | None = None
         """The page whose keys or sticks were the last to change."""
-        self._failure: Exception | None = None
-        self._is_stopping, self._is_listening = threading.Event(), threading.Event()
-        try:
-            self._flight = make()
-        except BaseException:
-            self._socket.close()
-            raise
-        self._loop, self._end = asyncio.new_event_loop(), asyncio.Event()
+        self._flight = make()
         self._hello = json.dumps(self._flight.hello())
-        self._threads = [
-            threading.Thread(target=of, daemon=True) for of in (self._serve, self._simulate)
-        ]
-        for thread in self._threads:
-            thread.start()
-        self._is_listening.wait(_PATIENCE_S)
+        self._is_stopping = threading.Event()
+        self._simulation = threading.Thread(target=self._simulate, daemon=True)
+        try:
+            super().__init__(self._serve)
+        except BaseException:
+            self._flight.close()
+            raise
+        self._simulation.start()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self.close()
-
-    def wait(self) -> None:
-        """Wait until the server ends; raise the error that ended the simulation, if one did."""
-        self._is_stopping.wait()  # Ctrl-C during `Thread.join` would mark the thread as ended
-        if self._failure is not None:
-            raise self._failure
+    @property
+    def url(self) -> str:
+        """Address of the page, with its token."""
+        return f"http://{ADDRESS}:{self._port}{self._start}"
 
     def close(self) -> None:
         """Write recorded steps and stop server and simulation."""
         self._is_stopping.set()
-        self._call_soon(self._end.set)
-        for thread in self._threads:
-            thread.join(_PATIENCE_S)
+        self._simulation.join(_PATIENCE_S)
 
     # The server's thread
 
-    def _serve(self) -> None:
-        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
-            try:
-                runner.run(self._listen())
-            finally:
-                self._is_stopping.set()
-                self._is_listening.set()
-
-    async def _listen(self) -> None:
+    async def _serve(self, ready: Callable[[], None]) -> None:
         logger = logging.getLogger("drone_rl.websockets")
         logger.setLevel(logging.CRITICAL)  # browsers open connections that they do not use
-        async with self._websockets.serve(
-            self._talk,
-            sock=self._socket,
-            process_request=self._answer,
-            compression=None,  # images are compressed already
-            max_size=MAX_MESSAGE,
-            close_timeout=1.0,
-            server_header=None,
-            logger=logger,
-        ):
-            self._is_listening.set()
-            await self._end.wait()
+        try:
+            server = await self._websockets.serve(
+                self._talk,
+                ADDRESS,
+                self._port,
+                process_request=self._answer,
+                compression=None,  # images are compressed already
+                max_size=MAX_MESSAGE,
+                close_timeout=1.0,
+                server_header=None,
+                logger=logger,
+            )
+        except OSError as error:
+            raise InputError(
+                f"port={self._port} can't be used ({error.strerror}); give another one, or 0 for a "
+                "free one"
+            ) from error
+        async with server:
+            self._port = server.sockets[0].getsockname()[1]
+            ready()
+            await server.wait_closed()
 
     def _answer(self, connection: Any, request: Any) -> Any:
         """Return a file, or a refusal; None lets the socket open."""
@@ -217,8 +198,9 @@ class FlyPage:
         """Return whether host, origin and token are right."""
         start, origins = self._start.encode(), request.headers.get_all("Origin")
         has_token = hmac.compare_digest(request.path.encode()[: len(start)], start)
-        is_here = request.headers.get_all("Host") in ([host] for host in self._hosts)
-        is_own = origins in ([f"http://{host}"] for host in self._hosts)
+        hosts = [f"{name}:{self._port}" for name in (ADDRESS, "localhost")]
+        is_here = request.headers.get_all("Host") in ([host] for host in hosts)
+        is_own = origins in ([f"http://{host}"] for host in hosts)
         return (
             has_token and is_here and (is_own or (not origins and "Upgrade" not in request.headers))
         )
@@ -258,33 +240,28 @@ class FlyPage:
         for page in self._pages:
             page.offer(frame)
 
-    def _call_soon(self, function: Callable[..., None], *values: Any) -> None:
-        """Call a function in the server's thread; do nothing if that has ended."""
-        with contextlib.suppress(RuntimeError):
-            self._loop.call_soon_threadsafe(function, *values)
-
     # The simulation's thread
 
     def _simulate(self) -> None:
         try:
-            self._run()
+            self._make_frames()
         except Exception as error:  # raised again by `wait`
-            self._failure = error
+            self._error = error
             _log.error("the simulation failed: %s", error)
         finally:
             self._flight.close()
-            self._call_soon(self._end.set)
+            super().close()
 
-    def _run(self) -> None:
+    def _make_frames(self) -> None:
         period, before = self._period, time.monotonic()
         due = before
-        while not self._is_stopping.is_set():
+        while not (self._is_stopping.is_set() or self._ended.is_set()):
             now = time.monotonic()
             self._handle_messages()
             if self._pages:
                 self._flight.advance(now - before)
                 if frame := self._flight.frame():
-                    self._call_soon(self._publish, frame)
+                    self.call_soon(self._publish, frame)
             before, due = now, max(due + period, time.monotonic() - period)
             self._is_stopping.wait(max(0.0, due - time.monotonic()))
 
@@ -300,20 +277,7 @@ class FlyPage:
                 if message["type"] in ("hold", "sticks"):
                     self._holder = page
             except InputError as error:
-                self._call_soon(page.tell, str(error))
-
-
-def _listen(port: int) -> socket.socket:
-    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listener.bind((ADDRESS, port))
-    except OSError as error:
-        listener.close()
-        raise InputError(
-            f"port={port} can't be used ({error.strerror}); give another one, or 0 for a free one"
-        ) from error
-    return listener
+                self.call_soon(page.tell, str(error))
 
 
 def fly(
@@ -321,7 +285,7 @@ def fly(
     settings: FlySettings | None = None,
     *,
     outputs: str | Path = "outputs",
-    **changes: Unpack[FlyOptions],
+    **changes: Any,
 ) -> FlyPage:
     """Start a page to fly from, in threads of this process.
 

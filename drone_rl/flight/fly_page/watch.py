@@ -4,7 +4,7 @@ import asyncio
 import concurrent.futures
 import copy
 import math
-from typing import Any
+from typing import Any, Literal
 
 from PIL import Image
 from torch import Tensor
@@ -13,18 +13,17 @@ from drone_rl.config.commands import CAMERAS
 from drone_rl.flight.airsim.messages import to_world
 from drone_rl.flight.airsim.serving import RunningServer
 from drone_rl.flight.airsim.simulation import Simulation
-from drone_rl.flight.fly_page.flight import JPEG_QUALITY, packed, pose_of
+from drone_rl.flight.fly_page.flight import JPEG_QUALITY, Camera, message, packed, pose_of
 from drone_rl.flight.fly_page.server import FlyPage
 from drone_rl.flight.fly_page.world import HEIGHT, WIDTH
 from drone_rl.flight.image_types import ImageType, encode
 from drone_rl.sim.entities import CHASE
 from drone_rl.trust.video import render_chase
-from drone_rl.utils.schema import OneOf, Record, as_mapping
 
 _FRAMES_PER_SECOND = 20
 _PATIENCE_S = 5.0
 """Seconds to wait for a frame."""
-_MESSAGE = Record({"type": OneOf(("camera",)), "camera": OneOf(CAMERAS)})
+_MESSAGE = message(type=Literal["camera"], camera=Camera)
 
 
 class Watched:
@@ -40,7 +39,7 @@ class Watched:
 
     def handle(self, message: Any) -> None:
         """Do what a browser's message says; an `InputError` if it is not a choice of a camera."""
-        self._camera = _MESSAGE.read(as_mapping(message, "message"), "message")["camera"]
+        self._camera = dict(_MESSAGE.read(message, "message"))["camera"]
 
     def advance(self, seconds: float) -> None:
         """Do nothing: the program that is watched lets time pass."""
@@ -79,17 +78,12 @@ class Watched:
         simulation, stage = self._simulation, self._simulation.stage
         vehicle = simulation.find("")
         places = (to_world(stage.object_pose(name).position) for name in stage.movable)
-        x, y, _ = vehicle.settings.wind
         return {
             "time": round(simulation.time, 3),
             "episode": vehicle.epoch,
             "camera": self._camera,
             **pose_of(vehicle.body),
             "objects": [None if math.isnan(place[0]) else place for place in places],
-            "settings": {
-                "wind": round(math.hypot(x, y), 2),
-                "wind_from": math.degrees(math.atan2(y, 0.0 - x)) % 360.0,
-            },
             "texts": {
                 "flyer": f"A program flies {vehicle.name}",
                 "note": "Time is paused." if simulation.is_paused else "",

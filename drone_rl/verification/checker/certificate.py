@@ -194,8 +194,8 @@ class Certificate(Provenance, extra="forbid"):
         return self._share_of(is_success=False)
 
     @property
-    def is_proved(self) -> bool:
-        """Whether the policy succeeds from every placement."""
+    def is_full_success(self) -> bool:
+        """Whether it states success from every placement."""
         return self._is_everything(is_success=True)
 
     def _share_of(self, *, is_success: bool) -> float:

@@ -31,7 +31,7 @@ from drone_rl.verification.checker.consistency import (
     find_wrong_step_counts,
     missing_steps,
 )
-from drone_rl.verification.checker.sampling import ANYWHERE, BORDER, INSIDE, sample_placements
+from drone_rl.verification.checker.sampling import ANYWHERE, sample_placements
 from drone_rl.verification.requirements import require_cubes
 
 MAX_EXACT = 200  # approximate number of episodes repeated with the network in float64
@@ -46,7 +46,7 @@ class Contradiction(Stored):
     """An episode that ended otherwise than stated."""
 
     where: str
-    """Why it was simulated: "inside" a box, at a "border", or "anywhere"."""
+    """Why it was simulated, see `sampling.Placements.why`."""
     placement: tuple[float, ...]
     """Metres to the left of each cube."""
     stated: str
@@ -70,6 +70,17 @@ class CheckFindings(Stored):
     """Number of such episodes."""
     flights: dict[str, int] = {}
     """Number of episodes, by why they were simulated."""
+
+    @computed_field
+    @property
+    def wrong_at_most(self) -> float:
+        """Upper bound on the fraction of placements with a wrong statement, with 95% confidence.
+
+        A certificate that is wrong about more is refuted by the uniform episodes in at least 95% of
+        cases.
+        """
+        uniform = self.flights.get(ANYWHERE, 0)
+        return 1.0 - 0.05 ** (1.0 / uniform) if uniform else 1.0
 
     @computed_field
     @property
@@ -218,12 +229,12 @@ def check_certificate(
         )
         for i in wrong[:MAX_KEPT]
     ]
-    count = {kind: int((why == kind).sum()) for kind in (INSIDE, BORDER, ANYWHERE)}
+    kinds, counted = np.unique(why, return_counts=True)
     return CheckFindings(
         findings=(*rounded, *counts),
         contradictions=tuple(kept),
         contradicted=len(wrong),
-        flights=count,
+        flights=dict(zip(kinds.tolist(), counted.tolist(), strict=True)),
     )
 
 

@@ -1,4 +1,4 @@
-"""Sample placements inside boxes, on both sides of their borders, and anywhere."""
+"""Sample placements inside boxes, at borders, at the limits of all placements, and anywhere."""
 
 import dataclasses
 from collections.abc import Iterator, Sequence
@@ -104,7 +104,22 @@ def _random(boxes: Boxes, rng: np.random.Generator) -> Points:
     return low + rng.random(low.shape) * (high - low)
 
 
-INSIDE, BORDER, ANYWHERE = "inside", "border", "anywhere"
+def sample_limits(bound: float, num_cubes: int, count: int, rng: np.random.Generator) -> Points:
+    """Return `count` points of [-bound, bound]^num_cubes: its corners, then random edges and faces.
+
+    Points after the corners have at least one coordinate at a limit; the others are random.
+    """
+    whole = np.full((1, num_cubes, 2), (-bound, bound))
+    corners = _corners(whole)[:count]
+    left = count - len(corners)
+    points = _random(np.repeat(whole, left, 0), rng)
+    is_at = rng.random(points.shape) < 0.5
+    is_at[np.arange(left), rng.integers(num_cubes, size=left)] = True
+    ends = np.where(rng.random(points.shape) < 0.5, -1, 1) * (bound - CORNER_INSET)
+    return np.concatenate([corners, np.where(is_at, ends, points)])
+
+
+INSIDE, BORDER, LIMIT, ANYWHERE = "inside", "border", "limit", "anywhere"
 _ROUNDS = 4  # at most this many times 2^cubes + 2 episodes go to each box
 
 
@@ -114,17 +129,22 @@ class Placements:
 
     points: Points  # metres to the left of each cube. Shape: (k, cubes)
     outcome: NDArray[np.int64]  # (k,); index of the stated outcome; their number where none is
-    why: NDArray[np.str_]  # (k,); INSIDE a box, near a BORDER of an outcome, or ANYWHERE
+    why: NDArray[np.str_]
+    """INSIDE a box, near a BORDER of an outcome, at a LIMIT of all placements, or ANYWHERE (k,)."""
 
 
 def sample_placements(certificate: Certificate, count: int, rng: np.random.Generator) -> Placements:
-    """Sample placements: half in the outcomes' boxes, a quarter at borders, the rest anywhere."""
-    groups = certificate.groups
+    """Sample placements: three quarters or more anywhere, for the bound that they give.
+
+    An eighth is in the outcomes' boxes, a sixteenth at borders and another one at limits.
+    """
+    groups, task = certificate.groups, certificate.task
     boxes = np.concatenate(groups)
     group = np.repeat(np.arange(len(groups)), [len(boxes) for boxes in groups])
-    parts = [(p, np.full(len(p), i), INSIDE) for i, p in _inside(groups[:-1], count // 2, rng)]
-    border = sample_borders(groups, certificate.task.lateral_bound, count // 4, rng)
-    parts.append((border, group[find(boxes, border)], BORDER))
+    parts = [(p, np.full(len(p), i), INSIDE) for i, p in _inside(groups[:-1], count // 8, rng)]
+    border = sample_borders(groups, task.lateral_bound, count // 16, rng)
+    limits = sample_limits(task.lateral_bound, task.num_cubes, count // 16, rng)
+    parts += [(p, group[find(boxes, p)], why) for p, why in ((border, BORDER), (limits, LIMIT))]
     points, chosen = sample_anywhere(boxes, count - sum(len(p) for p, *_ in parts), rng)
     parts.append((points, group[chosen], ANYWHERE))
     return Placements(

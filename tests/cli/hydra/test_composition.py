@@ -7,7 +7,7 @@ from omegaconf import OmegaConf
 
 from drone_rl.cli.evaluation import EvaluateCommand
 from drone_rl.cli.hydra import composition
-from drone_rl.cli.hydra.composition import HydraConfig, _job, read_settings, whole_numbers
+from drone_rl.cli.hydra.composition import HydraConfig, _job, read_settings
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.utils.errors import InputError
 
@@ -53,25 +53,6 @@ def test_a_signal_ends_a_whole_sweep(job):
     with pytest.raises(SystemExit) as stop:
         function(OmegaConf.create({}))
     assert stop.value.code == 143
-
-
-@pytest.mark.parametrize(
-    ("override", "number"),
-    [
-        ("trainer.total_frames=1e5", "trainer.total_frames=100000"),
-        ("trainer.total_frames=1.5E+3", "trainer.total_frames=1500"),
-        ("collector.num_envs=1e1,2e1", "collector.num_envs=10,20"),
-        ("network.hidden=[1e2,64]", "network.hidden=[100,64]"),
-        ("certificate_flights=1e3", "certificate_flights=1000"),
-        ("certificate=1e3", "certificate=1e3"),
-        ("optimizer.lr=1e-3", "optimizer.lr=1e-3"),
-        ("optimizer.lr=1e30", "optimizer.lr=1e30"),
-        ("hydra.run.dir=1e5", "hydra.run.dir=1e5"),
-        ("task=x1e5", "task=x1e5"),
-    ],
-)
-def test_whole_numbers_may_have_an_exponent(override, number):
-    assert whole_numbers(override) == number
 
 
 def test_a_command_gets_its_settings_and_status_for_each_run(monkeypatch, tmp_path):

@@ -113,6 +113,15 @@ def test_interpolations_numbers_as_names_and_keys_that_no_file_names(settings):
     assert settings("train", "camera=large", "camera.horizontal_fov=90").camera.width == 256
 
 
+def test_whole_numbers_may_have_an_exponent(settings):
+    words = ["trainer.total_frames=1.5E+3", "network.hidden=[1e2,64]", "optimizer.lr=1e-3"]
+    made = settings("train", *words)
+    assert (made.trainer.total_frames, made.network.hidden) == (1500, (100, 64))
+    assert repr(settings("verdict", "task.num_cubes=1e1").task) == "{'num_cubes': 10}"
+    with pytest.raises(InputError, match=r"total_frames=1\.5: it must be a whole number"):
+        settings("train", "trainer.total_frames=1.5")
+
+
 def test_original_is_algorithm_4(settings):
     made = settings("train", "experiment=original")
     assert made.collector.num_envs == 1

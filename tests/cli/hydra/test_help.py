@@ -29,7 +29,8 @@ def test_every_setting_of_every_command_is_explained(command, config, capsys):
 def test_help_shows_units_defaults_and_choices(config, capsys):
     show_help("train", ["--help", "seed=7"], find_command("train"))
     text = capsys.readouterr().out
-    assert "  trainer.total_frames=2000000  (frames)\n      Stop after" in text
+    assert "  evaluate_after=0  (episodes)\n      Episodes of a verdict" in text
+    assert "  trainer\n      Training loop: stopping rule" in text and "trainer.total" not in text
     assert "  seed=7\n" in text
     assert "  objective=reinforce\n      One of: a2c, ppo, reinforce.\n" in text
     assert "drone-rl evaluate" not in text

@@ -49,7 +49,7 @@ def text(tmp_path, monkeypatch):
         ("summary", "Not measured", MEASURED, {}),
         ("summary", "another task", MEASURED,
          {"shifts": {"path": "a", "refused": "it is of another task"}}),
-        ("summary", "re-checked by 1,000 rollouts", {"verdict.proof.wrong_at_most": None},
+        ("summary", "not refuted by 3,000 episodes", {"verdict.proof.computed": True},
          {"verdict.proof": PROOF}),
         ("summary", "1 of 2 methods passed the tests: trust saliency.", NONE_TRUSTED, {}),
         ("summary", "2 to 4 m ahead", {"places": {"refused": "a stack"}}, {}),

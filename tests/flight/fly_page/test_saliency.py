@@ -52,19 +52,23 @@ def test_the_map_is_that_of_the_most_probable_action(make_world):
     assert live.heat(seen).shape == (25, 64)
 
 
-class Connection(list):
-    """One end of a pipe."""
-
-    def send(self, value):
-        self.append(value)
-
-
-def test_a_policy_that_cannot_be_explained_says_why(monkeypatch):
-    def refuse(policy):
+def test_a_policy_that_cannot_be_explained_says_why(make_world):
+    def refuse():
         raise drone_rl.InputError("task=x cannot be explained")
 
-    sent = Connection()
-    monkeypatch.setattr(saliency, "find_trusted", refuse)
-    monkeypatch.setattr(saliency.os, "nice", lambda more: more)
-    saliency._work(sent, None, [])
-    assert sent == [(None, "task=x cannot be explained")]
+    live = LiveSaliency(make_world())
+    live._result = SimpleNamespace(ready=lambda: True, get=refuse)
+    live.poll()
+    assert (live.state, live.problem) == ("failed", "task=x cannot be explained")
+
+
+def test_a_policy_that_cannot_be_sent_to_the_process_says_so(make_world):
+    world = make_world()
+    world.policy = lambda: None
+    live = LiveSaliency(world)
+    world.policy.name = "mine"
+    live.start()
+    assert live.state == "testing"
+    live._result.wait(60)
+    live.poll()
+    assert live.state == "failed" and "pickle" in live.problem

@@ -84,23 +84,11 @@ def test_mixer_assigns_torques_to_rotors(goal, rotors):
     np.testing.assert_allclose(setpoints(BARE, *goal), rotors, atol=1e-6)
 
 
-def test_angle_goals_set_control():
-    """0.1 rad sets 0.625 rad/s, and so 0.15625 of the control."""
-    found = control(setpoints((*ANGLES[:3], Mode.THROTTLE), 0.1, -0.1, 0.05, 0.5))
-    np.testing.assert_allclose(found, (0.5, 0.15625, -0.15625, 0.078125), atol=1e-6)
-
-
 def test_heading_takes_the_shorter_turn():
     modes = (*ANGLES[:3], Mode.THROTTLE)
     assert control(setpoints(modes, 0, 0, -3.0, 0.5, yaw=3.0))[3] > 0.1
     assert control(setpoints(modes, 0, 0, 3.0, 0.5, yaw=-3.0))[3] < -0.1
     np.testing.assert_allclose(control(setpoints(modes, 0, 0, 3.0, 0.5, yaw=3.0))[3], 0, atol=1e-6)
-
-
-def test_drifting_heading_sets_its_rate():
-    modes = (*ANGLES[:3], Mode.THROTTLE)
-    found = control(setpoints(modes, 0, 0, 0.0, 0.5, drift=(0, 0, 0.4, 0)))
-    np.testing.assert_allclose(found[3], 0.1, atol=1e-6)
 
 
 SHARE = 0.2 * math.pi / 5.5 * 2.5 * 2.5 * 0.25
@@ -128,15 +116,6 @@ def test_position_goals_set_velocities():
     found = control(setpoints(POSITIONS, 0.0, 0.0, 0.0, 100.1))
     np.testing.assert_allclose(found[0], HOVER + 0.5 * 2.0 * 0.1, atol=1e-6)
     assert control(setpoints(POSITIONS, 0.0, 0.0, 0.0, 101.0))[0] == pytest.approx(1.0)
-
-
-def test_drifting_position_sets_its_velocity():
-    found = control(setpoints(POSITIONS, 0.0, 0.0, 0.0, 100.0, drift=(0.3, -0.2, 0.0, 0.05)))
-    np.testing.assert_allclose(found, (HOVER + 0.05, 0.2 * SHARE, 0.3 * SHARE, 0), atol=1e-6)
-    far = control(setpoints(POSITIONS, 50.0, 0.0, 0.0, 100.0, drift=(50.0, 0.0, 0.0, 0.0)))
-    moving = {"velocity": (6.0, 0.0, 0.0)}
-    fast = control(setpoints(POSITIONS, 50.0, 0, 0, 100.0, drift=(50.0, 0, 0, 0), change=moving))
-    assert far[2] > 0.1 and fast[2] == pytest.approx(0.0, abs=1e-6)  # the limit is 6 m/s
 
 
 def test_rotor_goals_bypass_controllers():
@@ -198,15 +177,6 @@ def test_limits_hold_for_random_goals():
     assert not state.is_lost.any()
     assert most[0] < 6.0 * 1.2 and most[1] < 4.0 * 1.6
     assert most[2] < math.pi / 5.5 * 1.3 and most[3] < 2.5 * 2**0.5 * 1.1
-
-
-def test_reference_after_a_command():
-    state = hovering(quadrotor())
-    state.attitude[:] = doubles((math.cos(0.2), 0.0, 0.0, math.sin(0.2)))
-    goals = make_goals(POSITIONS, 1.0, 2.0, 0.5, 101.0, drift=(0.1, 0.2, 0.3, 0.4))
-    np.testing.assert_allclose(goals.reference_after(2.0, state)[0], (1.2, 2.4, 1.1, 101.8))
-    free = make_goals(VELOCITIES, 1.0, 2.0, 0.5, 1.0)
-    np.testing.assert_allclose(free.reference_after(2.0, state)[0], (0, 0, 0.4, 100), atol=1e-9)
 
 
 MOVES_SETTINGS = ActionSettings(move_speed=4.0, move_lead=0.5)

@@ -51,21 +51,6 @@ def test_results_do_not_depend_on_threads_or_batch():
         assert torch.equal(drone.fly(one, single_goals, 330).numbers[0], both[world])
 
 
-@pytest.mark.parametrize(
-    ("modes", "goal"),
-    [(POSITIONS, (2, 1, 1, 101)), (VELOCITIES, (2, 1, 1, 1)), (ANGLES, (0.3, 0.2, 1, 99))],
-)
-def test_command_of_66_ticks_equals_two_of_33(modes, goal):
-    """They agree up to rounding, less than 1 micrometer."""
-    drone = quadrotor()
-    whole = drone.fly(hovering(drone), make_goals(modes, *goal), 66)
-    half = drone.fly(
-        drone.fly(hovering(drone), make_goals(modes, *goal), 33), make_goals(modes, *goal), 33
-    )
-    assert float((whole.numbers - half.numbers)[:, :13].abs().max()) < 1e-6
-    assert whole.ticks.tolist() == half.ticks.tolist() == [66]
-
-
 def test_precision_does_not_depend_on_the_distance_to_the_origin():
     """A drone 100 km from the origin moves as at the origin."""
     drone, far = quadrotor(), doubles((1e5, -1e5, 0.0))
@@ -182,16 +167,6 @@ def test_drift_moves_the_reference():
     )
     np.testing.assert_allclose(after.position[0], reference.position, atol=1e-4)
     np.testing.assert_allclose(after.reference[0], (1.5, -0.9, 0.3, 100.6), atol=1e-6)
-
-
-def test_climb_integral_is_used_only_with_height_goals():
-    drone = quadrotor()
-    thrown = (Mode.ANGLE, Mode.ANGLE, Mode.ANGLE, Mode.THROTTLE)
-    state = hovering(drone)
-    kept = drone.fly(state, make_goals(thrown, 0.0, 0.0, 0.0, 0.9), 10).numbers[0, 21]
-    assert float(kept) == pytest.approx(2 * drone.settings.hover_throttle - 1)
-    gained = drone.fly(state, make_goals(VELOCITIES, 0.0, 0.0, 0.0, 0.5), 1).numbers[0, 21] - kept
-    assert float(gained) == pytest.approx(2.0 * 0.5 * 0.003, rel=1e-4)
 
 
 def test_drone_on_the_ground_keeps_its_tilt_under_thrust():

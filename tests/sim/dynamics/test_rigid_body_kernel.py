@@ -121,16 +121,6 @@ def test_rotor_torques_follow_from_position_and_spin(shares, torque):
     np.testing.assert_allclose(after.angular_velocity[0], gained, rtol=1e-5, atol=1e-8)
 
 
-def test_constant_torque_accelerates_rotation():
-    """The rate is linear and the angle quadratic in time."""
-    drone = quadrotor(**AT_ONCE, **VACUUM)
-    after = drone.push(falling(), doubles((0.0, 0.005, 0.005, 0.0)), 100)
-    rate = 0.3 * 0.01 * LEVER / 0.00672
-    assert float(after.angular_velocity[0, 0]) == pytest.approx(rate, rel=1e-5)
-    w, x = after.attitude[0, :2].tolist()
-    assert 2 * math.atan2(x, w) == pytest.approx(rate * 0.3 / 2 * 1.01, rel=1e-5)
-
-
 @pytest.mark.parametrize("axis", range(3))
 def test_spin_about_a_principal_axis_is_constant(axis):
     rates = np.zeros(3)
@@ -138,13 +128,6 @@ def test_spin_about_a_principal_axis_is_constant(axis):
     after = quadrotor(**VACUUM).push(falling(rates=tuple(rates)), NONE, 1000)
     np.testing.assert_allclose(after.angular_velocity[0], rates, atol=1e-6)
     np.testing.assert_allclose(matrix(after.attitude[0]), rotation(rates * 3.0), atol=2e-5)
-
-
-def test_symmetric_body_nutates_by_eulers_equations():
-    """The nutation rate is (I3 - I1) / I1 of the spin: 1 rad/s, a quarter turn in 1.5708 s."""
-    drone = quadrotor(inertia=(0.01, 0.01, 0.015), tick=0.0005, **VACUUM)
-    after = drone.push(falling(rates=(0.1, 0.0, 2.0)), NONE, 3142)
-    np.testing.assert_allclose(after.angular_velocity[0], (0.0, 0.1, 2.0), atol=2e-4)
 
 
 def test_angular_momentum_and_energy_are_conserved():
@@ -159,16 +142,6 @@ def test_angular_momentum_and_energy_are_conserved():
     (before, energy), (after, left) = of(state), of(drone.push(state, NONE, 6000))
     np.testing.assert_allclose(after, before, atol=0.01 * np.linalg.norm(before))
     assert left == pytest.approx(energy, rel=0.01)
-
-
-def test_attitudes_stay_normalized():
-    rates = torch.tensor(np.random.default_rng(0).normal(size=(20, 3)) * 5)
-    state = falling()
-    state = type(state)(state.numbers.repeat(20, 1))
-    state.angular_velocity[:] = rates
-    states = trajectory(quadrotor(), state, rotor_goals(torch.full((20, 4), 0.2).double()), 990, 33)
-    lengths = torch.stack([s.attitude.norm(dim=-1) for s in states])
-    assert float((lengths - 1).abs().max()) < 1e-6
 
 
 MASS, ARM, MOST, RATIO = 0.0319, 0.03253, 0.12, 0.00735
@@ -246,15 +219,6 @@ def gusts(count=1000, ticks=4000, every=20, *, seeds=None, **changes):
         drone, state, make_goals(POSITIONS, 0, 0, 0, 1000.0, count=count), ticks, every
     )
     return torch.stack([s.gust for s in states]).numpy()
-
-
-def test_light_body_drifts_with_the_wind():
-    """100 m2 and 1 kg: after 3 s it moves with the wind and sinks slowly."""
-    wind = (3.0, -4.0, 0.5)
-    drone = quadrotor(wind=wind, drag_area=(3.0, 3.0, 3.0))
-    after = drone.push(falling(1000.0), NONE, 1000).velocity[0]
-    sinking = (9.81 / (1.225 * 3.0)) ** 0.5
-    np.testing.assert_allclose(after, (3.0, -4.0, 0.5 - sinking), atol=0.2)
 
 
 def test_wind_causes_a_steady_position_error():

@@ -17,16 +17,6 @@ from tests.fake_flight import FLIGHT, Floating
 from tests.flying import doubles
 
 
-def test_body_at_rest_is_level_by_default():
-    place = torch.tensor([[1.0, 2.0, 3.0]], dtype=torch.float64)
-    body = BodyState.at_rest(place)
-    assert body.position.tolist() == [[1, 2, 3]] and body.attitude.tolist() == [[1, 0, 0, 0]]
-    assert not body.velocity.any() and not body.angular_velocity.any()
-    assert all(value.dtype == torch.float64 for value in vars(body).values())
-    turned = torch.tensor([[0.0, 0.0, 0.0, 1.0]], dtype=torch.float64)
-    assert BodyState.at_rest(place, turned).attitude is turned
-
-
 @pytest.mark.parametrize("yaw", [0.0, 40.0, -170.0, 170.0])
 def test_the_twist_about_z_has_no_roll_and_pitch(yaw):
     """Attitudes apply roll and pitch first, then yaw."""
@@ -52,14 +42,6 @@ def test_reference_at_rest_is_the_own_position():
     assert state.numbers[0, fs.SEED] == 5 and not state.is_lost.any()
     assert state.contact.thing.tolist() == [fs.NOTHING] and state.ticks.tolist() == [0]
     assert FlightState.at_rest(doubles((0.0, 0.0, 0.0))).attitude.tolist() == [[1, 0, 0, 0]]
-
-
-def test_parts_are_views_of_the_state():
-    state = FlightState.at_rest(doubles((1.0, 2.0, 3.0), (4.0, 5.0, 6.0)))
-    state.velocity[1] = doubles((7.0, 8.0, 9.0))
-    state.rotors[:] = 0.5
-    assert state.numbers[1, 7:10].tolist() == [7, 8, 9]
-    assert state.numbers[0, 13:17].tolist() == [0.5] * 4
 
 
 SETTINGS = PillarsSettings(num_rows=2, width=0.5, height=6.0)

@@ -2,7 +2,6 @@
 
 import time
 import types
-from threading import get_ident
 
 import pytest
 import torch
@@ -29,17 +28,6 @@ def test_warp_starts_without_output(tmp_path):
     code = "from drone_rl.sim.rendering.devices import start_warp; start_warp('cpu')"
     done = run_forked(code, cwd=tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-
-
-def test_kernels_are_loaded_once_in_a_thread(monkeypatch):
-    loaded = []
-    monkeypatch.setattr(devices.wp, "load_module", lambda *_, **__: loaded.append(get_ident()))
-    kernels = types.ModuleType("kernels")
-    first = load_kernels(kernels)
-    assert load_kernels(kernels) is first
-    assert first.result() is None
-    assert len(loaded) == 1
-    assert loaded[0] != get_ident()
 
 
 def test_forked_process_reloads_kernels(monkeypatch):

@@ -10,22 +10,6 @@ from drone_rl.sim.rendering.scene import SemanticClass, compiled
 from drone_rl.utils.errors import InputError
 
 
-def test_geoms_are_found_by_semantic_class():
-    geoms = '<geom size="1"/>' * 4
-    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{geoms}</worldbody></mujoco>")
-    semantic_classes = (
-        SemanticClass.GROUND,
-        SemanticClass.TARGET,
-        SemanticClass.DRONE,
-        SemanticClass.TARGET,
-    )
-    scene = Scene(model, semantic_classes, (-1, 0, -1, 1), (0.0, 0.0, 1.0))
-    assert scene.geoms(SemanticClass.TARGET) == [1, 3]
-    assert scene.geoms(SemanticClass.OBSTACLE) == []
-    assert scene.shown(show_drone=True) == [0, 1, 2, 3]
-    assert scene.shown(show_drone=False) == [0, 1, 3]
-
-
 def test_a_model_that_mujoco_rejects_is_named_with_its_reason():
     model = mjcf.RootElement()
     model.worldbody.add("geom", type="mesh", mesh="tree")

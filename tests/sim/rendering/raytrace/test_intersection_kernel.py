@@ -6,16 +6,13 @@ import numpy as np
 import pytest
 import warp as wp
 
-from drone_rl.sim.rendering.raytrace import intersection_kernel
 from drone_rl.sim.rendering.raytrace.intersection_kernel import (
     BOX,
     CAPSULE,
     CYLINDER,
     ELLIPSOID,
     SPHERE,
-    intersect_plane,
     intersect_solid,
-    is_nearest,
     surface_normal,
 )
 
@@ -34,11 +31,6 @@ def try_solid(
     normal[0] = surface_normal(kind, size, face, point, ray, distance)
 
 
-@wp.kernel(enable_backward=False)
-def try_plane(size: wp.vec3, point: wp.vec3, ray: wp.vec3, along: wp.array[float]):
-    along[0] = intersect_plane(size, point, ray)
-
-
 def entered(kind, size, point, ray):
     """Return the distance along the ray and the normal."""
     along = wp.zeros(1, dtype=float, device="cpu")
@@ -46,13 +38,6 @@ def entered(kind, size, point, ray):
     given = [int(kind), wp.vec3(*size), wp.vec3(*point), wp.vec3(*ray), along, normal]
     wp.launch(try_solid, 1, inputs=given, device="cpu")
     return float(along.numpy()[0]), normal.numpy()[0]
-
-
-def met(size, point, ray):
-    along = wp.zeros(1, dtype=float, device="cpu")
-    given = [wp.vec3(*size), wp.vec3(*point), wp.vec3(*ray), along]
-    wp.launch(try_plane, 1, inputs=given, device="cpu")
-    return float(along.numpy()[0])
 
 
 ROOT = math.sqrt(0.5)
@@ -95,40 +80,3 @@ def test_ray_parallel_to_a_cylinder():
     assert entered(CYLINDER, (1, 2, 0), (0.5, 0, 9), (0, 0, -1))[0] == pytest.approx(7.0)
     assert entered(CYLINDER, (1, 2, 0), (1.5, 0, 9), (0, 0, -1))[0] < 0
     assert entered(CYLINDER, (1, 2, 0), (-3, 0, 2.5), (1, 0, 0))[0] < 0
-
-
-def test_plane_is_hit_from_above_within_its_size():
-    assert met((0, 0, 1), (3, 4, 2), (0, 0, -1)) == pytest.approx(2.0)
-    assert met((0, 0, 1), (0, 0, -2), (0, 0, 1)) < 0  # from below
-    assert met((0, 0, 1), (0, 0, 2), (1, 0, 0)) < 0  # parallel
-    assert met((1, 2, 1), (0.9, 1.9, 2), (0, 0, -1)) == pytest.approx(2.0)
-    assert met((1, 2, 1), (1.1, 0, 2), (0, 0, -1)) < 0
-    assert met((1, 2, 1), (0, 2.1, 2), (0, 0, -1)) < 0
-
-
-def test_geom_types_have_mujocos_numbers():
-    numbers = [intersection_kernel.PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX]
-    assert [int(n) for n in numbers] == [0, 2, 3, 4, 5, 6]
-
-
-@wp.kernel(enable_backward=False)
-def try_nearest(hits: wp.array[wp.vec4], nearest: wp.array[int]):
-    i = wp.tid()
-    hit = hits[i]
-    nearest[i] = int(is_nearest(hit[0], hit[1], hit[2], hit[3]))
-
-
-def test_nearest_hit_is_selected_within_the_far_limit():
-    cases = [
-        ((4.0, 5.0, 1.0, 50.0), True),
-        ((5.0, 4.0, 1.0, 50.0), False),
-        ((4.000001, 4.0, 1.0, 50.0), True),  # equal depth: the later is in front
-        ((4.0001, 4.0, 1.0, 50.0), False),
-        ((-1.0, 1e10, 1.0, 50.0), False),  # no hit
-        ((60.0, 1e10, 1.0, 50.0), False),  # too far along the axis
-        ((60.0, 1e10, 0.5, 50.0), True),  # but not along this axis
-    ]
-    hits = wp.array([hit for hit, _ in cases], dtype=wp.vec4, device="cpu")
-    nearest = wp.zeros(len(cases), dtype=int, device="cpu")
-    wp.launch(try_nearest, len(cases), inputs=[hits, nearest], device="cpu")
-    assert nearest.numpy().astype(bool).tolist() == [expected for _, expected in cases]

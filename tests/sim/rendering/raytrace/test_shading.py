@@ -7,7 +7,7 @@ import warp as wp
 from drone_rl.sim.rendering.raytrace import structs_kernel
 from drone_rl.sim.rendering.raytrace.intersection_kernel import ROUND
 from drone_rl.sim.rendering.raytrace.shading_kernel import light_surface, map_texture
-from drone_rl.sim.rendering.raytrace.spans_kernel import shade_plain, shade_sky, shade_textured
+from drone_rl.sim.rendering.raytrace.spans_kernel import shade_textured
 from drone_rl.sim.rendering.raytrace.structs_kernel import Job, SurfaceLight, TextureMap
 from drone_rl.sim.rendering.textures import levels
 from tests.box_ahead import array, materials
@@ -73,63 +73,24 @@ def test_texture_axes_of_each_face(face, normal, corner):
     np.testing.assert_allclose(laid["facing"], -np.array(normal), atol=1e-6)
 
 
-LIT, SHADED, HORIZON = (wp.vec3(*c) for c in ((200, 100, 300), (20, 10, 30), (50, 60, 70)))
-
-
 @wp.kernel(enable_backward=False)
-def shade(
-    job: Job,
-    light: SurfaceLight,
-    cover: TextureMap,
-    texels: wp.array[wp.uint32],
-    what: int,
-):
-    count = job.colors.shape[0]
-    if what == 0:
-        shade_sky(job, 0, count, wp.vec3(0.0, 1.0, 0.0), HORIZON, LIT)
-    if what == 1:
-        shade_plain(job, 0, count, light)
-    if what == 2:
-        shade_textured(job, 0, count, light, cover, texels)
+def shade(job: Job, light: SurfaceLight, cover: TextureMap, texels: wp.array[wp.uint32]):
+    shade_textured(job, 0, 1, light, cover, texels)
 
 
-def shaded(what, rays, nearest=None, dark=None, texels=(0,), cover=None, extinction=0.0):
-    count, job, light = len(rays), Job(), SurfaceLight()
-    job.colors = wp.zeros(count, dtype=wp.vec3ub, device="cpu")
-    job.rays, job.nearest = array(rays, wp.vec3), array(nearest or [1.0] * count, float)
-    job.dark = array(dark or [0] * count, int)
-    light.lit, light.shaded, light.horizon, light.extinction = LIT, SHADED, HORIZON, extinction
-    given = [job, light, cover or TextureMap(), array(texels, wp.uint32), what]
-    wp.launch(shade, 1, inputs=given, device="cpu")
-    return job.colors.numpy().tolist()
-
-
-def test_sky_color_is_interpolated():
-    rays = [(0.0, 0.0, -1.0), (0.0, 0.6, -0.8), (0.0, -0.6, -0.8)]
-    found = shaded(0, rays)
-    assert found == [[50, 60, 70], [140, 84, 208], [50, 60, 70]]
-
-
-def test_flat_face_is_lit_or_dark_and_clipped():
-    assert shaded(1, [(0, 0, -1)] * 2, dark=[0, 1]) == [[200, 100, 255], [20, 10, 30]]
-
-
-@pytest.mark.parametrize("metres", [1.0, 7.0, 40.0, 1000.0])
-def test_fog_attenuates_exponentially(metres):
-    clear = np.exp(-0.05 * metres)
-    wanted = clear * np.array([200, 100, 255]) + (1 - clear) * np.array([50, 60, 70])
-    (found,) = shaded(1, [(0, 0, -1)], [metres], extinction=0.05)
-    assert np.abs(np.array(found) - wanted).max() <= 1
-
-
-def covered(place, metres=1.0, area=0.0):
+def covered(place):
     """Return the color of a texture with 2x2 texels (black, red; green, blue) and tiles of 1 m."""
     colors = np.array([[[0, 0, 0], [255, 0, 0]], [[0, 255, 0], [0, 0, 255]]], np.uint8)
     texels = levels(colors).astype(np.uint32) @ np.array([1, 256, 65536], np.uint32)
-    cover = TextureMap()
-    cover.start, cover.side, cover.area = 1, 2, area
+    cover, job, light = TextureMap(), Job(), SurfaceLight()
+    cover.start, cover.side = 1, 2
     cover.facing, cover.corner = wp.vec3(0.0, 0.0, -1.0), wp.vec2(*place)
-    return shaded(2, [(0, 0, -1)], [metres], texels=[7, *texels], cover=cover)[0]
+    job.colors = wp.zeros(1, dtype=wp.vec3ub, device="cpu")
+    job.rays, job.nearest = array([(0, 0, -1)], wp.vec3), array([1.0], float)
+    job.dark, light.lit = array([0], int), wp.vec3(200.0, 100.0, 300.0)
+    given = [job, light, cover, array([7, *texels], wp.uint32)]
+    wp.launch(shade, 1, inputs=given, device="cpu")
+    return job.colors.numpy().tolist()[0]
 
 
 @pytest.mark.parametrize("tile", [-3, 0, 5])
@@ -144,10 +105,3 @@ def test_colors_between_texels_are_interpolated():
     assert covered((0.5, 0.25)) == pytest.approx([100, 0, 0], abs=1)
     assert covered((0.0, 0.25)) == pytest.approx([100, 0, 0], abs=1)  # across the edge of the tile
     assert covered((0.5, 0.5)) == pytest.approx([50, 25, 75], abs=1)
-
-
-def test_pixel_covering_a_tile_has_its_mean():
-    assert covered((0.25, 0.25), area=1.9) == [0, 0, 0]
-    assert covered((0.25, 0.25), area=2.1) == pytest.approx([50, 25, 75], abs=1)
-    assert covered((0.25, 0.25), metres=2.0, area=0.6) == pytest.approx([50, 25, 75], abs=1)
-    assert covered((0.25, 0.25), metres=9.0, area=1e30) == pytest.approx([50, 25, 75], abs=1)

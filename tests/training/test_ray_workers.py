@@ -10,8 +10,8 @@ from drone_rl.config.learning import Ray
 from drone_rl.config.networks import Network
 from drone_rl.config.registry import modules_of
 from drone_rl.config.training import TrainSettings
-from drone_rl.training.components import make_collector
-from drone_rl.training.variants import _remote_collector
+from drone_rl.training.ray_workers import _remote_collector
+from drone_rl.training.train import make_collector
 from drone_rl.utils.errors import InputError
 
 TASK = TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60)
@@ -43,7 +43,7 @@ def test_a_worker_imports_the_modules_that_register_its_parts(tmp_path, monkeypa
     del sys.modules["ray_plugin"], Network.registry["ray_cells"]  # as in a new process
     with pytest.raises(InputError, match="it must be one of"):
         Network.read("ray_cells", "network")
-    collector, network, _ = _remote_collector(*sent, [2], 0, None)
+    collector = _remote_collector(*sent, [2], 0, None)
     collector.shutdown()
-    assert type(network).__name__ == "Cells"
+    assert type(collector.actor.network).__name__ == "Cells"
     registered(sys.modules["ray_plugin"].Cells)

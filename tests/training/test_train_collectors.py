@@ -7,7 +7,7 @@ from drone_rl.collectors import ThreadedCollector
 from drone_rl.config import TaskSettings
 from drone_rl.config.learning import Episodes, Ray
 from drone_rl.config.training import TrainSettings
-from drone_rl.training.components import group_sizes, make_collector
+from drone_rl.training.train import group_sizes, make_collector
 
 TASK = TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60)
 

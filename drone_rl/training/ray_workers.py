@@ -1,0 +1,55 @@
+"""Collecting by workers on a Ray cluster."""
+
+import functools
+import importlib
+from typing import Any
+
+from drone_rl.collectors import EpisodeCollector
+from drone_rl.config.learning import Ray
+from drone_rl.config.registry import implements, modules_of
+from drone_rl.config.training import TrainSettings
+from drone_rl.sim.tasks import FailureReplayTask
+from drone_rl.training.train import Components, group_sizes, make_groups
+from drone_rl.utils.plugins import IMPORTED
+
+
+@implements(Ray)
+def ray_collector(settings: TrainSettings, replay: FailureReplayTask | None = None) -> Components:
+    """Make `collector=ray`: complete episodes, with returns, from workers on a Ray cluster."""
+    from drone_rl.collectors.ray import RayEpisodeCollector  # slow to import, seldom needed
+
+    chosen = settings.collector
+    assert isinstance(chosen, Ray)
+    sizes = group_sizes(settings)
+    ((env, actor),) = make_groups(settings, [1])  # only the actor is needed
+    env.close()
+    sent = (settings.config(), sorted(modules_of(settings) | {*IMPORTED}), sizes)
+    makers = [functools.partial(_remote_collector, *sent, i, replay) for i in range(len(sizes))]
+    collector = RayEpisodeCollector(
+        makers,
+        actor,
+        address=chosen.address,
+        num_cpus=chosen.num_cpus,
+        max_lost_workers=chosen.max_lost_workers,
+        device=settings.device,
+        postproc=settings.returns.make().to(settings.device),
+    )
+    return Components(collector, actor.network, {})
+
+
+def _remote_collector(
+    config: dict[str, Any],
+    modules: list[str],
+    sizes: list[int],
+    number: int,
+    replay: FailureReplayTask | None,
+) -> EpisodeCollector:
+    """Make a worker's collector, from arguments that can be sent; `modules` register its parts."""
+    for module in modules:
+        importlib.import_module(module)
+    settings = TrainSettings.read(config)
+    chosen = settings.collector
+    assert isinstance(chosen, Ray)
+    ((env, actor),) = make_groups(settings, sizes, replay, [number])
+    cores = max(1, int(chosen.num_cpus))
+    return EpisodeCollector(env, actor, compiled=chosen.compiled, num_threads=cores)
