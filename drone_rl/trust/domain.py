@@ -131,9 +131,11 @@ def range_of(
     def value(strength: float | None) -> float | None:
         return None if strength is None else finite(axis.value(strength, of))
 
-    tested = [
-        (axis.position(s), value(s), p.good) for e in ends.values() for s, p in e.tested.items()
-    ]
+    tested = sorted(
+        (axis.position(strength), value(strength), probe.good)
+        for end in ends.values()
+        for strength, probe in end.tested.items()
+    )
     return Range(
         **{name: value(end.limit) for name, end in ends.items()},
         **{f"{n}_open": e.failed is None if e.tested else None for n, e in ends.items()},
