@@ -13,7 +13,8 @@ def bench_gamed(setup: Setup) -> dict[str, int]:
 
     Returns:
         "gamed_verdicts": number of policies that are judged good or proved; "gamed_total": number
-        of policies.
+        of policies. "forged_boxes_proved": for how many of "forged_boxes_seeds" seeds a certificate
+        of 13,824 boxes, which is wrong about few placements, counts as proved.
     """
     folder = setup.runs / "gamed"
     cases = {
@@ -24,4 +25,10 @@ def bench_gamed(setup: Setup) -> dict[str, int]:
     deceived = [name for name, is_judged_good in cases.items() if is_judged_good()]
     for name in deceived:
         _log.warning("%s: judged good", name)
-    return {"gamed_verdicts": len(deceived), "gamed_total": len(cases)}
+    seeds = 2 if setup.quick else 20
+    return {
+        "gamed_verdicts": len(deceived),
+        "gamed_total": len(cases),
+        "forged_boxes_proved": gamed_certificates.accepted_many_boxes(folder / "boxes", seeds),
+        "forged_boxes_seeds": seeds,
+    }

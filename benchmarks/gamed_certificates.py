@@ -1,6 +1,7 @@
 """Forged certificates and trivial tasks."""
 
 import functools
+import itertools
 import json
 import shutil
 from collections.abc import Callable, Sequence
@@ -15,6 +16,7 @@ from drone_rl.policies.zoo import certificate_path, fingerprint
 from drone_rl.trust.judge import judge
 from drone_rl.utils.progress import silent
 from drone_rl.verification.checker.checker import Simulator
+from drone_rl.verification.claim import find_claim
 
 _TRIVIAL = {"lateral_bound": 0.5}
 _EPISODES = 300
@@ -68,6 +70,30 @@ def one_box(policy: Policy, steps: dict[str, float]) -> dict[str, Any]:
     return certificate_of(policy, [{**won, "steps": steps, "boxes": [[[-bound, bound]] * cubes]}])
 
 
+def many_boxes(policy: Policy, count: int = 24, episodes: int = 4000) -> dict[str, Any]:
+    """Return a certificate of success from everywhere in so many boxes that few can be tested.
+
+    Args:
+        policy: The policy that the certificate names; it may fail from a few placements.
+        count: Number of boxes along each cube's positions.
+        episodes: Number of episodes that estimate the numbers of steps.
+    """
+    stated = one_box(policy, steps_of(policy, episodes=episodes))
+    (outcome,) = stated["outcomes"]
+    ((low, high), *_) = outcome["boxes"][0]
+    ends = np.linspace(low, high, count + 1).tolist()
+    pieces = itertools.product(itertools.pairwise(ends), repeat=len(outcome["collected"]))
+    outcome["boxes"] = [[*map(list, box)] for box in pieces]
+    return stated
+
+
+def accepted_many_boxes(folder: Path, seeds: int = 20) -> int:
+    """Return for how many seeds a forged certificate of many boxes passes as proved."""
+    policy = _copy_shipped("good", folder)  # fails from 0.09% of all placements
+    certificate_path(policy.path).write_text(json.dumps(many_boxes(policy)))
+    return sum(_counts_as_proved(policy, seed=seed) for seed in range(seeds))
+
+
 def certificate_of(
     policy: Policy,
     outcomes: list[dict[str, Any]],
@@ -100,7 +126,9 @@ def certificate_of(
     }
 
 
-def steps_of(policy: Policy, total: float = 0.98, high: float | None = None) -> dict[str, float]:
+def steps_of(
+    policy: Policy, total: float = 0.98, high: float | None = None, episodes: int = _EPISODES
+) -> dict[str, float]:
     """Estimate the fraction of placements by number of steps from random placements.
 
     An attacker can do the same, so these numbers of steps are plausible.
@@ -109,16 +137,17 @@ def steps_of(policy: Policy, total: float = 0.98, high: float | None = None) -> 
         policy: The policy, in its task.
         total: Sum of the returned fractions.
         high: Largest y of the first cube, metres; the task's bound by default.
+        episodes: Number of random placements.
     """
     task: Any = policy.task
     bound, cubes, rng = task.lateral_bound, task.num_cubes, np.random.default_rng(7)
-    places = rng.uniform(-bound, bound, (_EPISODES, cubes))
-    places[:, 0] = rng.uniform(-bound, bound if high is None else high, _EPISODES)
+    places = rng.uniform(-bound, bound, (episodes, cubes))
+    places[:, 0] = rng.uniform(-bound, bound if high is None else high, episodes)
     with closing(Simulator(policy.description, policy.state["policy"])) as simulator:
         steps = simulator.fly(places).steps
     numbers, counts = np.unique(steps, return_counts=True)
     pairs = zip(numbers.tolist(), counts.tolist(), strict=True)
-    return {str(number): total * count / _EPISODES for number, count in pairs}
+    return {str(number): total * count / episodes for number, count in pairs}
 
 
 def _copy_shipped(name: str, folder: Path) -> Policy:
@@ -148,8 +177,13 @@ def _rehashed(policy: Policy) -> dict[str, Any]:
 def _is_proved(folder: Path, name: str, forge: Forge, **options: Any) -> bool:
     policy = _copy_shipped(name, folder)
     certificate_path(policy.path).write_text(json.dumps(forge(policy)))
-    judged = judge(policy, episodes=20, sampled=False, progress=silent, **options)
-    return judged.verdict.is_proved or judged.status("proved") == 0
+    return _counts_as_proved(policy, **options)
+
+
+def _counts_as_proved(policy: Policy, **options: Any) -> bool:
+    how = {"episodes": 20, "sampled": False, "require": "proved", "progress": silent}
+    judged = judge(policy, **how, find_claim=find_claim, **options)
+    return judged.is_proved or judged.status("proved") == 0
 
 
 def _is_good(name: str) -> bool:

@@ -47,8 +47,8 @@ def bench_prove(setup: Setup) -> dict[str, Any]:
         "proof_lost": [proof.lost for proof in trained],
         "proof_undecided": max(proof.undecided for proof in trained),
         "proof_undecided_each": [proof.undecided for proof in trained],
-        "proof_contradicted": sum(check.findings.contradicted for check in checks),
-        "proof_flights": sum(sum(check.findings.flights.values()) for check in checks),
+        "proof_contradicted": sum(check.contradicted for check in checks),
+        "proof_flights": sum(sum(check.flights.values()) for check in checks),
         "proof_checked": sum(check.accepted for check in checks),
         "proof_checked_total": len(checks),
     }

@@ -9,7 +9,6 @@ from typing import Any, Self
 
 import torch
 import warp as wp
-from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
 from torchrl.envs.utils import ExplorationType
 
@@ -17,6 +16,7 @@ from drone_rl.acceleration import rollout_kernel
 from drone_rl.acceleration.fused_network import ActivationRecorder
 from drone_rl.acceleration.packed_layers import PackedNetwork, Reasons, unsupported
 from drone_rl.envs import DroneEnv, Observer
+from drone_rl.envs.drone_env import Entries
 from drone_rl.envs.transforms import CropRows, StandardizePixels
 from drone_rl.policies.actor import CategoricalActor
 from drone_rl.policies.networks import require_finite
@@ -25,6 +25,8 @@ from drone_rl.sim.rendering.raytrace.renderer import Raytracer
 from drone_rl.sim.rendering.raytrace.structs_kernel import Images
 from drone_rl.sim.tasks import State
 
+EPISODE, REWARD = ("collector", "traj_ids"), ("next", "reward")
+END_REASON = ("next", "info", "end_reason")
 _MAX_STEPS = 64
 """Steps of one launch of the kernel; most episodes end within them."""
 _MAX_PIXELS = 2**23
@@ -81,7 +83,6 @@ class FusedEpisodes:
         launches = _MAX_ACTIVATIONS // (rows * size)
         self.activations = ActivationRecorder(launches * rows, size)
         """Of the last batch, for a `FusedNetwork` that learns from it."""
-        self._logits = torch.empty(0, num_actions)
         self._owner = getattr(self._actor.network, "owner", "the policy")
         self._kernel = rollout_kernel.make_kernel(*rules.functions)
         load_kernels(self._kernel.module)
@@ -110,12 +111,13 @@ class FusedEpisodes:
         network = PackedNetwork(actor.network, first_pixel)
         return cls(env, actor, keeps_inputs, network, rules, num_threads)
 
-    def run(self, started: State) -> TensorDictBase | None:
+    def run(self, started: State) -> Entries | None:
         """Run episodes to their ends, from states of k environments at their starts.
 
         Returns:
-            A batch as `EpisodeCollector`'s, whose traj_ids are 0 to k - 1; None if actions are
-            chosen in another way than by sampling or greedily.
+            The steps, one episode after the other: `EPISODE`, 0 to k - 1, `REWARD`, `END_REASON`,
+            the action, and what the actor reads and writes if it is kept, (T_total, *). None if
+            actions are chosen in another way than by sampling or greedily.
         """
         if self._actor.exploration not in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC):
             return None
@@ -123,42 +125,41 @@ class FusedEpisodes:
         self._rules.begin(started)
         self.activations.recording = None
         self._network.pack()
-        env_of_step, logged = self._run(len(started))
-        logged["action"] = logged["action"].long()
-        outcome = self._env.outcome(logged.pop("end_reason").long(), logged.pop("reward"))
-        batch = TensorDict({}, [len(env_of_step)])
-        for key, value in {**logged, **outcome}.items():
-            batch.set(key, value)
-        return batch.set(("collector", "traj_ids"), env_of_step)
+        count, names = len(started), ["action", "reward", "end_reason"]
+        if self._keeps_inputs:
+            names += ["pixels", "logits"]
+        taken, end_reasons = self._rules.steps[:count], self._rules.end_reasons[:count]
+        parts: list[tuple[Tensor, Tensor]] = []
+        while not bool(end_reasons.all()):
+            before, first = taken.clone(), len(parts) * self._num_rows
+            logits = self._launch(count, len(parts), names)
+            is_step = torch.arange(self._length) < (taken - before)[:, None]
+            envs, times = is_step.nonzero(as_tuple=True)
+            rows = envs * self._length + times
+            require_finite(logits[rows], self._owner)
+            parts.append((envs, first + rows))
+        envs, rows = (torch.cat(column) for column in zip(*parts, strict=True))
+        order = envs.argsort(stable=True)
+        envs, rows = envs[order], rows[order]
+        logged = self._buffer.read(rows, names)
+        if self._keeps_inputs:
+            if self._rows != slice(0, self._env.observer.view.height):
+                logged["pixels"] = logged["pixels"][..., self._rows, :].contiguous()
+            self.activations.record(rows, self._network.weights, logged["pixels"])
+        return {
+            EPISODE: envs,
+            REWARD: logged.pop("reward"),
+            END_REASON: logged.pop("end_reason").long(),
+            **logged,
+            "action": logged["action"].long(),
+        }
 
     def close(self) -> None:
         """End the threads."""
         self._workers.close()
 
-    def _run(self, num_envs: int) -> tuple[Tensor, dict[str, Tensor]]:
-        """Return the environment of each step, episode after episode, and what the kernel wrote."""
-        taken, end_reasons = self._rules.steps[:num_envs], self._rules.end_reasons[:num_envs]
-        is_observed = self._keeps_inputs
-        seen = ("pixels", "logits") if is_observed else ()
-        names, parts = ("action", "reward", "end_reason", *seen), []
-        while not (parts and bool(end_reasons.all())):
-            before, first = taken.clone(), len(parts) * self._num_rows
-            self._launch(num_envs, len(parts), names)
-            envs, rows = self._written(taken - before)
-            require_finite(self._logits[rows], self._owner)
-            parts.append((envs, rows + first))
-        envs, rows = (torch.cat(column) for column in zip(*parts, strict=True))
-        order = envs.argsort(stable=True)
-        envs, rows = envs[order], rows[order]
-        logged = self._buffer.read(rows, names)
-        if is_observed and self._rows != slice(0, self._env.observer.view.height):
-            logged["pixels"] = logged["pixels"][..., self._rows, :].contiguous()
-        if is_observed:
-            self.activations.record(rows, self._network.weights, logged["pixels"])
-        return envs, logged
-
-    def _launch(self, num_envs: int, part: int, kept: tuple[str, ...]) -> None:
-        """Run up to `_length` steps; the named entries are kept beyond the next launch."""
+    def _launch(self, num_envs: int, part: int, kept: Iterable[str]) -> Tensor:
+        """Run up to `_length` steps; return the logits. `kept` are kept beyond the next launch."""
         draws = torch.full((num_envs, self._length), -1.0)  # the most probable action
         if self._actor.exploration == ExplorationType.RANDOM:
             source: Any = self._actor.generator
@@ -166,11 +167,10 @@ class FusedEpisodes:
         opened, frames = self._buffer.open(part, kept), Images()
         gray: Any = wp.from_torch(opened["pixels"].flatten(1))
         frames.gray = gray
-        self._logits = opened["logits"]
         rollout: Any = rollout_kernel.Rollout()
         rollout.camera, rollout.layers = self._camera, self._network.arrays
         rollout.workspaces, rollout.draws = self._workspaces, wp.from_torch(draws)
-        rollout.frames, rollout.logits = frames, wp.from_torch(self._logits)
+        rollout.frames, rollout.logits = frames, wp.from_torch(opened["logits"])
         rollout.actions = wp.from_torch(opened["action"])
         rollout.rewards = wp.from_torch(opened["reward"])
         rollout.end_reasons = wp.from_torch(opened["end_reason"])
@@ -182,12 +182,7 @@ class FusedEpisodes:
             wp.launch(self._kernel, 1, inputs=inputs, device="cpu")
 
         self._workers.map_spans(0, num_envs, run_span)
-
-    def _written(self, lengths: Tensor) -> tuple[Tensor, Tensor]:
-        """Return environment and row of each step, from the environments' numbers of steps."""
-        is_step = torch.arange(self._length) < lengths[:, None]
-        rows = is_step.flatten().nonzero()[:, 0]
-        return rows // self._length, rows
+        return opened["logits"]
 
 
 def _mean_and_deviation(observer: Observer) -> tuple[float, float]:

@@ -67,11 +67,10 @@ class BatchedCollector(BaseCollector):
                 f"{', '.join(self.base_env.worlds.entries)}"
             )
 
-    def _outcome(self, step: Step) -> Entries:
-        """Return the ("next", ...) entries of a step. Shapes: (k, *)."""
-        entries = self.base_env.outcome(step.after.end_reason, step.reward)
+    def _kept_info(self, step: Step) -> Entries:
+        """Return the requested entries of ("next", "info") of a step. Shapes: (k, *)."""
         every = self.base_env.worlds.info(step.after) if self._info else {}
-        return entries | {("next", "info", name): every[name] for name in self._info}
+        return {("next", "info", name): every[name] for name in self._info}
 
     @abc.abstractmethod
     def collect(self) -> TensorDictBase:

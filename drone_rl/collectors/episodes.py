@@ -11,6 +11,7 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.acceleration import FusedEpisodes, Reasons
+from drone_rl.acceleration.fused_episodes import END_REASON, EPISODE, REWARD
 from drone_rl.collectors.collector import BatchedCollector, BatchOptions
 from drone_rl.envs.drone_env import Entries
 from drone_rl.envs.rollout import Act, Agent, StepContext, steps
@@ -74,26 +75,31 @@ class EpisodeCollector(BatchedCollector):
         """Run an episode in every environment, or in the first `num_envs`. Shape: (T_total,)."""
         size = self.env.batch_size[0]
         count = size if num_envs is None else min(num_envs, size)
-        started = self.base_env.start()[torch.arange(count, device=self.base_env.device)]
-        batch = None if isinstance(self.fused, Reasons) else self.fused.run(started)
-        if batch is None:
-            batch = self._step(self._agent, started)
+        env = self.base_env
+        started = env.start()[torch.arange(count, device=env.device)]
+        entries = None if isinstance(self.fused, Reasons) else self.fused.run(started)
+        if entries is None:
+            entries = self._step(self._agent, started)
         elif self._info:  # the task's batched step computes it; nothing is rendered
-            again = _Again(batch["action"], batch["collector", "traj_ids"])
-            batch.update(self._step(again, started))
-        batch["collector", "traj_ids"] += self.episodes
+            entries |= self._step(_Again(entries["action"], entries[EPISODE]), started)
+        entries |= env.outcome(entries[END_REASON], entries[REWARD])
+        entries[EPISODE] = entries[EPISODE] + self.episodes
+        batch = TensorDict({}, [len(entries[EPISODE])], device=env.device)
+        for key, value in entries.items():
+            batch.set(key, value)
         return self._finish(batch, count)
 
-    def _step(self, agent: Agent, started: State) -> TensorDictBase:
-        """Run episodes from these states step by step."""
-        rows: list[Tensor] = []
-        entries: list[Entries] = []
+    def _step(self, agent: Agent, started: State) -> Entries:
+        """Run episodes step by step; return the same entries as `FusedEpisodes.run`."""
+        taken: list[Entries] = []
         for step in steps(agent, self.base_env.observer, started):
             acted = {**step.act.entries, "action": step.act.action}
             keys = acted if self._actor_keys is None else self._actor_keys
-            rows.append(step.rows)
-            entries.append({**{key: acted[key] for key in keys}, **self._outcome(step)})
-        return _join(rows, entries, len(started))
+            kept = {key: acted[key] for key in keys} | self._kept_info(step)
+            ends = {REWARD: step.reward, END_REASON: step.after.end_reason}
+            taken.append({EPISODE: step.rows, **ends, **kept})
+        order = torch.cat([step[EPISODE] for step in taken]).argsort(stable=True)
+        return {key: torch.cat([step[key] for step in taken])[order] for key in taken[0]}
 
     def shutdown(
         self, timeout: float | None = None, close_env: bool = True, raise_on_error: bool = True
@@ -126,17 +132,3 @@ class _Again:
         now = self._next[context.rows]
         self._next[context.rows] += 1
         return Act(self._actions[now])
-
-
-def _join(rows: list[Tensor], steps: list[Entries], num_envs: int) -> TensorDictBase:
-    """Return the steps of all episodes, one episode after the other. Shape: (T_total,)."""
-    env_of_step = torch.cat(rows)
-    lengths = env_of_step.bincount(minlength=num_envs)
-    first = lengths.cumsum(0) - lengths
-    targets = torch.cat([first[indices] + t for t, indices in enumerate(rows)])
-    batch = TensorDict({}, [len(targets)], device=targets.device)
-    for key, value in steps[0].items():
-        joined = value.new_empty(len(batch), *value.shape[1:])
-        batch.set(key, joined.index_copy_(0, targets, torch.cat([step[key] for step in steps])))
-    traj_ids = torch.empty_like(env_of_step).index_copy_(0, targets, env_of_step)
-    return batch.set(("collector", "traj_ids"), traj_ids)

@@ -83,7 +83,8 @@ class RolloutCollector(BatchedCollector):
         return {
             **step.act.entries,
             "action": step.act.action,
-            **self._outcome(step),
+            **self.base_env.outcome(step.after.end_reason, step.reward),
+            **self._kept_info(step),
             **{("next", name): value for name, value in step.following.inputs.items()},
             ("next", "episode_reward"): self._reward,
             ("next", "step_count"): self._count,

@@ -46,7 +46,7 @@ class JudgeSettings(HeldOutSettings):
     good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
     """Fraction of the oracle's success rate that a good policy exceeds."""
     certificate_flights: Annotated[int, Whole(0, 10_000_000, "rollouts")] = 3000
-    """Episodes that check a given certificate like drone-rl check; they can only refute it."""
+    """Episodes that check a certificate like drone-rl check; they can refute it, not prove it."""
     domain_flights: Annotated[int, Whole(0, 100_000, "episodes")] = 200
     """New episodes at strengths drawn from all required ranges together, one each; with 0 the
     required domain is not covered."""

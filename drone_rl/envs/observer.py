@@ -14,6 +14,7 @@ from drone_rl.envs.transforms import GrayPixels, RgbPixels, is_of_pixels, withou
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import State
 from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.errors import InputError
 
 Streams = Callable[[Tensor, tuple[int, ...]], list[np.random.Generator]]
 """From environments, (k,), whose episodes begin and the key of a purpose to fresh streams."""
@@ -103,10 +104,25 @@ class Stage:
         self.memory = with_rows(self.memory, rows, memory)
 
 
+def _check_has_no_memory(transform: Transform) -> None:
+    """Raise an `InputError` if a transform needs a method that is not called."""
+    for name in ("_step", "_call", "_reset"):
+        method = getattr(type(transform), name)
+        is_library = method.__module__.startswith(("torchrl.", "drone_rl."))
+        if method is not getattr(Transform, name) and not (name == "_reset" and is_library):
+            raise InputError(
+                f"{type(transform).__name__} has its own {name}, which is not called: "
+                "images pass through _apply_transform alone; derive what remembers something of "
+                "each environment from drone_rl.envs.CameraFault"
+            )
+
+
 class Pipeline:
     """Transforms of images, with their memory of each environment.
 
-    Camera faults have an effect only if `streams` gives them random numbers.
+    Camera faults have an effect only if `streams` gives them random numbers. Of other transforms
+    than those and TorchRL's `CatFrames`, `_apply_transform` is called alone; an `InputError` names
+    one that has its own `_step`, `_call` or `_reset`.
     """
 
     def __init__(
@@ -126,6 +142,7 @@ class Pipeline:
                 stack = stacked_frames(transform.N, transform.dim, *padding)
                 self._steps.append(Stage(stack))
             elif not isinstance(transform, CameraFault):
+                _check_has_no_memory(transform)
                 self._steps.append(transform)
             elif streams is not None:
                 number = sum(type(one) is type(transform) for one in self.transforms[:i])

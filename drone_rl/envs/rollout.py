@@ -198,7 +198,8 @@ class ActorAgent:
         self._actor: Any = actor
         written = set(self._actor.out_keys)
         self._carried = [key for key in actor.in_keys if ("next", key) in written]
-        self._state: dict[NestedKey, Tensor] = {}
+        self.memory: Mapping[NestedKey, Tensor] = {}
+        """State of a recurrent network by key, of each environment; it is replaced, not changed."""
 
     def act(self, context: StepContext) -> Act:
         """See `Agent`."""
@@ -207,20 +208,19 @@ class ActorAgent:
             self._start(context)
         read = TensorDict({}, [len(rows)], device=rows.device)
         for key in self._actor.in_keys:
-            state = self._state.get(key)
+            state = self.memory.get(key)
             read.set(key, _entry(context, key) if state is None else state[rows])
         acted = self._actor(read)
-        for key in self._carried:
-            self._state[key] = with_rows(self._state[key], rows, acted.get(("next", key)))
+        after = {key: acted.get(("next", key)) for key in self._carried}
+        self.memory = {k: with_rows(self.memory[k], rows, value) for k, value in after.items()}
         written = {key: acted.get(key) for key in acted.keys(True, True)}
         return Act(written["action"], written.get("logits"), written)
 
     def _start(self, context: StepContext) -> None:
         """Forget the episodes before those that start."""
         starting = context.rows[context.starts]
-        fresh = self._actor.network.start(len(starting))
-        for key, value in zip(self._carried, fresh, strict=True):
-            self._state[key] = with_rows(self._state.get(key), starting, value)
+        fresh = zip(self._carried, self._actor.network.start(len(starting)), strict=True)
+        self.memory = {k: with_rows(self.memory.get(k), starting, value) for k, value in fresh}
 
 
 def as_agent(policy: TensorDictModuleBase | Agent) -> Agent:

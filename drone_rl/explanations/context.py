@@ -46,7 +46,12 @@ class Context:
         unlike: Mapping[str, Any] | None = None,
         seed: RootSeed | None = None,
     ) -> None:
-        """See `explain`; raise InputError if a setting does not fit the policy."""
+        """Prepare the analysis of a policy; raise InputError if a setting does not fit it.
+
+        The environments are held out, have not been stepped, and have the policy's transforms; the
+        network is on the CPU. The verdict quotes `claim`, `measured` and `unlike`. The seed is the
+        settings' by default.
+        """
         self.env, self.network, self.claim = env, network, claim
         self.remembers = network.is_recurrent
         """Whether the policy remembers earlier frames in rollouts; of single frames, each counts as

@@ -8,15 +8,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from torchrl.envs import EnvBase
-
 from drone_rl.config.configuration import from_arguments
 from drone_rl.explanations import attribution, behavior, class_models, embedding, response, truth
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.results import Explanation
 from drone_rl.explanations.settings import ExplainSettings
-from drone_rl.policies import ImageNetwork
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
@@ -24,8 +21,6 @@ from drone_rl.sim.vocabulary import shown_actions
 from drone_rl.trust.coverage import find_domain
 from drone_rl.trust.recorded import record_verdict
 from drone_rl.trust.repetition import require_repeatable
-from drone_rl.trust.results import Proof
-from drone_rl.trust.shifts_results import SavedShifts
 from drone_rl.trust.verdict import FindClaim
 from drone_rl.utils.display import Result, page
 from drone_rl.utils.errors import InputError
@@ -75,8 +70,8 @@ class Explanations(Result):
         lines = []
         for name, explanation in self.policies.items():
             if verdict := explanation.verdict:
-                certainty = "" if verdict.certain else " (not certain)"
-                lines.append(f"{name}: {verdict.kind}{certainty}. {verdict.sentence}")
+                findings = (finding.text for finding in explanation.findings)
+                lines += [f"{name}: {verdict.line}", *findings]
         seed_line = Seeded(**self.seed.as_dict()).seed_line()
         return "\n".join([*lines, f"report: {self.report}", seed_line])
 
@@ -122,22 +117,18 @@ def explain(
 
     def explain_one(policy: BasePolicy, folder: Path) -> Explanation:
         require_repeatable(policy, seed=seed.value, renderer=settings.renderer)
-        network = policy.make_network()
         env = policy.make_env(num_envs, seed=seed.value, renderer=settings.renderer)
         with closing(env):
+            claim = None if find_claim is None else find_claim(policy, seed=seed)
+            measured = find_domain(policy, None, outputs)
+            network, unlike = policy.make_network(), policy.unlike
             return explain_policy(
-                env,
-                network,
+                Context(env, network, settings, claim, measured, unlike, seed),
                 folder,
-                settings,
                 name=policy.name,
                 provenance={**policy.origin, **provenance()},
                 progress=lambda title: progress(f"{policy.name}: {title}"),
                 sections={**SECTIONS, **(more_sections or {})},
-                claim=None if find_claim is None else find_claim(policy, seed=seed),
-                measured=find_domain(policy, None, outputs),
-                unlike=policy.unlike,
-                seed=seed,
             )
 
     with torch_threads(1):  # same results for any number of cores; more would gain nothing
@@ -165,35 +156,26 @@ def _named(policies: Given | Sequence[Given], outputs: str | Path) -> dict[str, 
 
 
 def explain_policy(
-    env: EnvBase,
-    network: ImageNetwork,
+    context: Context,
     folder: Path,
-    settings: ExplainSettings,
     *,
     name: str,
     provenance: dict[str, Any],
     progress: Callable[[str], None] = lambda _: None,
     sections: Mapping[str, Section] | None = None,
-    claim: Proof | None = None,
-    measured: SavedShifts | None = None,
-    unlike: Mapping[str, Any] | None = None,
-    seed: RootSeed | None = None,
 ) -> Explanation:
     """Compute all sections for one policy and write them to a folder.
 
-    The environments are held out, have not been stepped, and have the policy's transforms; the
-    network is on the CPU. `provenance` is the origin of the policy as plain values. `sections` are
-    `SECTIONS` by default; their order changes no result. `progress` is called with the title of
-    each. The verdict quotes `claim`, `measured` and `unlike`. The seed is the settings' by default.
+    `provenance` is the origin of the policy as plain values. `sections` are `SECTIONS` by default;
+    their order changes no result. `progress` is called with the title of each.
 
     Returns:
         The results, also in `explanation.json`; "left_out" gives the reason for each section that
         can't be computed for this policy.
 
     Raises:
-        InputError: The folder can't be written or a setting does not fit the policy.
+        InputError: The folder can't be written.
     """
-    context = Context(env, network, settings, claim, measured, unlike, seed)
     sections = SECTIONS if sections is None else sections
     results: dict[str, Any] = {}
     left_out: dict[str, str] = {}

@@ -76,12 +76,7 @@ def features(network: ImageNetwork, observations: Tensor, layer: str) -> Tensor:
 
 
 @torch.no_grad()
-def outputs(network: ImageNetwork, observations: Tensor) -> Tensor:
-    """Evaluate the network in batches. Shape: (T, C, h, w) to (T, number of outputs)."""
-    return torch.cat([network(part) for part in observations.split(BATCH)])
-
-
-@torch.no_grad()
 def probabilities(network: ImageNetwork, observations: Tensor) -> Tensor:
     """Return action probabilities (Eq. 9). (T, C, h, w) to (T, parts), see `Actions`."""
-    return network.actions.probabilities(outputs(network, observations))
+    outputs = torch.cat([network(part) for part in observations.split(BATCH)])
+    return network.actions.probabilities(outputs)

@@ -13,14 +13,16 @@ from pydantic import ConfigDict, Field
 from pydantic_core import to_json
 
 from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary
+from drone_rl.trust.findings import Finding, untested
 from drone_rl.trust.results import Verdict
-from drone_rl.trust.shifts_results import Robustness, SavedShifts, not_evaluated
+from drone_rl.trust.shifts_results import Robustness, SavedShifts, find
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
 from drone_rl.utils.intervals import Mean, Share
 from drone_rl.utils.limits import EXPLANATION_BYTES
 from drone_rl.utils.models import Model, Seeded
+from drone_rl.utils.text import render
 
 Array = np.ndarray
 """An array of a result; the fields say its shape."""
@@ -242,6 +244,13 @@ class Outcomes(Model):
     ground_changed: Mean
     """Rollouts whose outcome differs with another ground."""
 
+    @property
+    def finding(self) -> Finding:
+        """The effect of another ground, which should have none."""
+        text = render("drone_rl.explanations.report", "ground.j2", outcomes=self)
+        effect, tested = self.ground_changed.mean or 0.0, frozenset({"color"})
+        return Finding(text=text, effect=effect, tested=tested, section="truth")
+
 
 class Truth(MapTests):
     """Tests of the heat maps, and effects of changes to the scene."""
@@ -453,9 +462,16 @@ class Explanation(Seeded):
         return saved.shifts if saved and verdict and not saved.why_not(verdict) else None
 
     @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What the policy's success depends on, the largest effect first."""
+        outcomes = self.truth.outcomes if self.truth else None
+        others = [outcomes.finding] if outcomes else []
+        return find(self.verdict, self.shifts, others) if self.verdict else tuple(others)
+
+    @property
     def untested(self) -> list[str]:
-        """Return which of colors, light and sizes were not evaluated."""
-        return not_evaluated(self.robustness)
+        """Which of colors, light and sizes no finding tests."""
+        return untested(self.findings)
 
     @classmethod
     def load(cls, folder: Path) -> Self:

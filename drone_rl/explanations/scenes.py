@@ -1,7 +1,6 @@
 """Render any state as the policy observes it, and label the region of each pixel."""
 
 import enum
-from collections.abc import Sequence
 
 import torch
 from torch import Tensor
@@ -73,12 +72,9 @@ class Scenes:
         """Return the observations of scenes. Shape: (T, C, h, w)."""
         return self.transform(self.frames(state))
 
-    def transform(self, frames: Tensor, earlier: Sequence[Tensor] = ()) -> Tensor:
-        """Apply the transforms to RGB frames. Shape: (T, H, W, 3) to (T, C, h, w).
-
-        `earlier` has frames of earlier steps, oldest first; missing ones are those of a start.
-        """
-        return Pipeline(self._transforms).of_frames([*earlier, frames])
+    def transform(self, frames: Tensor) -> Tensor:
+        """Apply the transforms to RGB frames. Shape: (T, H, W, 3) to (T, C, h, w)."""
+        return Pipeline(self._transforms)(frames)
 
     def observer(self, appearance: Appearance | None = None) -> Observer:
         """Return what observes rollouts in one appearance, without camera faults."""

@@ -16,7 +16,7 @@ distribution and any dependence within episodes.
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import torch
@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.explanations import patches
+from drone_rl.explanations.context import Context
 from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.patches import (
     PatchGrid,
@@ -40,9 +41,8 @@ from drone_rl.explanations.results import (
     Pointing,
 )
 from drone_rl.explanations.rollouts import spread_frames
-from drone_rl.explanations.scenes import Scenes, alternatives, empty_scene
+from drone_rl.explanations.scenes import alternatives
 from drone_rl.policies import ImageNetwork
-from drone_rl.sim.tasks import State
 from drone_rl.utils.intervals import Mean, episode_means, mean_interval, median_bounds
 
 MapOf = Callable[[ImageNetwork, Tensor, Tensor], Tensor]
@@ -67,7 +67,7 @@ class Trial:
     episode: NDArray  # (T,)
     grid: PatchGrid
     frames_without_effect: int = 0  # left out, as no patch affects the policy
-    seed: int = 0
+    seed: int = 0  # of shuffled weights
 
     def __getitem__(self, rows: NDArray) -> "Trial":
         """Return the trial on some of its frames, given as indices or as a mask."""
@@ -99,58 +99,29 @@ class Trial:
         return self[spread_frames(self.episode, 1)]
 
 
-def measure(
-    network: ImageNetwork,
-    actions: Tensor,
-    observations: Tensor,
-    others: Sequence[Tensor],
-    absent: Tensor,
-    episode: NDArray,
-    seed: int = 0,
-) -> Trial:
-    """Return a trial on the frames in which some patch affects a policy.
-
-    `others` are the observations (T, C, h, w) with other contents, see `alternatives`; `absent` is
-    that of the scene without targets (C, h, w). Actions to explain and episodes have shape (T,);
-    the seed is that of noise and shuffled weights.
-    """
+def make_trial(context: Context) -> Trial:
+    """Return a trial on some frames of each rollout, those in which a patch affects the policy."""
+    data, scenes, network = context.dataset, context.scenes, context.network
+    rows, seed = spread_frames(data.episode, FRAMES_AN_EPISODE), context.seed.value
+    index = torch.from_numpy(rows)
+    state = data.state(scenes.task, scenes.worlds.dynamics)[index].to(scenes.worlds.device)
+    others = list(alternatives(scenes, state, seed).values())
+    observations = scenes.observe(state)
     grid = make_grid(*observations.shape[-2:])
     effects = patches.patch_effects(network, observations, others, grid)
     moved = patches.has_effect(effects)
     trial = Trial(
         network=network,
         observations=observations,
-        actions=actions,
+        actions=data.tensor("actions")[index],
         effects=effects,
-        placebos=placebo_maps(observations, absent, others, seed),
-        episode=episode,
+        placebos=placebo_maps(observations, context.absent, others, seed),
+        episode=data.episode[rows],
         grid=grid,
         frames_without_effect=int((~moved).sum()),
         seed=seed,
     )
     return trial[moved]
-
-
-def make_trial(
-    scenes: Scenes,
-    network: ImageNetwork,
-    state: State,
-    actions: Tensor,
-    episode: NDArray,
-    seed: int = 0,
-) -> Trial:
-    """Return a trial on some frames of T steps of a policy's rollouts.
-
-    The states are those of `RolloutDataset.state()`, with the actions taken there. The seed is also
-    that of the places of targets.
-    """
-    rows = spread_frames(episode, FRAMES_AN_EPISODE)
-    index = torch.from_numpy(rows)
-    sampled = state[index].to(scenes.worlds.device)
-    others = list(alternatives(scenes, sampled, seed).values())
-    absent = scenes.observe(empty_scene(scenes))[0]
-    seen = scenes.observe(sampled)
-    return measure(network, actions[index], seen, others, absent, episode[rows], seed)
 
 
 def method_maps(explainer: Explainer) -> dict[str, MapOf]:

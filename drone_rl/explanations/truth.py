@@ -25,7 +25,7 @@ def section(context: Context) -> Truth:
     data, scenes, network = context.dataset, context.scenes, context.network
     episode, seed = data.episode, context.seed.value
     state = data.state(scenes.task, scenes.worlds.dynamics).to(str(context.env.device))
-    trial = trust.make_trial(scenes, network, state, data.tensor("actions"), episode, seed)
+    trial = trust.make_trial(context)
     changes = intervene(scenes, network, state, data.tensor("regions"), seed=seed)
     shown_frame = clear_frame(changes[0])
     methods = trust.method_maps(context.explainer) if network.has_weights else {}

@@ -199,7 +199,7 @@ class Worlds:
                 f"{type(self.task).__name__}.step must return two things: the states after the "
                 "step, and the rewards, a tensor with one number for each environment"
             )
-        is_usable = (reward <= LARGEST_REWARD) & (reward >= -LARGEST_REWARD)  # nor NaN
+        is_usable = reward.abs() <= LARGEST_REWARD  # nor NaN
         if not bool(is_usable.all()):
             raise InputError(
                 f"{type(self.task).__name__}.step returns a reward of {reward[~is_usable][0]:g}; "

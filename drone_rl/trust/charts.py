@@ -18,8 +18,8 @@ from drone_rl.utils.text import percent
 _COLUMNS = 4
 _POLICY, _ORACLE, _GOOD = css(INK), css(MUTED), css(GOOD)
 _OTHERS = {
-    "drifting": (css(FAINT), "--", "drifting"),
-    "onset": (css(FAINT), ":", "from step 20 on"),
+    "drifting": (css(FAINT), "--", "... if the perturbation drifts"),
+    "onset": (css(FAINT), ":", "... if it begins at step 20"),
 }
 _SCALE = 3
 _TILES, _GAP, _HEADING = 3, 8, 28

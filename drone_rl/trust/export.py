@@ -15,8 +15,9 @@ from drone_rl.policies.zoo.files import exported_bytes
 from drone_rl.sim.vocabulary import some_cubes
 from drone_rl.trust.coverage import find_domain
 from drone_rl.trust.evaluate import held_out_environments
+from drone_rl.trust.findings import untested
 from drone_rl.trust.results import Verdict
-from drone_rl.trust.shifts_results import SavedShifts, not_evaluated
+from drone_rl.trust.shifts_results import SavedShifts, find
 from drone_rl.trust.verdict import FindClaim, judge_policy
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_bytes, write_all_atomically
@@ -188,10 +189,11 @@ class Card(Stored):
         measured, verdict = self.shifts, self.verdict
         if measured is not None and measured.why_not(verdict):
             measured = None
+        findings = find(verdict, measured)
         columns = {
             "most probable actions": verdict.greedy,
             "sampled actions": verdict.sampled,
-            f"best blind baseline ({verdict.best_baseline})": (
+            f"best random or constant actions ({verdict.best_baseline})": (
                 verdict.baselines[verdict.best_baseline]
             ),
             "oracle": verdict.baselines["oracle"],
@@ -202,6 +204,7 @@ class Card(Stored):
             c=self,
             measured=measured,
             columns={name: of for name, of in columns.items() if of is not None},
-            unknown=not_evaluated(measured and measured.shifts),
+            findings=findings,
+            unknown=untested(findings),
             cubes=None if "name" in self.task else some_cubes(self.task),
         )

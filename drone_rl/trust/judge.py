@@ -20,9 +20,10 @@ from drone_rl.policies.zoo import fingerprint, parse
 from drone_rl.trust.baselines import BASELINES
 from drone_rl.trust.coverage import check_required, find_domain
 from drone_rl.trust.evaluate import held_out_environments
+from drone_rl.trust.findings import Finding
 from drone_rl.trust.results import Proof, Verdict
 from drone_rl.trust.rule import Rule
-from drone_rl.trust.shifts_results import Coverage, SavedShifts
+from drone_rl.trust.shifts_results import Coverage, SavedShifts, find
 from drone_rl.trust.verdict import FindClaim, judge_policy
 from drone_rl.utils.display import Result, TableResult, paragraph
 from drone_rl.utils.errors import InputError
@@ -45,8 +46,8 @@ class Judgement(Result, Verdict, Provenance):
     """The given file or that next to the policy, even if the verdict does not quote it."""
     shifts: str | None = None
     """File of its robustness evaluation, if there is one."""
-    domain: str | None = None
-    """The operating domain as text, if it was measured."""
+    findings: tuple[Finding, ...] = ()
+    """What its success depends on, the largest effect first."""
     required_domain: Coverage | None = None
     """The test of the required operating domain, if one is required."""
 
@@ -73,9 +74,10 @@ class Judgement(Result, Verdict, Provenance):
         self.replace(**provenance()).write_json(path)
 
     def __str__(self) -> str:
-        """Return the verdict, the operating domain, what it does not cover, and the seed."""
-        required = "" if self.required_domain is None else str(self.required_domain)
-        return "\n".join(filter(None, (self.line, self.domain, required, self.seed_line())))
+        """Return the verdict, its findings, what a required domain lacks, and the seed."""
+        required = [] if self.required_domain is None else [str(self.required_domain)]
+        texts = [finding.text for finding in self.findings]
+        return "\n".join([self.line, *texts, *required, self.seed_line()])
 
     def _repr_html_(self) -> str:
         return "".join(map(paragraph, str(self).splitlines()))
@@ -247,7 +249,7 @@ def judge_one(
         weights=identify(loaded),
         certificate=None if claim is None else claim.path,
         shifts=None if measured is None else measured.path,
-        domain=None if measured is None else measured.text(verdict, brief=True),
+        findings=find(verdict, measured),
         required_domain=coverage,
     )
 

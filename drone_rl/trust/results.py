@@ -5,6 +5,7 @@ from typing import Any
 import pydantic
 
 from drone_rl.sim.vocabulary import CUBES, TaskVocabulary
+from drone_rl.trust.findings import Finding
 from drone_rl.trust.rule import Quantity, VerdictKind
 from drone_rl.utils.intervals import Mean, Share
 from drone_rl.utils.models import Seeded, Stored
@@ -207,7 +208,7 @@ class Verdict(Seeded):
     rule: str = ""
     """The rule as text."""
     error_rate: float
-    """Largest probability of a certain and wrong verdict."""
+    """Largest fraction of cases in which the rule gives a certain and wrong verdict."""
     good_share: float
     """Fraction of the oracle's success rate that a good policy exceeds."""
     terms: TaskVocabulary = CUBES
@@ -242,6 +243,17 @@ class Verdict(Seeded):
     def sentence(self) -> str:
         """The verdict as text."""
         return render("drone_rl.trust", "verdict.j2", v=self)
+
+    @property
+    def own_findings(self) -> list[Finding]:
+        """What the episodes of the verdict show."""
+        success, drawing = self.greedy.success.share, self.drawing
+        effects = {
+            "failures.j2": 0.0 if success is None else 1.0 - success,
+            "sampled.j2": abs(drawing.mean or 0.0) if drawing else 0.0,
+        }
+        texts = {name: render("drone_rl.trust", name, v=self) for name in effects}
+        return [Finding(text=texts[name], effect=effects[name]) for name in effects if texts[name]]
 
     @property
     def quoted(self) -> Proof | None:

@@ -1,8 +1,8 @@
 """The rule of the verdict: quantities, thresholds, and the kind in every corner of a box.
 
 The level of a quantity is the number of its thresholds that it exceeds; the levels decide the kind.
-The intervals of all quantities hold at once with the required probability. The verdict is certain
-if all levels within the intervals lead to the same kind.
+In all but the allowed fraction of cases, all intervals hold at once. The verdict is certain if all
+levels within the intervals lead to the same kind.
 """
 
 import enum
@@ -75,7 +75,7 @@ class Rule(Model):
     """Fraction of the way from the best random or constant baseline to the oracle up to which a
     policy is poor."""
     error_rate: Fraction = 0.05
-    """Largest probability of a certain and wrong verdict."""
+    """Largest fraction of cases in which the verdict is certain and wrong."""
     strata: tuple[str, ...] = SIDES
     """Of the task, from left to right; one-sided policies differ between first and last."""
     blind_baselines: tuple[str, ...] = BLIND_BASELINES
@@ -138,8 +138,9 @@ more than {100 * self.other_share:g}% on the other, both offered. poor: neither,
 than {self.poor_margin:.0%} of the way from luck to the oracle, in cubes; luck is the best of \
 random actions and of each action always, flown in the same worlds. none of these: anything else. \
 Every episode counts once: a share is a mean over episodes. The verdict is certain if the kind is \
-the same wherever the quantities lie within intervals that hold all at once with \
-{100 * (1 - self.error_rate):g}% probability, whatever depends on what within an episode."""
+the same wherever the quantities lie within their intervals. The procedure that gives them errs in \
+at most {100 * self.error_rate:g}% of cases, that is, an interval misses its quantity, whatever \
+depends on what within an episode."""
 
 
 class Quantity(Stored):

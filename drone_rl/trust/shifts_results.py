@@ -3,7 +3,7 @@
 import base64
 import math
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -14,6 +14,7 @@ from drone_rl.config.commands import ShiftSettings
 from drone_rl.config.transforms import Fault
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.trust.axes_table import NAMES, TABLE
+from drone_rl.trust.findings import Finding
 from drone_rl.trust.results import Difference, Verdict
 from drone_rl.utils.display import Result
 from drone_rl.utils.errors import InputError
@@ -268,6 +269,13 @@ class Robustness(Seeded, Provenance):
         return sum(defined) / max(len(defined), 1)
 
     @property
+    def weakest(self) -> tuple[str, Level] | None:
+        """The axis and strength, possible for the oracle, with the fewest successful episodes."""
+        levels = [(n, level) for n, of in self.axes.items() for level in of.allowed]
+        possible = (at for at in levels if not at[1].impossible)
+        return min(possible, key=lambda at: at[1].constant.success.share or 0.0, default=None)
+
+    @property
     def sentence(self) -> str:
         """The operating domain as text."""
         return render("drone_rl.trust", "shifts.j2", s=self)
@@ -436,21 +444,26 @@ class SavedShifts(Stored):
             )
         return None
 
-    def text(self, verdict: Verdict, *, brief: bool = False) -> str:
-        """Return what a verdict quotes, or why it quotes nothing; `brief` for a terminal."""
-        values = {"of": self, "why": self.why_not(verdict), "brief": brief}
-        return render("drone_rl.trust", "quoted_shifts.j2", **values)
+    def finding(self, verdict: Verdict) -> Finding:
+        """Return the evaluation in a line, or why a verdict does not quote it."""
+        why, shifts, effect = self.why_not(verdict), self.shifts, 0.0
+        text = render("drone_rl.trust", "shifts_finding.j2", of=self, why=why)
+        if shifts is None or why:
+            return Finding(text=text)
+        if shifts.weakest is not None:
+            worst = shifts.weakest[1].constant.success
+            effect = max(0.0, (shifts.plain.success.share or 0.0) - (worst.share or 0.0))
+        tested = frozenset(along.group for along in shifts.axes.values())
+        return Finding(text=text, effect=effect, tested=tested, section="shifts")
 
-    def not_evaluated(self, verdict: Verdict) -> list[str]:
-        """Return which of colors, light and sizes were not evaluated."""
-        return not_evaluated(None if self.why_not(verdict) else self.shifts)
 
-
-def not_evaluated(shifts: Robustness | None) -> list[str]:
-    """Return which of colors, light and sizes a robustness evaluation leaves out."""
-    tested = {along.group for along in shifts.axes.values()} if shifts else set()
-    names = {"color": "colors", "light": "light", "object size": "sizes"}
-    return [name for group, name in names.items() if group not in tested]
+def find(
+    verdict: Verdict, measured: SavedShifts | None, others: Sequence[Finding] = ()
+) -> tuple[Finding, ...]:
+    """Return the findings of a verdict, of a robustness evaluation, and others, by effect."""
+    shifted = [] if measured is None else [measured.finding(verdict)]
+    every = [*verdict.own_findings, *shifted, *others]
+    return tuple(sorted(every, key=lambda finding: -finding.effect))
 
 
 class Need(Model):

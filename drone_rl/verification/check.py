@@ -1,12 +1,13 @@
 """`drone-rl check`: check a certificate independently of the prover."""
 
-import dataclasses
 import functools
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from pydantic import Field
+
+from drone_rl.config import TaskSettings
 from drone_rl.config.commands import CheckSettings
 from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.policies.policy import Policy, load_policy
@@ -17,9 +18,9 @@ from drone_rl.utils.exit_codes import CERTIFICATE_REFUSED
 from drone_rl.utils.files import as_path, newest
 from drone_rl.utils.models import Seeded
 from drone_rl.utils.progress import Progress, as_progress
-from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.text import exact_percent
+from drone_rl.utils.provenance import Provenance, provenance
+from drone_rl.utils.seeding import with_seed
+from drone_rl.utils.text import exact_percent, percent
 from drone_rl.verification.checker.certificate import (
     Certificate,
     certificate_file,
@@ -29,61 +30,46 @@ from drone_rl.verification.checker.certificate import (
 from drone_rl.verification.checker.checker import CheckFindings, check_certificate
 
 
-@dataclasses.dataclass(frozen=True)
-class Check(Result):
-    """The result of checking a certificate."""
+class Check(Result, CheckFindings, Seeded, Provenance):
+    """The result of checking a certificate, as in `check.json`; the seed is of the placements."""
 
-    path: Path
+    certificate: str
     """The certificate's file."""
-    policy: Policy
-    """The policy, in the task of the certificate."""
-    settings: CheckSettings
-    certificate: Certificate
+    policy: str
+    """The policy's file."""
+    task: dict[str, Any]
+    """Settings of the certificate's task."""
+    stated: Certificate = Field(exclude=True)
     """The statements."""
-    findings: CheckFindings
-    seed: RootSeed
-    """Root seed of the simulated placements."""
-
-    @property
-    def accepted(self) -> bool:
-        """Whether nothing contradicts the certificate."""
-        return self.findings.accepted
 
     @property
     def exit_code(self) -> int:
         """Exit status of a process that reports it."""
         return 0 if self.accepted else CERTIFICATE_REFUSED
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values, as in `check.json`."""
-        return {
-            "certificate": str(self.path),
-            "policy": str(self.policy.path),
-            "task": self.policy.task.values(),
-            **self.seed.as_dict(),
-            **self.findings.model_dump(mode="json"),
-            **provenance(),
-        }
-
     def save(self, path: Path) -> None:
         """Write `check.json`."""
-        path.write_text(json.dumps(self.as_dict(), indent=2))
+        self.write_json(path)
 
     def lines(self) -> list[str]:
         """Return the result, the statements, and each finding in one line."""
-        stated, seed = self.certificate, Seeded(**self.seed.as_dict())
-        task = self.policy.state["description"]["task"]
-        changed = [f"{n}={v}" for n, v in self.policy.task.values().items() if task.get(n) != v]
+        stated, usual = self.stated, TaskSettings().values()
+        changed = [f"{n}={v}" for n, v in self.task.items() if usual.get(n) != v]
+        found = "accepted: not refuted" if self.accepted else "refused"
+        bound = (
+            f", wrong on at most {percent(self.wrong_at_most, 2)} of placements (95% confidence)"
+        )
         return [
-            f"{'accepted' if self.accepted else 'refused'}: {self.path}, of policy "
-            f"{self.policy.name}{' with ' if changed else ''}{', '.join(changed)}, "
-            f"{sum(map(len, stated.groups))} boxes, {sum(self.findings.flights.values())} flights, "
-            f"{self.findings.contradicted} of them ended otherwise than stated",
+            f"{found}: {self.certificate}, of policy {stated.policy.name}"
+            f"{' with ' if changed else ''}{', '.join(changed)}, "
+            f"{sum(map(len, stated.groups))} boxes, {sum(self.flights.values())} flights, "
+            f"{self.contradicted} of them ended otherwise than stated"
+            f"{bound if self.accepted else ''}",
             *(f"stated: {exact_percent(of.share)} {of}" for of in stated.outcomes),
             f"stated: {exact_percent(stated.undecided.share)} undecided",
-            *(f"refused: {line}" for line in self.findings.lines()),
-            *(f"note: {line}" for line in [seed.seed_warning("placements")] if line),
-            seed.seed_line("placements"),
+            *(f"refused: {line}" for line in super().lines()),
+            *(f"note: {line}" for line in [self.seed_warning("placements")] if line),
+            self.seed_line("placements"),
         ]
 
     def __str__(self) -> str:
@@ -132,8 +118,7 @@ def check(
     weights = policy.state["policy"]
     required = policy.in_task(**as_changes(task, "task")).task if task else None
     check_same_policy(stated, policy.description, weights, required)
-    policy = dataclasses.replace(policy, description=stated.policy.description)
-    findings = check_certificate(
+    found = check_certificate(
         stated,
         weights,
         flights=settings.flights,
@@ -142,7 +127,15 @@ def check(
         renderer=settings.renderer,
         report=functools.partial(as_progress(progress), "flown"),
     )
-    return Check(path, policy, settings, stated, findings, seed)
+    return Check(
+        **dict(found),
+        certificate=str(path),
+        policy=str(policy.path),
+        task=stated.task.values(),
+        stated=stated,
+        **seed.as_dict(),
+        **provenance(),
+    )
 
 
 def _find(certificate: str | Path, outputs: str | Path) -> Path:

@@ -1,12 +1,14 @@
 """Policies that deceive an analysis with a known seed, rounding or forged files do not succeed."""
 
 import functools
+import json
 
 import pytest
 
 import drone_rl
 from benchmarks import gamed, gamed_certificates, gamed_memory, gamed_rounding
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import silent
 
 
 def test_a_policy_that_depends_on_the_batch_is_not_good(tmp_path):
@@ -35,4 +37,20 @@ def test_deceived_analyses_are_counted(setup, monkeypatch):
     for module in (gamed_memory, gamed_rounding, gamed_certificates):
         outcomes = {f"{module} fooled": lambda: True, f"{module} not": lambda: False}
         monkeypatch.setattr(module, "cases", lambda folder, outcomes=outcomes: outcomes)
-    assert gamed.bench_gamed(setup) == {"gamed_verdicts": 3, "gamed_total": 6}
+    monkeypatch.setattr(gamed_certificates, "accepted_many_boxes", lambda folder, seeds: 1)
+    found = gamed.bench_gamed(setup)
+    assert (found["gamed_verdicts"], found["gamed_total"]) == (3, 6)
+    assert found["forged_boxes_proved"] == 1
+
+
+def test_a_certificate_of_many_boxes_is_not_proved(monkeypatch, tmp_path):
+    """In small: 4 boxes of one cube, no episodes that check it; the proof refutes it."""
+    one_sided = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
+    stated = gamed_certificates.many_boxes(one_sided, count=4, episodes=50)
+    boxes = stated["outcomes"][0]["boxes"]
+    assert boxes == [[[-6.0, -3.0]], [[-3.0, 0.0]], [[0.0, 3.0]], [[3.0, 6.0]]]
+    (tmp_path / "certificate.json").write_text(json.dumps(stated))
+    how = {"certificate": tmp_path, "certificate_flights": 0, "episodes": 1, "progress": silent}
+    assert drone_rl.judge(one_sided, seed=3, **how).status("proved") == 16
+    with pytest.raises(InputError, match=r"a proof finds 63\.8% of them"):
+        drone_rl.judge(one_sided, require="proved", **how)

@@ -2,10 +2,11 @@
 
 import pytest
 import torch
-from torchrl.envs import CatFrames, Compose, TransformedEnv
+from torchrl.envs import CatFrames, Compose, ToTensorImage, TransformedEnv
 
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.envs import (
+    CameraFault,
     CropRows,
     DroneEnv,
     GrayPixels,
@@ -15,8 +16,10 @@ from drone_rl.envs import (
     RgbPixels,
     StandardizePixels,
 )
-from drone_rl.envs.fault_models import late_frames
+from drone_rl.envs.fault_models import FaultModel, late_frames
 from drone_rl.envs.observer import Observer, Stage
+from drone_rl.envs.transforms import PixelTransform
+from drone_rl.utils.errors import InputError
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
 
@@ -68,6 +71,41 @@ def test_stacks_repeat_the_first_frame_of_each_environment():
 def test_faults_need_random_streams():
     images = torch.rand(2, 1, 4, 4)
     assert torch.equal(Pipeline([Noise(0.5)])(images), images)
+
+
+def test_transforms_with_methods_that_are_not_called_are_refused():
+    class Flicker(PixelTransform):
+        def _apply_transform(self, obs):
+            return obs
+
+        def _step(self, tensordict, next_tensordict):
+            return next_tensordict
+
+    class Forgetting(Flicker):
+        _step = PixelTransform._step
+
+        def _reset(self, tensordict, tensordict_reset):
+            return tensordict_reset
+
+    for kind, name in ((Flicker, "_step"), (Forgetting, "_reset")):
+        with pytest.raises(InputError, match=rf"{kind.__name__} has its own {name}, .*CameraFault"):
+            DroneEnv(1, SHORT, transforms=[GrayPixels(), kind()])
+    DroneEnv(1, SHORT, transforms=[ToTensorImage(in_keys=["pixels"], out_keys=["pixels"])])
+
+
+def test_a_fault_of_ones_own_remembers_each_environment():
+    """It shows the darkest image of the episode so far."""
+    darkest = FaultModel(
+        show=lambda images, memory, blank: memory,
+        begin=lambda images, sample: images,
+        update=lambda memory, images, sample: memory.minimum(images),
+    )
+    pipeline = Pipeline([CameraFault(darkest)], lambda rows, key: [None] * len(rows), 2)
+    assert pipeline(numbers(0.5, 0.2)).flatten().tolist() == pytest.approx([0.5, 0.2])
+    after = pipeline(numbers(0.4, 0.9), starts=torch.tensor([False, True]))
+    assert after.flatten().tolist() == pytest.approx([0.4, 0.9])
+    last = pipeline(numbers(0.6, 0.8), starts=False)
+    assert last.flatten().tolist() == pytest.approx([0.4, 0.8])
 
 
 def test_faults_of_an_evaluation_act_before_the_transforms():

@@ -64,9 +64,9 @@ def test_mistakes_name_the_argument(change, message, tmp_path):
 def test_all_policies_are_explained_from_one_fresh_seed(tmp_path, monkeypatch):
     seen = []
 
-    def note(env, network, folder, settings, *, seed, **kwargs):
-        states = env.base_env.state_dict()["random_states"]
-        seen.append((seed, settings.seed, states[0]))
+    def note(context, folder, **kwargs):
+        states = context.env.base_env.state_dict()["random_states"]
+        seen.append((context.seed, context.settings.seed, states[0]))
         return explanation("good", certain=True)
 
     monkeypatch.setattr(explaining, "explain_policy", note)
@@ -87,8 +87,10 @@ def test_the_result_prints_verdict_and_report(tmp_path):
     of_x = explanation("good", certain=False)
     shown = Explanations(tmp_path, tmp_path / "report.html", {"x": of_x}, SEED)
     first, *rest = str(shown).splitlines()
-    assert first.startswith("x: good (not certain). This policy looks good")
-    assert rest == [f"report: {tmp_path / 'report.html'}", "environments: seed 6 (fresh)"]
+    assert first.startswith("x: good (not certain): This policy looks good")
+    assert rest[0].startswith("It fails in 40.0% of episodes, most with cubes on its left")
+    assert rest[1].startswith("With sampled actions it collects every cube in 40.0%")
+    assert rest[-2:] == [f"report: {tmp_path / 'report.html'}", "environments: seed 6 (fresh)"]
     assert shown._repr_html_().startswith(
         '<iframe sandbox="allow-scripts" srcdoc="&lt;h1&gt;trusted?'
     )
@@ -100,9 +102,8 @@ SMALL = ExplainSettings(frames=40, episodes=6, perplexity=5, seed=3)
 def explain(env, network, folder, settings=SMALL, **kwargs):
     origin = {"policy": "a test", "trained": {}}
     with quick():
-        return explain_policy(
-            env, network, folder, settings, name="test", provenance=origin, **kwargs
-        )
+        context = Context(env, network, settings)
+        return explain_policy(context, folder, name="test", provenance=origin, **kwargs)
 
 
 def test_the_order_of_sections_changes_no_result(make_pipeline, tmp_path):
@@ -159,9 +160,7 @@ def posts():
 def test_all_sections_work_with_another_task(posts, tmp_path):
     """Nothing of an explanation needs cubes, only targets."""
     with quick():
-        numbers = explain_policy(
-            posts.env, posts.network, tmp_path, posts.settings, name="posts", provenance={}
-        )
+        numbers = explain_policy(posts, tmp_path, name="posts", provenance={})
     assert numbers.verdict.num_cubes == NUM_POSTS
     assert [row.side for row in numbers.response.rows] == ["left", "right"]
     assert numbers.truth.outcomes.collected.keys() == {"as it was", "moved left", "moved right"}

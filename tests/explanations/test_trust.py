@@ -1,6 +1,7 @@
 """Tests of heat maps, on a policy whose response is known."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.patches import PatchGrid, placebo_maps
 from drone_rl.explanations.results import Likeness
 from drone_rl.explanations.rollouts import spread_frames
+from drone_rl.explanations.scenes import empty_scene
 from drone_rl.explanations.trust import (
     Trial,
     check_maps,
@@ -145,11 +147,15 @@ def test_methods_use_the_network_of_the_call(trial):
 
 
 def test_a_trial_of_a_policy_in_the_simulator(world, scenes, dataset):
-    network = world[2]
-    made = trust.make_trial(
-        scenes, network, dataset.state(scenes.task), dataset.tensor("actions"), dataset.episode
+    network, absent = world[2], scenes.observe(empty_scene(scenes))[0]
+    context = SimpleNamespace(
+        dataset=dataset,
+        scenes=scenes,
+        network=network,
+        absent=absent,
+        seed=SimpleNamespace(value=0),
     )
-    assert made.seed == 0
+    made = trust.make_trial(context)
     assert made.effects.shape == (len(made.episode), 40) == (len(made.observations), 40)
     rows = spread_frames(dataset.episode, trust.FRAMES_AN_EPISODE)
     assert len(made.episode) + made.frames_without_effect == len(rows)
@@ -159,9 +165,7 @@ def test_a_trial_of_a_policy_in_the_simulator(world, scenes, dataset):
     assert "mean difference to re-rendered patches" in made.placebos
     with torch.no_grad():
         network.layers.logits.weight.zero_()
-    blind = trust.make_trial(
-        scenes, network, dataset.state(scenes.task), dataset.tensor("actions"), dataset.episode
-    )
+    blind = trust.make_trial(context)
     assert len(blind.episode) == 0 and blind.frames_without_effect == len(rows)
     found = check_maps(blind, method_maps(Explainer(network, torch.zeros(1, 25, 64))))
     assert found.trusted is None

@@ -97,7 +97,7 @@ def test_card_quotes_and_copies_a_robustness_evaluation(tmp_path, name, is_good)
         assert beside.read_bytes() == made.read_bytes()
         again = drone_rl.load_policy(tmp_path / "mine.safetensors")
         assert find_domain(again).path == str(beside)
-        assert "Read from mine.shifts.json, dated" in card  # and no path of this machine
+        assert "see mine.shifts.json, dated" in card  # and no path of this machine
 
 
 def test_origin_in_a_checkpoint_is_ignored(checkpoint):
@@ -144,11 +144,15 @@ def lines(**changes):
 def test_card():
     found = lines()
     assert found[0] == "# mine"
-    assert found[2].startswith("**none of these** (certain, with a chance of error of at most 5%)")
-    baselines = "best blind baseline (forward) | oracle |"
-    assert found[4] == f"| | most probable actions | sampled actions | {baselines}"
-    assert "| cubes collected | 80.0% (78.0% to 82.0%) | 70.0% (" in found[7]
-    assert found[8].startswith("| of those left | not offered | 40.0%")
+    assert found[2].startswith(
+        "**none of these** (certain: the procedure errs in at most 5% of cases)"
+    )
+    assert found[4].startswith("- It fails in 40.0% of episodes, most")
+    assert found[5].startswith("- With sampled actions it collects every cube in 40.0%")
+    baselines = "best random or constant actions (forward) | oracle |"
+    table = found[found.index(f"| | most probable actions | sampled actions | {baselines}") :]
+    assert "| cubes collected | 80.0% (78.0% to 82.0%) | 70.0% (" in table[3]
+    assert table[4].startswith("| of those left | not offered | 40.0%")
     at = found.index("| fails first at | episodes | of | rate |")
     assert found[at + 2] == "| side: left | 150 | 300 | 50.0% (48.0% to 52.0%) |"
     assert found[at + 3].startswith("| end: step_limit | 40 | 400 |") and found[at + 4] == ""

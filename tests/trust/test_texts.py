@@ -2,11 +2,21 @@
 
 import pytest
 
+from drone_rl.trust.findings import Finding, untested
 from drone_rl.trust.results import Verdict
-from drone_rl.trust.shifts_results import Robustness, SavedShifts, inward
+from drone_rl.trust.shifts_results import Robustness, SavedShifts, find, inward
 from tests.evidence import PROOF, SAVED_SHIFTS, SHIFTS, VERDICT, changed
 
-KINDS = {"verdict": (Verdict, VERDICT), "shifts": (Robustness, SHIFTS)}
+KINDS = {
+    "verdict": (lambda result: Verdict.read(result).sentence, VERDICT),
+    "findings": (
+        lambda result: " ".join(one.text for one in Verdict.read(result).own_findings),
+        VERDICT,
+    ),
+    "shifts": (lambda result: Robustness.read(result).sentence, SHIFTS),
+    "line": (lambda result: SavedShifts.read(result).finding(GOOD).text, SAVED_SHIFTS),
+}
+GOOD = Verdict.read({**VERDICT, "kind": "good"})
 TRIVIAL = {"baselines.forward.success.share": 0.95}
 WIND = {"unlike": {"wind": {"own": [0.0, 0.0, 0.0], "flown": [5.0, 0.0, 0.0]}}}
 NEVER_FAILED = {"failures.largest": None, "failures.bound.successes": 0}
@@ -55,11 +65,11 @@ CLAIMS = [
      {"baselines.forward.shares.all.mean": 0.0}),
     ("verdict", 'This task is trivial: the baseline "always forward" collects', TRIVIAL,
      {"baselines.forward.success.share": 0.89}),
-    ("verdict", "on its left: in 150 of 300 episodes that offered it (50.0%); 10.0% of all end at",
+    ("findings", "on its left: in 150 of 300 episodes that offered it (50.0%); 10.0% of all end at",
      {}, {"failures.rows.1.lower95": 0.02}),
-    ("verdict", "It failed in none of 400 episodes, so it fails in at most 45.0% (95% CI).",
+    ("findings", "It failed in none of 400 episodes, so it fails in at most 45.0% (95% CI).",
      NEVER_FAILED, {"failures.bound.successes": 1}),
-    ("verdict", "With sampled actions it collects every cube in 40.0%", {},
+    ("findings", "With sampled actions it collects every cube in 40.0%", {},
      {"drawing.upper95": 0.05}),
     ("shifts", "Good with the sun at 21.1 to 60 degrees (certainly not at 9, no more was tried and "
      "fails on at most 2.5% of it) and blur of up to 1.5 pixels (fails on at most 2.5% of it) (95% "
@@ -88,6 +98,13 @@ CLAIMS = [
      {"network": {"weights": "", "description": {"transforms": [{"name": "noise"}]}}},
      {"network": None}),
     ("shifts", "Fixed seed 0", {}, {"seed_is_fixed": False}),
+    ("line", "With elevation of the sun at 0 degrees it succeeds in 10.0% of episodes, "
+     "unperturbed in 100%; good with the sun at", {"shifts.axes.sun.levels.1.impossible": False},
+     {"shifts.axes.sun.levels.1.impossible": True}),
+    ("line", "; good with", {}, {"shifts.domain": None}),
+    ("line", "see shifts.json, dated 2026-01-31 12:00, 200 episodes at each strength. Fixed seed",
+     {},
+     {"shifts.seed_is_fixed": False}),
 ]  # fmt: skip
 """Result, a part of its text, what it needs, and what contradicts it."""
 
@@ -95,10 +112,10 @@ CLAIMS = [
 @pytest.mark.parametrize("row", CLAIMS, ids=lambda row: row[1])
 def test_a_contradicted_claim_is_not_made(row):
     kind, part, needed, against = row
-    model, example = KINDS[kind]
+    text, example = KINDS[kind]
     result = changed(example, needed)
-    assert part in model.read(result).sentence
-    assert part not in model.read(changed(result, against)).sentence
+    assert part in text(result)
+    assert part not in text(changed(result, against))
 
 
 def test_a_policy_is_proved_only_by_a_proof_that_was_computed_here():
@@ -129,17 +146,21 @@ def test_contradicting_evaluations_are_not_quoted(verdict, saved, why):
     judged = Verdict.read({**VERDICT, "kind": "good", **verdict})
     measured = SavedShifts.read({**SAVED_SHIFTS, **saved})
     assert why in measured.why_not(judged)
-    assert measured.text(judged).startswith("A robustness evaluation is not quoted: ")
-    assert measured.not_evaluated(judged) == ["colors", "light", "sizes"]
+    finding = measured.finding(judged)
+    assert finding.text.startswith("A robustness evaluation is not quoted: ")
+    assert untested(find(judged, measured)) == ["colors", "light", "sizes"]
 
 
-def test_an_evaluation_is_quoted_in_full_and_in_brief():
+def test_findings_are_ordered_by_their_effect():
+    """By hand: 40% fail; 200 of 200 unperturbed and 80 of 200 in the dark: 60%; sampled 20%."""
     measured = SavedShifts.read(SAVED_SHIFTS)
-    unsure = Verdict.read({**VERDICT, "certain": False})
-    assert "400 (ranges) and 200 episodes at each strength (seed 0) of elev" in measured.text(
-        unsure
-    )
-    brief = measured.text(unsure, brief=True)
-    assert brief.startswith("Read from shifts.json, dated 2026-01-31 12:00, not measured again")
-    assert "(fails on at most 2.5% of it). Fixed seed 0: a policy could have been" in brief
-    assert measured.not_evaluated(unsure) == ["colors", "sizes"]
+    another = Finding(text="Another ground", effect=0.5, tested=frozenset({"color"}))
+    found = find(GOOD, measured, [another])
+    assert [one.effect for one in found] == pytest.approx([0.6, 0.5, 0.4, 0.2])
+    assert found[0].text.startswith("With brightness at 0.8 times it succeeds in 40.0%")
+    assert found[0].tested == {"light", "sensor"} and found[0].section == "shifts"
+    assert untested(found) == ["sizes"] and untested(found[2:]) == ["colors", "light", "sizes"]
+    assert untested(find(GOOD, None)) == ["colors", "light", "sizes"]
+    never = {"failures.largest": None, "failures.bound.successes": 0, "greedy.success.share": 1.0}
+    spotless = Verdict.read(changed(VERDICT, {**never, "drawing": None}))
+    assert [one.effect for one in find(spotless, None)] == [0.0]

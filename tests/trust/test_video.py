@@ -13,6 +13,8 @@ from drone_rl.config import (
     PillarsSettings,
     TaskSettings,
 )
+from drone_rl.config.networks import Lstm
+from drone_rl.envs import GrayPixels
 from drone_rl.envs.rollout import Act
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.entities import CHASE
@@ -33,6 +35,7 @@ from drone_rl.utils.errors import InputError
 from tests.continuous import SETTINGS
 from tests.five_actions import FIVE
 from tests.second_task import Posts
+from tests.untrained import untrained
 
 
 class Canvas:
@@ -202,3 +205,27 @@ def test_viewer_runs_a_policy_in_dm_control(name, monkeypatch):
     view(policy)
     assert len(actions) == 10
     assert actions[0].shape == ((3,) if name == "flight_velocity" else ())
+
+
+@torch.no_grad()
+def test_a_recurrent_policy_remembers_in_the_viewer(monkeypatch):
+    """It acts as its network evaluated step by step from the start of each episode."""
+    policy = untrained(Lstm(channels=(2,), hidden=(4,), memory=8), seed=7)
+    network, taken, memoryless = policy.make_network(), [], []
+
+    def launch(env, act, title):
+        for _ in range(2):
+            timestep, memory = env.reset(), network.start(1)
+            for _ in range(12):
+                task = env.task
+                gray = GrayPixels()._apply_transform(task.worlds.render(task.state))
+                outputs, memory = network.step(gray, memory)
+                memoryless.append(int(network(gray).argmax()))
+                taken.append(int(act(timestep)))
+                assert taken[-1] == int(outputs.argmax())
+                timestep = env.step(taken[-1])
+
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr("dm_control.viewer.launch", launch)
+    view(policy)
+    assert len(taken) == 24 and taken != memoryless

@@ -30,7 +30,9 @@ def test_an_accepted_certificate(path, tmp_path):
     done = drone_rl.check(path, flights=50, progress=lambda *how: reports.append(how))
     assert done.accepted and done.exit_code == 0
     assert reports[-1] == ("flown", 50, 50)
-    assert str(done).startswith("accepted: ") and "<td>stated</td>" in done._repr_html_()
+    assert (
+        str(done).startswith("accepted: not refuted: ") and "<td>stated</td>" in done._repr_html_()
+    )
     done.save(tmp_path / "check.json")
     kept = json.loads((tmp_path / "check.json").read_text())
     assert kept["accepted"] and kept["task"]["num_cubes"] == 1 and kept["versions"]
@@ -39,7 +41,7 @@ def test_an_accepted_certificate(path, tmp_path):
 def test_the_shipped_certificate():
     proved = drone_rl.load_policy("proved")
     done = drone_rl.check(certificate_path(proved.path), flights=100, progress=silent)
-    assert done.accepted and done.findings.contradicted == 0
+    assert done.accepted and done.contradicted == 0
     read = drone_rl.load_proof(certificate_path(proved.path))
     assert read.success == 1.0 and not read.is_proved
     assert read.notes()[0].startswith("Stated by its file, not proved here: with its most")
@@ -51,7 +53,7 @@ def test_the_newest_certificate_and_a_policy_in_a_file(path, tmp_path):
     done = drone_rl.check(
         "latest", policy.path, outputs=tmp_path / "outputs", flights=5, progress=silent
     )
-    assert done.path == path and done.accepted
+    assert done.certificate == str(path) and done.accepted
     older = path.parents[1] / "0" / "certificate.json"
     older.parent.mkdir()
     older.write_text("{")
@@ -66,10 +68,10 @@ def test_a_false_certificate_is_refused(path, truth):
     path.write_text(json.dumps({**truth, "outcomes": [lost]}))
     done = drone_rl.check(path, flights=30, progress=silent)
     assert (done.accepted, done.exit_code) == (False, 14)
-    assert str(done).startswith("refused: ") and done.findings.contradicted == 30
-    again = drone_rl.check(path, flights=30, seed=done.seed.value, progress=silent)
-    assert again.findings == done.findings
-    assert (again.as_dict()["seed_is_fixed"], done.as_dict()["seed_is_fixed"]) == (True, False)
+    assert str(done).startswith("refused: ") and done.contradicted == 30
+    again = drone_rl.check(path, flights=30, seed=done.seed, progress=silent)
+    assert (again.contradictions, again.flights) == (done.contradictions, done.flights)
+    assert (again.seed_is_fixed, done.seed_is_fixed) == (True, False)
 
 
 def test_the_policy_must_be_known(path, truth):

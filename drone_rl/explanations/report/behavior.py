@@ -26,9 +26,12 @@ def draw_shifts(saved: SavedShifts, explanation: Explanation) -> Figures:
 
 def describe_shifts(saved: SavedShifts, explanation: Explanation) -> dict[str, Any]:
     """Return the robustness in words, and as a table."""
-    shifts = explanation.robustness
+    shifts, verdict = explanation.robustness, explanation.verdict
     return {
-        "text": saved.text(explanation.verdict) if explanation.verdict else "",
+        "texts": [
+            saved.finding(verdict).text if verdict else "",
+            shifts.sentence if shifts else "",
+        ],
         "rows": shifts.table() if shifts else [],
         "names": NAMES,
     }

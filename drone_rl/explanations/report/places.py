@@ -21,7 +21,7 @@ WHERE = {"left": "on its left", "ahead": "straight ahead", "right": "on its righ
 
 def rows(places: ExactMap, names: Sequence[str]) -> list[list[str]]:
     """Return a map as rows of a table, one for each side, the header first."""
-    head = ["one cube", "share of places", *names, "not seen", "blind"]
+    head = ["one cube", "share of places", *names, "not seen", "no reaction"]
     by_side = {**{WHERE[side]: of for side, of in places.sides.items()}, "anywhere": places}
     shares = {w: (of.share, *of.actions, of.unseen, of.blind) for w, of in by_side.items()}
     return [head, *([where, *(percent(s, 2) for s in of)] for where, of in shares.items())]

@@ -31,19 +31,10 @@ _NUM_ENVS = 32
 
 def find_trusted(policy: Policy) -> str | None:
     """Return the method that `drone-rl explain` would trust, or None; see `trust.check_maps`."""
-    settings, seed = ExplainSettings(), root_seed(None)
+    seed = root_seed(None)
     env = policy.make_env(_NUM_ENVS, seed=seed.value)
-    context = Context(env, policy.make_network(), settings, seed=seed)
-    data, scenes = context.dataset, context.scenes
-    state = data.state(scenes.task, scenes.worlds.dynamics)
-    trial = trust.make_trial(
-        scenes,
-        context.network,
-        state,
-        data.tensor("actions"),
-        data.episode,
-        context.seed.value,
-    )
+    context = Context(env, policy.make_network(), ExplainSettings(), seed=seed)
+    trial = trust.make_trial(context)
     env.close()
     return trust.check_maps(trial, trust.method_maps(context.explainer)).trusted
 

@@ -2,25 +2,25 @@
 
 import dataclasses
 import math
-from collections import deque
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import torch
-from tensordict import TensorDict
+from tensordict.utils import NestedKey
 from torch import Tensor
 
 from drone_rl.config import ActionSettings, DynamicsSettings
-from drone_rl.envs import base_env
+from drone_rl.envs import Observer, base_env
+from drone_rl.envs.rollout import ActorAgent, StepContext
 from drone_rl.explanations.scenes import Scenes
-from drone_rl.policies.actor import exploring
+from drone_rl.policies.actor import Exploring
 from drone_rl.policies.policy import Policy
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import BodyState, ComputerVision, FlightState, Quadrotor
 from drone_rl.sim.entities import CHASE
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
-from drone_rl.trust.video import render_chase
+from drone_rl.trust.video import probabilities, render_chase
 from drone_rl.utils.errors import InputError
 
 HEIGHT, WIDTH = 144, 256
@@ -42,8 +42,6 @@ class Seen(NamedTuple):
     """Of each part of its actions."""
     action: Tensor
     """The action that it takes. Shape: (1,), then that of an action."""
-    memory: Mapping[str, Tensor]
-    """What a policy that remembers frames keeps for the next step, by name."""
 
 
 class World:
@@ -67,13 +65,14 @@ class World:
         self.task: Any = self.worlds.task
         self.actions: Actions = self.worlds.dynamics.actions
         self.scenes = Scenes(self._env)
-        self._actor = policy.make_actor(self._env, seed=seed)
-        entries: Any = self._env.observation_spec.zero()
-        names = (str(name) for name in self._actor.in_keys if name != "pixels")
-        self._forgotten: Mapping[str, Tensor] = {name: entries[name] for name in names}
-        """Memory of the actor at the start of an episode, by name."""
-        self._greedy = greedy
-        self._earlier_frames: deque[Tensor] = deque(maxlen=self.scenes.memory)
+        self._observer = Observer(
+            self.worlds,
+            self._base.observer.transforms,
+            appearance=lambda rows: self._look(),
+            streams=lambda rows, key: self._base.side_streams(rows, *key),
+        )
+        self._actor = ActorAgent(policy.make_actor(self._env, seed=seed))
+        self._agent = Exploring(self._actor, greedy=greedy)
         self._every = torch.arange(1)
         self.light = 1.0
         self.wind = _to_polar(policy.dynamics.wind)
@@ -160,23 +159,20 @@ class World:
     def see(self) -> Seen:
         """Return what the policy observes and would do; computed once for each state."""
         if self._seen is None:
-            state = self.worlds.state
-            frame = self.worlds.render(state, appearance=self._look())
-            observation = self.scenes.transform(frame, [*self._earlier_frames])
-            observed = TensorDict({"pixels": observation, **self._memory}, [1])
-            with exploring(greedy=self._greedy):
-                acted = self._actor(observed)
-            shares = self.actions.probabilities(acted["logits"])[0]
-            after: Any = acted.get("next", {})
-            memory = {name: after.get(name, start) for name, start in self._forgotten.items()}
-            self._seen = Seen(frame, observation, tuple(shares.tolist()), acted["action"], memory)
+            starts = torch.tensor([self._memory is None])
+            if self._memory is not None:  # the state may have been seen before, in another light
+                seen, self._actor.memory = self._memory
+                self._observer.pipeline.load_state_dict(seen)
+            context = StepContext(self._observer, self.worlds.state, self._every, starts)
+            shares = probabilities(act := self._agent.act(context), self.actions)
+            frame, observation = context.render(), context.observe()
+            self._seen = Seen(frame, observation, tuple(shares.tolist()), act.action)
         return self._seen
 
     def step(self, action: Tensor) -> float:
         """Take an action, (1,) and then its shape; return the reward."""
-        seen = self.see()
-        self._earlier_frames.append(seen.frame)
-        self._memory = seen.memory
+        self.see()
+        self._memory = self._observer.pipeline.state_dict(), self._actor.memory
         reward = float(self.worlds.step(self._every, action)[0])
         self.reward += reward
         self._change()
@@ -255,8 +251,8 @@ class World:
 
     def _forget(self) -> None:
         """Let the policy begin without earlier frames."""
-        self._earlier_frames.clear()
-        self._memory: Mapping[str, Tensor] = self._forgotten
+        self._memory: tuple[list[dict[str, Any]], Mapping[NestedKey, Tensor]] | None = None
+        """That of the observer and of the policy after the last step."""
 
     def _place(self, body: BodyState) -> None:
         self.worlds.state.body = body

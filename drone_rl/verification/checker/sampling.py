@@ -21,10 +21,10 @@ _MAX_WORK = 2**31  # comparisons in the search for borders
 def sample_inside(boxes: Boxes, count: int, rng: np.random.Generator) -> Points:
     """Return `count` centres, corners and random points of boxes.
 
-    A centre of each box, for at most half of the points. If there are more boxes than that, large,
-    thin and random boxes take turns. Then all corners of as many boxes as half of the rest allows.
+    A centre of each box, in random order, for at most half of the points. Then all corners of as
+    many boxes as half of the rest allows.
     """
-    chosen = boxes[_mixed(boxes, rng)]
+    chosen = rng.permutation(boxes)
     centres = chosen[: -(-count // 2)].mean(-1)
     left = count - len(centres)
     num_corners = 2 ** boxes.shape[1]
@@ -79,14 +79,6 @@ def find(boxes: Boxes, points: Points) -> Indices:
             raise ValueError(f"no box holds {point}")
         indices[i] = holding[0]
     return indices
-
-
-def _mixed(boxes: Boxes, rng: np.random.Generator) -> Indices:
-    """Return all boxes once: in turn the next largest, thinnest and random one."""
-    sizes = np.diff(boxes)[..., 0]
-    orders = (-sizes.prod(1)).argsort(), sizes.min(1).argsort(), rng.permutation(len(boxes))
-    mixed = np.stack(orders, 1).ravel()
-    return mixed[np.sort(np.unique(mixed, return_index=True)[1])]
 
 
 def _corners(boxes: Boxes) -> Points:

@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
+from drone_rl.explanations.context import Context
 from drone_rl.explanations.explain import explain_policy
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.settings import ExplainSettings
@@ -43,9 +44,8 @@ def explain_twice(root):
     settings = ExplainSettings(frames=90, episodes=6, perplexity=5)
     origin = {"policy": f"/somewhere/{NASTY}", "trained": {}}
     with quick():
-        explain_policy(
-            env, network, root / "a", settings, name=NASTY, provenance=origin, sections=ALL_SECTIONS
-        )
+        context, path = Context(env, network, settings), root / "a"
+        explain_policy(context, path, name=NASTY, provenance=origin, sections=ALL_SECTIONS)
     env.close()
     shutil.copytree(root / "a", root / "b")
     numbers = json.loads((root / "b" / "explanation.json").read_text())

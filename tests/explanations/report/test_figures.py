@@ -90,7 +90,7 @@ def test_the_charts_of_the_response_are_of_each_height(explanation):
     left = charts["P(left), cube +1.5 m"].axes[0].collections[0]
     assert left.get_array().ravel().tolist() == [*[0.0] * 11, 0.5]
     assert left.get_datalim(left.axes.transData).bounds == pytest.approx((-4.0, 1.0, 8.0, 6.0))
-    assert any("blind" in title for title in charts)
+    assert any("no reaction" in title for title in charts)
 
 
 def test_each_change_of_a_scene_has_its_effect_as_caption(explanation):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from drone_rl.explanations.context import Context
 from drone_rl.explanations.explain import explain_policy
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.settings import ExplainSettings
@@ -26,7 +27,8 @@ def folder(tmp_path_factory):
         network.layers.logits.bias.copy_(torch.tensor([1.0, 0.2, 0.0, 0.0, 0.0, 0.0]))
     settings = ExplainSettings(frames=40, episodes=6, perplexity=5)
     with quick():
-        explain_policy(env, network, folder, settings, name="fast", provenance={})
+        context = Context(env, network, settings)
+        explain_policy(context, folder, name="fast", provenance={})
     env.close()
     return folder
 

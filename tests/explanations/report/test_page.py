@@ -134,7 +134,7 @@ def test_a_robustness_evaluation_is_shown(tmp_path):
     with quick_figures():
         text = render_section("shifts", [changed_explanation(good)], tmp_path)
     assert "the sun at 21.1 to 60 degrees" in text and text.count("data:image/svg") == 3 + 1
-    assert "not measured again here" in text and "<td>elevation of the sun</td>" in text
+    assert "Not measured again here" in text and "<td>elevation of the sun</td>" in text
 
 
 def test_missing_sections_are_left_out(tmp_path):

@@ -43,17 +43,20 @@ def text(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("section", "sentence", "against", "before"),
     [
-        ("summary", "Good. This verdict is wrong with at most 5%", UNCERTAIN, GOOD),
+        ("summary", "verdict errs in at most 5% of cases", UNCERTAIN, GOOD),
         ("summary", "in 60.0% (95% CI 58.0% to 62.0%) of 400", {"verdict": None}, {}),
-        ("summary", "2 of 3 perturbations", {"shifts.shifts.domain": None}, MEASURED),
-        ("summary", "Not measured", MEASURED, {}),
+        ("summary", "good with the sun at 21.1", {"shifts.shifts.domain": None}, MEASURED),
+        ("summary", "(drone-rl shifts measures them", MEASURED, {}),
+        ("summary", "changes the outcome of 2.0%", {"truth.outcomes": None}, {}),
         ("summary", "another task", MEASURED,
          {"shifts": {"path": "a", "refused": "it is of another task"}}),
         ("summary", "not refuted by 3,000 episodes", {"verdict.proof.computed": True},
          {"verdict.proof": PROOF}),
         ("summary", "1 of 2 methods passed the tests: trust saliency.", NONE_TRUSTED, {}),
         ("summary", "2 to 4 m ahead", {"places": {"refused": "a stack"}}, {}),
-        ("summary", "other colors, light or sizes", MEASURED, {}),
+        ("summary", "other colors, light or sizes", MEASURED, {"truth.outcomes": None}),
+        ("summary", "; other light or sizes", {"truth.outcomes": None}, {}),
+        ("verdict", "tests other light or sizes", MEASURED, {}),
         ("summary", "what was left out (embedding)", {"left_out": {}}, {}),
         ("verdict", "rely on it in environments like those tested", UNCERTAIN, GOOD),
         ("verdict", "do not rely on it; drone-rl verdict", GOOD, {}),
@@ -80,7 +83,7 @@ def text(tmp_path, monkeypatch):
          {"response.rows.1.places": 0}, {}),
         ("response", "with the cube at +1.2 m, the policy collects the cube from 50 of 72",
          {"response.rows.3.places": 0}, {}),
-        ("response", "blind at 60.0% of the places on its left, 50.0%",
+        ("response", "at 60.0% of the places on its left, 50.0%",
          {"response.rows.0.blind": None}, {}),
         ("asymmetry", "-0.20 (95% CI -0.30 to -0.10) in probability",
          {"asymmetry.signed": mean(0.2, 0.1, 0.3)}, {}),
@@ -93,3 +96,10 @@ def text(tmp_path, monkeypatch):
 def test_a_contradicted_sentence_is_not_shown(text, section, sentence, against, before):
     assert sentence in text(section, before)
     assert sentence not in text(section, {**before, **against})
+
+
+def test_the_summary_begins_with_the_largest_effect(text):
+    """In 40% of its episodes the policy fails; a ground that changes more outcomes comes first."""
+    for changed_outcomes, first in ((0.39, "It fails in 40.0%"), (0.41, "Another ground color")):
+        words = text("summary", {"truth.outcomes.ground_changed.mean": changed_outcomes})
+        assert words.split("effect on success first.")[1].strip().startswith(first)

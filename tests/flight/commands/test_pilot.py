@@ -127,21 +127,6 @@ def test_the_same_commands_give_the_same_flight():
     assert fly(1) != fly(2)
 
 
-def test_by_velocity(flying):
-    assert flying.move_by_velocity(0, 2, 0, 5, z=4) is True
-    assert flying.state.velocity == pytest.approx((0, 2, 0), abs=0.1)
-    assert flying.state.position[2] == pytest.approx(4, abs=0.1)
-    flying.move_by_velocity(0, 0, 1, 2)
-    assert flying.state.velocity[2] == pytest.approx(1, abs=0.05)
-
-
-def test_along_a_path_whose_end_is_held(flying):
-    assert flying.move_along([(2, 0, 2), (2, 3, 3)], speed=1) is True
-    assert math.dist(flying.state.position, (2, 3, 3)) <= 0.5
-    flying.advance(5.0)
-    assert flying.state.position == pytest.approx((2, 3, 3), abs=0.05)
-
-
 def test_to_a_place_and_to_a_height(flying):
     assert flying.move_to(3, 0, 2, speed=2, drivetrain="forward_only") is True
     assert flying.move_to_z(4) is True
@@ -203,10 +188,3 @@ def test_what_is_refused_before_anything_moves(flying, name, given, choices, tol
     assert not isinstance(error.value, PilotError)
     assert "\n" not in str(error.value)
     assert flying.time == before
-
-
-def test_nothing_moves_before_it_has_taken_off():
-    pilot = Pilot()
-    pilot.arm()
-    with pytest.raises(PilotError, match="move_along: the drone is on the ground"):
-        pilot.move_to(1, 2, 3)

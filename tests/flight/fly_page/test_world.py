@@ -1,17 +1,14 @@
 """The world of the page: rules, observations, wind, light, and changes of who flies."""
 
-from pathlib import Path
-
 import pytest
 import torch
 
 import drone_rl
 from drone_rl.config.commands import CAMERAS
-from drone_rl.config.networks import SmallCnn
+from drone_rl.config.networks import Lstm, SmallCnn
 from drone_rl.config.transforms import Gray, Stack
-from drone_rl.policies.policy import Policy
-from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.dynamics import FlightState, Quadrotor
+from tests.untrained import untrained
 
 FORWARD = torch.tensor([0])
 
@@ -100,14 +97,7 @@ def test_the_observation_is_that_of_the_policys_environment(make_world):
 
 
 def test_stacked_frames_are_those_of_the_last_actions(make_world):
-    transforms = (Gray(), Stack(N=2))
-    policy = drone_rl.load_policy("good")
-    description = PolicyDescription(
-        policy.task, policy.description.camera, transforms, SmallCnn(channels=(2,), hidden=(4,))
-    )
-    weights = description.build_network(torch.Generator().manual_seed(0)).state_dict()
-    state = {**policy.state, "policy": weights, "description": description.as_dict()}
-    world = make_world(Policy("stacked", Path("none"), description, state))
+    world = make_world(untrained(SmallCnn(channels=(2,), hidden=(4,)), Gray(), Stack(N=2)))
     first = world.see().observation
     assert torch.equal(first[0, 0], first[0, 1])
     for _ in range(8):
@@ -120,36 +110,32 @@ def test_stacked_frames_are_those_of_the_last_actions(make_world):
     assert torch.equal(after[0, 0], after[0, 1])
 
 
-class Remembering:
-    """An actor whose network counts the steps since it was last made to forget."""
+def test_a_policy_that_remembers_keeps_its_memory_from_step_to_step(make_world):
+    """As its network evaluated step by step, from a new state where a person takes over."""
+    policy = untrained(Lstm(channels=(2,), hidden=(4,), memory=8))
+    network, world = policy.make_network(), make_world(policy)
+    memory = network.start(1)
 
-    def __init__(self):
-        self.seen = []
+    @torch.no_grad()
+    def assert_follows():
+        nonlocal memory
+        seen = world.see()
+        outputs, memory = network.step(seen.observation, memory)
+        assert seen.probabilities == pytest.approx(outputs.softmax(-1)[0].tolist())
 
-    def __call__(self, tensordict):
-        """Move forward; remember one more step."""
-        count = tensordict["count"]
-        self.seen.append(int(count))
-        tensordict["logits"] = torch.tensor([[1.0, 0.0, 0.0]])
-        tensordict["action"] = torch.tensor([0])
-        tensordict["next", "count"] = count + 1
-        return tensordict
-
-
-def test_a_policy_that_remembers_keeps_its_memory_from_step_to_step(make_world, monkeypatch):
-    world = make_world()
-    actor = Remembering()
-    monkeypatch.setattr(world, "_actor", actor)
-    monkeypatch.setattr(world, "_forgotten", {"count": torch.zeros(1, 1)})
-    world.reset()
     for _ in range(3):
+        assert_follows()
+        before = world.see().probabilities
+        world.set_light(0.2)  # the state is seen again, from the same memory
+        assert world.see().probabilities != before
+        world.set_light(1.0)
+        assert world.see().probabilities == before
         world.step(world.see().action)
-    world.see()
-    world.move(world.body)  # a person takes over
-    world.see()
-    world.reset()
-    world.see()
-    assert actor.seen == [0, 1, 2, 3, 0, 0]
+    assert_follows()
+    for change in (lambda: world.move(world.body), world.reset):
+        change()
+        memory = network.start(1)
+        assert_follows()
 
 
 def test_wind_blows_from_its_direction(make_world):

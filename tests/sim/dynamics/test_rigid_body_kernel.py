@@ -18,7 +18,6 @@ from tests.flying import (
     make_goals,
     matrix,
     quadrotor,
-    rotation,
     trajectory,
 )
 
@@ -119,15 +118,6 @@ def test_rotor_torques_follow_from_position_and_spin(shares, torque):
     after = quadrotor(**AT_ONCE).push(falling(), doubles(shares))
     gained = 0.003 * np.array(torque) / (0.00672, 0.00804, 0.01428)
     np.testing.assert_allclose(after.angular_velocity[0], gained, rtol=1e-5, atol=1e-8)
-
-
-@pytest.mark.parametrize("axis", range(3))
-def test_spin_about_a_principal_axis_is_constant(axis):
-    rates = np.zeros(3)
-    rates[axis] = 4.0
-    after = quadrotor(**VACUUM).push(falling(rates=tuple(rates)), NONE, 1000)
-    np.testing.assert_allclose(after.angular_velocity[0], rates, atol=1e-6)
-    np.testing.assert_allclose(matrix(after.attitude[0]), rotation(rates * 3.0), atol=2e-5)
 
 
 def test_angular_momentum_and_energy_are_conserved():
@@ -304,13 +294,6 @@ def test_drone_rests_level_at_its_radius():
     assert after.contact.thing.tolist() == [GROUND]
     again = flown(drone, after, 3000)
     np.testing.assert_allclose(again.position, after.position, atol=1e-6)
-
-
-def test_rotors_lift_the_drone_off_the_ground():
-    drone = quadrotor()
-    rested = flown(drone, falling(0.3), 100)
-    risen = flown(drone, rested, 333, rotors=doubles((0.7,) * 4))
-    assert float(risen.position[0, 2]) > 0.6
 
 
 def test_obstacle_reflects_the_drone_and_is_recorded():
