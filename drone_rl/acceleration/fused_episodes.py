@@ -189,7 +189,7 @@ def _mean_and_deviation(observer: Observer) -> tuple[float, float]:
     """Return what the kernel subtracts from gray pixels, and then divides them by."""
     for transform in observer.pipeline.transforms:
         if type(transform) is StandardizePixels:
-            return transform.mean, transform.std
+            return transform.values.mean, transform.values.std
     return 0.0, 1.0
 
 
@@ -197,7 +197,7 @@ def _cropped_rows(observer: Observer) -> slice:
     """Return the rows of rendered frames that the policy sees."""
     for transform in observer.pipeline.transforms:
         if type(transform) is CropRows:
-            return slice(transform.top, transform.bottom)
+            return slice(transform.values.top, transform.values.bottom)
     return slice(0, observer.view.height)
 
 

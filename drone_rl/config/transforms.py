@@ -107,13 +107,16 @@ class Crop(Transform, target="crop"):
     def _transformed(self, frame: Frame) -> Frame:
         if not frame.is_float and frame.shape[-1] == 3:
             raise InputError("the transform crop needs channels first; put gray or rgb before it")
-        rows = frame.shape[-2]
-        if not self.top < self.bottom <= rows:
-            raise InputError(
-                f"the transform crop keeps rows {self.top} to {self.bottom} of {rows}; give top < "
-                f"bottom and at most {rows}"
-            )
+        self.check_height(frame.shape[-2])
         return Frame((*frame.shape[:-2], self.bottom - self.top, frame.shape[-1]), frame.is_float)
+
+    def check_height(self, height: int) -> None:
+        """Raise an `InputError` if no row is kept of an image of this height, or too many."""
+        if not self.top < self.bottom <= height:
+            raise InputError(
+                f"the transform crop keeps rows {self.top} to {self.bottom} of {height}; give top "
+                f"< bottom and at most {height}"
+            )
 
 
 class Resize(Transform, target="resize"):

@@ -19,7 +19,7 @@ from drone_rl.envs.fault_models import (
     noise,
     random_shift,
 )
-from drone_rl.envs.transforms import PixelTransform, call_text
+from drone_rl.envs.transforms import BuiltIn, PixelTransform, call_text, read_fields
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import Settings
 
@@ -82,8 +82,7 @@ class _BuiltInFault(CameraFault):
     """Returns the model for the fields of the settings."""
 
     def __init__(self, *args: Any, **fields: Any) -> None:
-        names = [*self.Settings.model_fields][: len(args)]
-        values = self.Settings(**dict(zip(names, args, strict=True)), **fields)
+        values = read_fields(self.Settings, args, fields)
         super().__init__(self.make_model(**vars(values)), values)
 
 
@@ -128,16 +127,10 @@ class Shift(_BuiltInFault):
 
 
 @implements(settings.Blur)
-class Blur(PixelTransform):
+class Blur(BuiltIn):
     """Blur images (*, C, H, W) by a Gaussian; it has no memory and samples nothing."""
-
-    def __init__(self, width: float = settings.Blur().width) -> None:
-        """See `drone_rl.config.transforms.Blur`."""
-        super().__init__()
-        self.values = settings.Blur(width=width)
-        self.width = width
 
     def _apply_transform(self, obs: Tensor) -> Tensor:
         if not obs.is_floating_point():
             raise InputError(f"Blur got {obs.dtype} images; put it after gray or rgb")
-        return blur(obs, self.width)
+        return blur(obs, self.values.width)

@@ -19,7 +19,7 @@ from drone_rl.config import (
     CameraSettings,
     DynamicsSettings,
 )
-from drone_rl.envs.observer import Observer
+from drone_rl.envs.observer import Observer, Starts
 from drone_rl.envs.transforms import is_of_pixels
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import Dynamics
@@ -134,19 +134,19 @@ class DroneEnv(EnvBase):
 
     def state_dict(self, *args: object, **kwargs: object) -> dict:
         """Return the random streams, which suffice if every environment is reset next."""
-        return {"random_states": [get_state(r) for r in self._random_states]}
+        return {"random_states": [get_state(r) for r in self.random_states]}
 
     def load_state_dict(  # pyright: ignore[reportIncompatibleMethodOverride] (as EnvBase)
         self, state_dict: dict, strict: bool = True, assign: bool = False
     ) -> None:
         """Restore a `state_dict` of as many environments, else raise an `InputError`."""
         states = state_dict["random_states"]
-        if len(states) != len(self._random_states):
+        if len(states) != len(self.random_states):
             raise InputError(
                 f"the saved state has {len(states)} environments, this batch "
-                f"{len(self._random_states)}; set num_envs={len(states)}"
+                f"{len(self.random_states)}; set num_envs={len(states)}"
             )
-        for random_state, state in zip(self._random_states, states, strict=True):
+        for random_state, state in zip(self.random_states, states, strict=True):
             set_state(random_state, state)
 
     def running_state(self) -> dict[str, Any]:
@@ -162,14 +162,14 @@ class DroneEnv(EnvBase):
         if self.appearances.varies:
             self.appearances.load(state["looks"])
         self.observer.pipeline.load_state_dict(state["observer"])
-        self._render(self._indices(None), None)
+        self.observe(self._indices(None), None)
 
     def side_streams(self, env_ids: Tensor, *key: int) -> list[np.random.Generator]:
         """Return further random streams of episodes that have just begun, for the purpose `key`.
 
         They leave the task's own streams unchanged. `env_ids` are indices, (k,).
         """
-        return [side_stream(self._random_states[i], *key) for i in env_ids.tolist()]
+        return [side_stream(self.random_states[i], *key) for i in env_ids.tolist()]
 
     @property
     def base_env(self) -> Self:
@@ -219,7 +219,8 @@ class DroneEnv(EnvBase):
         if seed is None:
             raise InputError("seed=None is not reproducible; give a whole number, 0 or more")
         first, n = self.first_world, self.batch_size[0]
-        self._random_states = [world_random_state(seed, first + i, self.stream) for i in range(n)]
+        self.random_states = [world_random_state(seed, first + i, self.stream) for i in range(n)]
+        """The random stream of each environment's episodes."""
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
         if "seed" in kwargs:
@@ -227,14 +228,14 @@ class DroneEnv(EnvBase):
         mask = None if tensordict is None else tensordict.get("_reset", None)
         env_ids = self._indices(mask)
         self.start(env_ids)
-        self._render(env_ids, True)
+        self.observe(env_ids, True)
         running = torch.zeros(*self.batch_size, 1, dtype=torch.bool, device=self.device)
-        return self._observe({name: running.clone() for name in _DONE_KEYS})
+        return self._entries({name: running.clone() for name in _DONE_KEYS})
 
     def start(self, env_ids: Tensor | None = None) -> State:
         """Start episodes, by default all, without rendering; return their states. Indices: (k,)."""
         env_ids = self._indices(None) if env_ids is None else env_ids
-        random_states = [self._random_states[i] for i in env_ids.tolist()]
+        random_states = [self.random_states[i] for i in env_ids.tolist()]
         self.appearances.reset(env_ids, random_states)
         self.worlds.reset(env_ids, random_states)
         return self.worlds.state[env_ids]
@@ -253,8 +254,8 @@ class DroneEnv(EnvBase):
         taken = action[env_ids]
         self._check_range(taken)
         reward[env_ids, 0] = self.worlds.step(env_ids, taken).float()
-        self._render(env_ids, False)
-        return self._observe({"reward": reward, **self.flags(self.worlds.state.end_reason)})
+        self.observe(env_ids, False)
+        return self._entries({"reward": reward, **self.flags(self.worlds.state.end_reason)})
 
     def flags(self, end_reason: Tensor) -> dict[str, Tensor]:
         """Return "done", "terminated" and "truncated" of states. Shapes: (k,) to (k, 1)."""
@@ -284,16 +285,20 @@ class DroneEnv(EnvBase):
                 "env.action_spec"
             )
 
-    def _render(self, env_ids: Tensor, starts: bool | None) -> None:
-        if not self.pixels or not len(env_ids):
-            return
-        is_whole = len(env_ids) == len(self._pixels)
-        state = self.worlds.state if is_whole else self.worlds.state[env_ids]
-        look = self.appearances.current(env_ids)
-        pixels = self.observer.observe(state, env_ids, starts, look)["pixels"]
-        self._pixels = pixels if is_whole else self._pixels.index_copy(0, env_ids, pixels)
+    def observe(self, env_ids: Tensor, starts: Starts) -> Tensor:
+        """Observe environments, (k,), once after each step and reset; see `Observer.observe`.
 
-    def _observe(self, entries: dict[str, Tensor]) -> TensorDict:
+        Returns the pixels of all; those of the others are as they were.
+        """
+        if self.pixels and len(env_ids):
+            is_whole = len(env_ids) == len(self._pixels)
+            state = self.worlds.state if is_whole else self.worlds.state[env_ids]
+            look = self.appearances.current(env_ids)
+            pixels = self.observer.observe(state, env_ids, starts, look)["pixels"]
+            self._pixels = pixels if is_whole else self._pixels.index_copy(0, env_ids, pixels)
+        return self._pixels
+
+    def _entries(self, entries: dict[str, Tensor]) -> TensorDict:
         pixels = {"pixels": self._pixels} if self.pixels else {}
         info = TensorDict(self.worlds.info(), self.batch_size, device=self.device)
         return TensorDict({**pixels, "info": info, **entries}, self.batch_size, device=self.device)

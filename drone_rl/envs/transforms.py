@@ -1,6 +1,7 @@
 """Image transforms from camera frames to network inputs; they need no torchvision."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, ClassVar
 
 import torch
 from tensordict import TensorDictBase
@@ -53,6 +54,25 @@ class PixelTransform(ObservationTransform):
         return observation_spec
 
 
+class BuiltIn(PixelTransform):
+    """A transform with the fields of its settings as arguments, in order or by name."""
+
+    Settings: ClassVar[type[settings.Transform]]
+    """Set by `implements`."""
+
+    def __init__(self, *args: Any, **fields: Any) -> None:
+        super().__init__()
+        self.values: Any = read_fields(self.Settings, args, fields)
+
+
+def read_fields(
+    kind: type[settings.Transform], args: Sequence[Any], fields: Mapping[str, Any]
+) -> settings.Transform:
+    """Return settings whose fields are given in order or by name."""
+    names = [*kind.model_fields][: len(args)]
+    return kind(**dict(zip(names, args, strict=True)), **fields)
+
+
 @implements(settings.Gray)
 class GrayPixels(PixelTransform):
     """Convert RGB bytes (*, H, W, 3) to gray (*, 1, H, W), float32 in [0, 1], in one pass.
@@ -75,18 +95,13 @@ class RgbPixels(PixelTransform):
 
 
 @implements(settings.Chromaticity)
-class ChromaticityPixels(PixelTransform):
+class ChromaticityPixels(BuiltIn):
     """Convert RGB floats (*, 3, H, W) to chromaticities of red and blue (*, 2, H, W).
 
     The red and blue fractions, minus a third: every gray becomes 0. Lighting, shadows and exposure
     change the brightness, not the chromaticity. Red and blue are divided by the sum of the channels
     and `floor`, which suppresses the color noise of dark pixels. Range: -1/3 to 2/3.
     """
-
-    def __init__(self, floor: float = settings.Chromaticity().floor) -> None:
-        super().__init__()
-        self.values = settings.Chromaticity(floor=floor)
-        self.floor = float(floor)
 
     def _apply_transform(self, obs: Tensor) -> Tensor:
         if obs.shape[-3] != 3:
@@ -95,40 +110,24 @@ class ChromaticityPixels(PixelTransform):
             )
         total = obs.sum(-3, keepdim=True)
         red_and_blue = torch.stack((obs[..., 0, :, :], obs[..., 2, :, :]), -3)
-        return (red_and_blue - total / 3).div_(total + self.floor)
+        return (red_and_blue - total / 3).div_(total + self.values.floor)
 
 
 @implements(settings.Crop)
-class CropRows(PixelTransform):
+class CropRows(BuiltIn):
     """Keep the rows `top` to `bottom` (exclusive) of frames (*, C, H, W)."""
 
-    def __init__(self, top: int, bottom: int) -> None:
-        super().__init__()
-        self.values = settings.Crop(top=top, bottom=bottom)
-        if not top < bottom:
-            raise InputError(f"CropRows({top}, {bottom}) keeps no row; give 0 <= top < bottom")
-        self.top, self.bottom = top, bottom
-
     def _apply_transform(self, obs: Tensor) -> Tensor:
-        if self.bottom > obs.shape[-2]:
-            raise InputError(
-                f"CropRows({self.top}, {self.bottom}) of a frame of {obs.shape[-2]} rows; "
-                f"give a bottom of at most {obs.shape[-2]}"
-            )
-        return obs[..., self.top : self.bottom, :]
+        self.values.check_height(obs.shape[-2])
+        return obs[..., self.values.top : self.values.bottom, :]
 
 
 @implements(settings.Resize)
-class Resize(PixelTransform):
+class Resize(BuiltIn):
     """Resize frames (*, C, H, W) by averaging over areas; those of the size stay as they are."""
 
-    def __init__(self, *, height: int, width: int) -> None:
-        super().__init__()
-        self.values = settings.Resize(height=height, width=width)
-        self.height, self.width = height, width
-
     def _apply_transform(self, obs: Tensor) -> Tensor:
-        size = (self.height, self.width)
+        size = (self.values.height, self.values.width)
         if obs.shape[-2:] == size:
             return obs
         flat = obs.reshape(-1, *obs.shape[-3:])
@@ -137,18 +136,11 @@ class Resize(PixelTransform):
 
 
 @implements(settings.Standardize)
-class StandardizePixels(PixelTransform):
+class StandardizePixels(BuiltIn):
     """Standardize pixels: (x - mean) / std. The defaults are the original study's."""
 
-    def __init__(
-        self, mean: float = settings.Standardize().mean, std: float = settings.Standardize().std
-    ) -> None:
-        super().__init__()
-        self.values = settings.Standardize(mean=mean, std=std)
-        self.mean, self.std = float(mean), float(std)
-
     def _apply_transform(self, obs: Tensor) -> Tensor:
-        return (obs - self.mean).div_(self.std)
+        return (obs - self.values.mean).div_(self.values.std)
 
 
 def call_text(transform: Transform, values: Settings) -> str:

@@ -95,8 +95,8 @@ class Scenes:
                 steps.append((transform, before))
         for transform, size in reversed(steps):
             if isinstance(transform, CropRows):
-                below = size[0] - transform.bottom
-                maps = functional.pad(maps, (0, 0, transform.top, below))
+                rows = transform.values
+                maps = functional.pad(maps, (0, 0, rows.top, size[0] - rows.bottom))
             elif maps.shape[-2:] != size:
                 maps = functional.interpolate(maps[:, None], size, mode="bilinear")[:, 0]
         return maps

@@ -1,13 +1,10 @@
-"""Returns of the steps of an episode: pure functions of rewards.
+"""Returns of the steps of an episode: pure functions of rewards, and transforms that apply them.
 
 Every function takes `reward` and `done` of shape (*batch, T, 1), time in dimension -2, of complete
 episodes: no return crosses a `done`, and the last step of every row must be one. A flat batch
 (T, 1) of episodes one after the other and a batch (N, T, 1) are equivalent.
 
-The original study has five variants, `advantage_type` 0 to 4: `standardized`, `linear_ramp`,
-`reward_to_go`, `success_scaled` and `time_baseline`. They are implemented as they were meant: an
-episode of constant return standardizes to zero instead of dividing by zero, and the baselines of
-`time_baseline` and `leave_one_out` never contain the episode that they are subtracted from.
+The original study's other variants are in `original_returns`.
 
 Unbiased means: with the loss summed over steps and divided by the number of episodes, the expected
 gradient is that of the expected reward (undiscounted), or that of Eq. 15 (discounted). Biases are
@@ -16,11 +13,21 @@ measured by enumerating all outcomes of small batches on the process of Fig. 3
 those between the expected update and the exact gradient. Discounting alone turns it by 1.4 degrees.
 """
 
+import abc
+from collections.abc import Callable
+from typing import Any, ClassVar, TypedDict, Unpack
+
 import torch
+from tensordict import TensorDictBase
+from tensordict.utils import NestedKey
 from torch import Tensor
 from torch.nn.utils.rnn import pad_sequence
+from torchrl.envs import EnvBase, Transform
 
+from drone_rl.config import learning as settings
+from drone_rl.config.registry import implements
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.plugins import described, place_of
 
 ROUNDING = 1e-6
 """Deviation of returns, in rewards, up to which they differ by rounding errors alone."""
@@ -43,64 +50,14 @@ def episode_lengths(done: Tensor) -> list[int]:
 
 def total_reward(reward: Tensor, done: Tensor) -> Tensor:
     """Return the whole episode's reward at every step, r(tau) of Eq. 12; unbiased."""
-    padded, lengths = _pad(reward, done)
-    return _unpad(padded.sum(0).expand_as(padded), lengths, reward)
+    padded, lengths = pad(reward, done)
+    return unpad(padded.sum(0).expand_as(padded), lengths, reward)
 
 
 def reward_to_go(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
     """Discounted return, Eq. 14: g_t = r_{t+1} + gamma g_{t+1}; unbiased. Shape: (*batch, T, 1)."""
-    padded, lengths = _pad(reward, done)
-    return _unpad(_discount(padded, gamma), lengths, reward)
-
-
-def standardized(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
-    """Discounted return, (g - mean) / std over each episode (Algorithm 4, line 2; footnote 5).
-
-    The deviation is the population's; an episode of constant return gets zeros. Mean and deviation
-    are the episode's own, so this is biased in batches of any size: an episode of one step teaches
-    nothing, nor does, undiscounted, one that is rewarded at its end alone. With odds of 9 to 1 at
-    the first step and 1 to 9 at the second, the angle is 38.7 degrees.
-    """
-    padded, lengths = _pad(reward, done)
-    returns = _discount(padded, gamma)
-    alive = _alive(lengths, returns)
-    centred = returns - _mean(returns, alive)
-    deviation = _mean(centred.square(), alive).sqrt()
-    return _unpad(torch.where(deviation > ROUNDING, centred / deviation, 0.0), lengths, reward)
-
-
-def linear_ramp(reward: Tensor, done: Tensor) -> Tensor:
-    """The episode's reward times a ramp from 1/T at its first step to 1 at its last.
-
-    The ramp depends on how long the episode is yet to become, so this is biased in batches of any
-    size: by 11.3 degrees.
-    """
-    padded, lengths = _pad(reward, done)
-    step = torch.arange(1, padded.shape[0] + 1, device=padded.device)[:, None]
-    ramp = step / torch.tensor(lengths, device=padded.device)
-    return _unpad(padded.sum(0) * ramp, lengths, reward)
-
-
-def success_scaled(reward: Tensor, done: Tensor, gamma: float, max_reward: float) -> Tensor:
-    """Discounted return times exp(r(tau) - max_reward): episodes count by their success.
-
-    Where an episode has one reward of 1 or none, that is a constant factor. Otherwise it is biased
-    towards what succeeds wholly, if seldom: an even chance of 2 is preferred to 1.1 for sure.
-    """
-    scale = (total_reward(reward, done) - max_reward).exp()
-    return reward_to_go(reward, done, gamma) * scale
-
-
-def time_baseline(reward: Tensor, done: Tensor, gamma: float, baseline: Tensor) -> Tensor:
-    """Return the discounted return minus a baseline for each time step of an episode; unbiased.
-
-    The baseline (steps,) is from earlier episodes; times beyond its end have baseline 0.
-    """
-    padded, lengths = _pad(reward, done)
-    steps = min(len(baseline), len(padded))
-    returns = _discount(padded, gamma)
-    returns[:steps] -= baseline[:steps, None]
-    return _unpad(returns, lengths, reward)
+    padded, lengths = pad(reward, done)
+    return unpad(discount(padded, gamma), lengths, reward)
 
 
 def leave_one_out(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
@@ -110,11 +67,11 @@ def leave_one_out(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
     neither scaled (`scale_to_unit`) nor averaged over steps (`ReinforceLoss`); an episode that goes
     on alone has baseline 0.
     """
-    padded, lengths = _pad(reward, done)
-    returns = _discount(padded, gamma)
-    others = _alive(lengths, returns).sum(1, keepdim=True) - 1
+    padded, lengths = pad(reward, done)
+    returns = discount(padded, gamma)
+    others = alive(lengths, returns).sum(1, keepdim=True) - 1
     baseline = (returns.sum(1, keepdim=True) - returns) / others.clamp(min=1)
-    return _unpad(returns - baseline, lengths, reward)
+    return unpad(returns - baseline, lengths, reward)
 
 
 def batch_normalized(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
@@ -140,15 +97,8 @@ def scale_to_unit(returns: Tensor) -> Tensor:
     return returns / rms if rms > ROUNDING else torch.zeros_like(returns)
 
 
-def mean_by_time(returns: Tensor, done: Tensor) -> tuple[Tensor, Tensor]:
-    """Return mean and number of the episodes still going at each time step, (longest,)."""
-    padded, lengths = _pad(returns, done)
-    count = _alive(lengths, padded).sum(1)
-    return padded.sum(1) / count, count
-
-
-def _pad(values: Tensor, done: Tensor) -> tuple[Tensor, list[int]]:
-    """Episodes side by side, zeros after their ends. Shape: (longest, episodes)."""
+def pad(values: Tensor, done: Tensor) -> tuple[Tensor, list[int]]:
+    """Return episodes side by side, (longest, episodes), with zeros after their ends; and lengths."""
     if values.shape != done.shape or values.shape[-1] != 1:
         raise ValueError(
             f"values {tuple(values.shape)} and done {tuple(done.shape)} must both be (*batch, T, 1)"
@@ -157,22 +107,185 @@ def _pad(values: Tensor, done: Tensor) -> tuple[Tensor, list[int]]:
     return pad_sequence(list(values.flatten().float().split(lengths))), lengths
 
 
-def _unpad(padded: Tensor, lengths: list[int], like: Tensor) -> Tensor:
+def unpad(padded: Tensor, lengths: list[int], like: Tensor) -> Tensor:
+    """Return padded values as the steps of `like`, episode after episode."""
     episodes = zip(padded.T, lengths, strict=True)
     return torch.cat([episode[:length] for episode, length in episodes]).reshape(like.shape)
 
 
-def _discount(padded: Tensor, gamma: float) -> Tensor:
+def discount(padded: Tensor, gamma: float) -> Tensor:
+    """Return the discounted rewards-to-go of padded episodes."""
     returns = padded.cpu().numpy().copy()  # numpy: ten times faster than torch for short rows
     for t in range(len(returns) - 2, -1, -1):
         returns[t] += gamma * returns[t + 1]
     return torch.from_numpy(returns).to(padded.device)
 
 
-def _alive(lengths: list[int], padded: Tensor) -> Tensor:
+def alive(lengths: list[int], padded: Tensor) -> Tensor:
+    """Return which steps of padded episodes belong to them. Shape: that of `padded`."""
     step = torch.arange(len(padded), device=padded.device)[:, None]
     return step < torch.tensor(lengths, device=padded.device)
 
 
-def _mean(padded: Tensor, alive: Tensor) -> Tensor:
-    return (padded * alive).sum(0) / alive.sum(0)
+_MASK = ("collector", "mask")
+
+
+class ReturnKeys(TypedDict, total=False):
+    """Keyword arguments of `ReturnEstimator`."""
+
+    scale: bool | None
+    reward_key: NestedKey
+    done_key: NestedKey
+    out_key: NestedKey
+
+
+class ReturnEstimator(Transform, abc.ABC):
+    """Apply one of the functions above to a batch: a transform, called by the collector.
+
+    Read rewards and end flags of shape (*batch, T, 1), write returns of the same shape.
+
+    A return is known once its episode has ended, so this is no transform of an environment. Like
+    TorchRL's `Reward2GoTransform` it is for complete episodes: the `postproc` of a collector (of a
+    chain, its `inv`), or the transform of a replay buffer, which estimates when a batch is added.
+
+    If a batch ends within an episode, the returns of its steps are unknown: they are 0, and
+    ("collector", "mask"), which TorchRL's losses and ours use, is False. An episode that began in
+    an earlier batch is taken to begin with this one; TorchRL's collectors start each batch again
+    with `reset_at_each_iter=True`.
+
+    Examples:
+        >>> Collector(env, actor, reset_at_each_iter=True, postproc=RewardToGo(), ...)
+        >>> ReplayBuffer(storage=LazyTensorStorage(10_000), transform=RewardToGo())
+        >>> RewardToGo(0.95)(batch)["return_to_go"]
+    """
+
+    Settings: ClassVar[type[settings.Returns]] = settings.Returns
+    """Where the defaults of the parameters are defined."""
+
+    def __init__(
+        self,
+        *,
+        scale: bool | None = None,
+        reward_key: NestedKey = ("next", "reward"),
+        done_key: NestedKey = ("next", "done"),
+        out_key: NestedKey = "return_to_go",
+    ) -> None:
+        """Name the entries.
+
+        Args:
+            scale: Whether to divide the batch's returns by their root mean square; biased, see
+                `scale_to_unit`. By default as in the settings of this estimator.
+            reward_key: Entry with the rewards.
+            done_key: Entry with the end flags.
+            out_key: Entry that is written, under one name for all estimators. With a baseline, as
+                in the default `LeaveOneOut`, it holds advantages, scaled if `scale` is set.
+        """
+        read, written = [reward_key, done_key], [out_key]
+        super().__init__(in_keys=read, out_keys=written, in_keys_inv=read, out_keys_inv=written)
+        self.scale = self.Settings().scale if scale is None else scale
+        self._is_contained = False
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Write the returns; in the chain of a replay buffer, return samples unchanged.
+
+        Raises:
+            InputError: No episode ends in the batch.
+        """
+        return tensordict if self._is_contained else self._inv_call(tensordict)
+
+    @torch.no_grad()
+    def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
+        reward, done = (tensordict.get(key) for key in self.in_keys)
+        ends = _ends_later(done)
+        if bool(ends.all()) and not (self._is_contained or _MASK in tensordict.keys(True)):
+            return tensordict.set(self.out_keys[0], self._estimate(reward, done))
+        values = self._estimate(reward[ends][:, None], done[ends][:, None])
+        filled = torch.zeros_like(reward, dtype=values.dtype)
+        filled[ends] = values[:, 0]
+        return tensordict.set(self.out_keys[0], filled).set(_MASK, ends[..., 0])
+
+    def _estimate(self, reward: Tensor, done: Tensor) -> Tensor:
+        values: Any = self.estimate(reward, done)
+        is_tensor = isinstance(values, Tensor) and values.shape == reward.shape
+        fault = "" if is_tensor else described(values)
+        if is_tensor and not type(self).__module__.startswith("drone_rl."):
+            fault = "" if values.isfinite().all() else "NaN or infinity"
+        if fault:
+            raise InputError(
+                f"{place_of(type(self))} returns {fault} for rewards of shape "
+                f"{tuple(reward.shape)}; return a tensor of finite numbers of that shape"
+            )
+        return scale_to_unit(values) if self.scale else values
+
+    def set_container(self, container: Transform | EnvBase) -> None:
+        """Join a chain of transforms; raise an `InputError` if it belongs to an environment."""
+        if isinstance(container, EnvBase) or container.parent is not None:
+            raise InputError(
+                f"{type(self).__name__} needs whole episodes, an environment has one step at a "
+                "time; give it as postproc to a collector or as transform to a replay buffer"
+            )
+        super().set_container(container)
+        self._is_contained = True
+
+    @abc.abstractmethod
+    def estimate(self, reward: Tensor, done: Tensor) -> Tensor:
+        """Return the returns. Shape: that of `reward`."""
+
+
+def _ends_later(done: Tensor) -> Tensor:
+    """Return whether the episode of each step ends within its row. Shape: (*batch, T, 1)."""
+    ends = done.flip(-2).cumsum(-2).flip(-2) > 0
+    if not bool(ends.any()):
+        raise InputError(
+            f"no episode ends in a batch of shape {tuple(done.shape[:-1])}, so no return is known; "
+            "collect more steps a batch"
+        )
+    return ends
+
+
+class Discounted(ReturnEstimator):
+    """A return estimator with a discount rate."""
+
+    function: ClassVar[Callable[[Tensor, Tensor, float], Tensor]]
+    """Maps rewards, end flags and discount rate to returns."""
+
+    def __init__(self, gamma: float | None = None, **keys: Unpack[ReturnKeys]) -> None:
+        super().__init__(**keys)
+        defaults: Any = self.Settings()
+        self.gamma: float = defaults.gamma if gamma is None else gamma
+        if not 0.0 <= self.gamma <= 1.0:
+            raise InputError(f"gamma={gamma} is out of range; give a rate from 0 to 1")
+
+    def estimate(self, reward: Tensor, done: Tensor) -> Tensor:
+        """See `ReturnEstimator.estimate`."""
+        return type(self).function(reward, done, self.gamma)
+
+
+@implements(settings.TotalReward)
+class TotalReward(ReturnEstimator):
+    """The whole episode's reward at every step (Eq. 12)."""
+
+    def estimate(self, reward: Tensor, done: Tensor) -> Tensor:
+        """See `total_reward`."""
+        return total_reward(reward, done)
+
+
+@implements(settings.RewardToGo)
+class RewardToGo(Discounted):
+    """Discounted return (Eq. 14)."""
+
+    function = staticmethod(reward_to_go)
+
+
+@implements(settings.LeaveOneOut)
+class LeaveOneOut(Discounted):
+    """Discounted return minus the other episodes' mean at the same time step."""
+
+    function = staticmethod(leave_one_out)
+
+
+@implements(settings.BatchNormalized)
+class BatchNormalized(Discounted):
+    """Discounted return, normalized over the batch."""
+
+    function = staticmethod(batch_normalized)

@@ -25,7 +25,7 @@ from drone_rl.objectives import (
     Standardized,
     TimeBaseline,
     TotalReward,
-    returns,
+    original_returns,
 )
 from tests.three_state_episodes import outcomes
 
@@ -117,7 +117,7 @@ def known_baseline():
     """Return an estimator with given running means."""
     estimator = TimeBaseline(1.0, max_steps=3, scale=False)
     estimator.baseline += torch.tensor([0.7, -0.3, 0.2])
-    estimator.estimate = lambda r, d: returns.time_baseline(r, d, 1.0, estimator.baseline)
+    estimator.estimate = lambda r, d: original_returns.time_baseline(r, d, 1.0, estimator.baseline)
     return estimator
 
 

@@ -4,7 +4,7 @@ from tensordict import TensorDict
 
 from drone_rl import objectives
 from drone_rl.config.learning import Gae, Returns
-from drone_rl.objectives import Advantages, ReturnEstimator, TimeBaseline, returns
+from drone_rl.objectives import Advantages, ReturnEstimator, TimeBaseline, original_returns, returns
 from drone_rl.utils.errors import InputError
 
 
@@ -50,10 +50,10 @@ def test_time_baseline_ignores_steps_beyond_max_steps():
 PURE = {
     "TotalReward": lambda r, d: returns.total_reward(r, d),
     "RewardToGo": lambda r, d: returns.reward_to_go(r, d, 0.7),
-    "Standardized": lambda r, d: returns.standardized(r, d, 0.7),
-    "LinearRamp": lambda r, d: returns.linear_ramp(r, d),
-    "SuccessScaled": lambda r, d: returns.success_scaled(r, d, 0.7, 2.0),
-    "TimeBaseline": lambda r, d: returns.time_baseline(r, d, 0.7, torch.zeros(0)),
+    "Standardized": lambda r, d: original_returns.standardized(r, d, 0.7),
+    "LinearRamp": lambda r, d: original_returns.linear_ramp(r, d),
+    "SuccessScaled": lambda r, d: original_returns.success_scaled(r, d, 0.7, 2.0),
+    "TimeBaseline": lambda r, d: original_returns.time_baseline(r, d, 0.7, torch.zeros(0)),
     "LeaveOneOut": lambda r, d: returns.leave_one_out(r, d, 0.7),
     "BatchNormalized": lambda r, d: returns.batch_normalized(r, d, 0.7),
 }

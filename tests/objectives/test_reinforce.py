@@ -6,7 +6,7 @@ from torch import nn
 from torchrl.data import Categorical
 from torchrl.modules import ProbabilisticActor
 
-from drone_rl.objectives import ReinforceLoss, returns
+from drone_rl.objectives import ReinforceLoss, original_returns
 from drone_rl.policies.actor import RandomSource, SeededCategorical
 from drone_rl.utils.errors import InputError
 
@@ -79,7 +79,7 @@ def test_algorithm_4_matches_a_hand_computed_step():
     network, actor = make(features=1)
     reward = torch.tensor([[0.0], [0.0], [1.0]])
     done = torch.tensor([[False], [False], [True]])
-    normalised = returns.standardized(reward, done, 0.5)
+    normalised = original_returns.standardized(reward, done, 0.5)
     root = 14**0.5
     torch.testing.assert_close(normalised[:, 0], torch.tensor([-4 / root, -1 / root, 5 / root]))
     batch = TensorDict(

@@ -5,7 +5,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drone_rl.objectives import returns
+from drone_rl.objectives import original_returns, returns
 from drone_rl.utils.errors import InputError
 
 REWARD = torch.tensor([0.0, 1.0, 0.0, 1.0, 1.0, 0.0])[:, None]
@@ -30,27 +30,27 @@ def test_standardized():
     # first episode: mean 0.84375, deviations -.21875 .40625 -.34375 .15625, variance .0888672
     std = 0.0888671875**0.5
     first = [-0.21875 / std, 0.40625 / std, -0.34375 / std, 0.15625 / std]
-    check(returns.standardized(REWARD, DONE, 0.5), [*first, 1.0, -1.0])
+    check(original_returns.standardized(REWARD, DONE, 0.5), [*first, 1.0, -1.0])
 
 
 def test_standardized_of_a_constant_is_zero():
     reward = torch.zeros(3, 1)
     done = torch.tensor([[False], [True], [True]])
-    assert returns.standardized(reward, done, 0.9).tolist() == [[0.0], [0.0], [0.0]]
+    assert original_returns.standardized(reward, done, 0.9).tolist() == [[0.0], [0.0], [0.0]]
 
 
 def test_linear_ramp():
-    check(returns.linear_ramp(REWARD, DONE), [0.5, 1.0, 1.5, 2.0, 0.5, 1.0])
+    check(original_returns.linear_ramp(REWARD, DONE), [0.5, 1.0, 1.5, 2.0, 0.5, 1.0])
 
 
 def test_success_scaled():
     e = torch.tensor(1.0).exp().item()
     expected = [v / e for v in TO_GO[:4]] + [1 / e**2, 0.0]
-    check(returns.success_scaled(REWARD, DONE, 0.5, max_reward=3.0), expected)
+    check(original_returns.success_scaled(REWARD, DONE, 0.5, max_reward=3.0), expected)
 
 
 def test_time_baseline_applies_to_known_steps_only():
-    values = returns.time_baseline(REWARD, DONE, 0.5, torch.tensor([0.5, 0.25]))
+    values = original_returns.time_baseline(REWARD, DONE, 0.5, torch.tensor([0.5, 0.25]))
     check(values, [0.125, 1.0, 0.5, 1.0, 0.5, -0.25])
 
 
@@ -78,7 +78,7 @@ def test_rounding_errors_are_not_scaled_up(gap, counts):
     expected = torch.tensor([[-1.0], [1.0]]) * counts
     values = returns.batch_normalized(reward, done, 0.0)
     torch.testing.assert_close(values, expected, atol=0.05, rtol=0)
-    values = returns.standardized(reward, torch.tensor([[False], [True]]), 0.0)
+    values = original_returns.standardized(reward, torch.tensor([[False], [True]]), 0.0)
     torch.testing.assert_close(values, expected, atol=0.05, rtol=0)
     scaled = returns.scale_to_unit(torch.tensor([[-gap], [gap]]))
     torch.testing.assert_close(scaled, expected)
@@ -103,10 +103,12 @@ def test_scale_to_unit_keeps_zero_and_sign():
 ESTIMATORS = {
     "total_reward": lambda r, d: returns.total_reward(r, d),
     "reward_to_go": lambda r, d: returns.reward_to_go(r, d, 0.9),
-    "standardized": lambda r, d: returns.standardized(r, d, 0.9),
-    "linear_ramp": lambda r, d: returns.linear_ramp(r, d),
-    "success_scaled": lambda r, d: returns.success_scaled(r, d, 0.9, 3.0),
-    "time_baseline": lambda r, d: returns.time_baseline(r, d, 0.9, torch.tensor([0.3, 0.2])),
+    "standardized": lambda r, d: original_returns.standardized(r, d, 0.9),
+    "linear_ramp": lambda r, d: original_returns.linear_ramp(r, d),
+    "success_scaled": lambda r, d: original_returns.success_scaled(r, d, 0.9, 3.0),
+    "time_baseline": lambda r, d: original_returns.time_baseline(
+        r, d, 0.9, torch.tensor([0.3, 0.2])
+    ),
     "leave_one_out": lambda r, d: returns.leave_one_out(r, d, 0.9),
     "batch_normalized": lambda r, d: returns.batch_normalized(r, d, 0.9),
 }

@@ -10,6 +10,7 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
+from torch import Tensor
 
 from drone_rl.envs.gymnasium.world_batch import METADATA, Chosen, WorldBatch, read_action
 from drone_rl.utils.errors import InputError
@@ -62,8 +63,6 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._seeds: list[int | None] = [None] * num_envs
         self._ended: Mask | None = None  # none is running before the first reset
-        space = self.observation_space
-        self._seen = np.zeros(space.shape or (), space.dtype)
 
     @property
     def np_random(self) -> tuple[np.random.Generator, ...]:  # pyright: ignore[reportIncompatibleMethodOverride] (as SyncVectorEnv's)
@@ -95,10 +94,9 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         for i, one in enumerate(self._read_seeds(seed)):
             if mask[i] and one is not None:
                 self._generators[i], self._seeds[i] = seeding.np_random(one)
-        self._start(mask)
-        self._observe_starts(mask)
+        seen = self.batch.observe(True, self._start(mask))
         self._ended = ~mask if self._ended is None else self._ended & ~mask
-        return self._seen.copy(), _masked(self.batch.info(), mask)
+        return seen, _masked(self.batch.info(), mask)
 
     def step(self, actions: Any) -> tuple[NDArray[Any], NDArray[Any], Mask, Mask, Info]:
         """Step each environment by one of `single_action_space`; reset those that had finished.
@@ -116,14 +114,15 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
             )
         rewards = np.where(self._ended, 0.0, self.batch.step(actions))
         self._start(self._ended)
-        self._seen = self.batch.observe(torch.from_numpy(self._ended))
+        starts = torch.from_numpy(self._ended).to(self.batch.worlds.device)
+        seen = self.batch.observe(starts)
         flags = self.batch.flags()
         self._ended = flags[0] | flags[1]
         final = {}
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
-            final = self._finish(self._ended)
+            seen, final = self._finish(self._ended, seen)
         info = {**_masked(self.batch.info(), np.ones(self.num_envs, bool)), **final}
-        return self._seen.copy(), rewards, *flags, info
+        return seen, rewards, *flags, info
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """Render each drone from behind, (360, 640, 3), if `render_mode` is set."""
@@ -134,25 +133,24 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         """Close the renderer."""
         self.batch.worlds.close()
 
-    def _finish(self, ended: Mask) -> Info:
-        """Reset environments that have just finished; return their final information."""
+    def _finish(self, ended: Mask, seen: NDArray[Any]) -> tuple[NDArray[Any], Info]:
+        """Reset environments that have just finished, as last seen.
+
+        Return the observations then, and the final information.
+        """
         last = np.full(self.num_envs, None, object)
         for i in np.flatnonzero(ended):
-            last[i] = self._seen[i].copy()
+            last[i] = seen[i].copy()
         info = _masked(self.batch.info(), ended)
-        self._start(ended)
-        self._observe_starts(ended)
+        after = self.batch.observe(True, self._start(ended))
         self._ended = np.zeros_like(ended)
-        return _masked({"final_obs": last, "final_info": info}, ended)
+        return after, _masked({"final_obs": last, "final_info": info}, ended)
 
-    def _observe_starts(self, mask: Mask) -> None:
-        """Observe environments whose episodes start; the others keep their last observation."""
-        if mask.any():
-            self._seen[mask] = self.batch.observe(True, torch.from_numpy(np.flatnonzero(mask)))
-
-    def _start(self, mask: Mask) -> None:
-        worlds = np.flatnonzero(mask)
-        self.batch.reset(torch.from_numpy(worlds), [self._generator(i) for i in worlds.tolist()])
+    def _start(self, mask: Mask) -> Tensor:
+        """Start episodes, without observations; return the indices of the environments."""
+        worlds = torch.from_numpy(np.flatnonzero(mask)).to(self.batch.worlds.device)
+        self.batch.reset(worlds, [self._generator(i) for i in worlds.tolist()])
+        return worlds
 
     def _generator(self, world: int) -> np.random.Generator:
         generator = self._generators[world]

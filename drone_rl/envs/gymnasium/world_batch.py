@@ -13,14 +13,13 @@ from torch import Tensor
 
 from drone_rl.config import BaseTaskSettings, TaskSettings
 from drone_rl.config.commands import GymnasiumSettings
-from drone_rl.envs.observer import Observer, Starts
+from drone_rl.envs import DroneEnv
+from drone_rl.envs.observer import Starts
 from drone_rl.sim.actions import Actions, Entry
 from drone_rl.sim.composer_task import CONTROL_TIMESTEP_S
 from drone_rl.sim.entities import CHASE
 from drone_rl.sim.tasks import Task, as_task
-from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError, did_you_mean
-from drone_rl.utils.seeding import side_stream
 from drone_rl.utils.settings import Settings
 
 _MOST = float(np.finfo(np.float32).max)
@@ -116,34 +115,29 @@ class WorldBatch:
         self.options = options
         self.task = _chosen_task(task, changes)
         """The task or its settings."""
-        self.worlds = Worlds(
-            num_envs,
-            as_task(self.task),
-            options.camera,
-            dynamics=options.dynamics,
-            actions=options.actions,
-            renderer=options.renderer,
-            device=options.device,
-        )
-        self._every = torch.arange(num_envs, device=self.worlds.device)
-        self._random_states = [np.random.RandomState(0)] * num_envs
         self.render_mode = options.render_mode
         self.has_images = options.observations == "pixels"
         if options.transforms and not self.has_images:
             raise InputError(
                 f"transforms change images, but observations={options.observations}; leave them out"
             )
-        self._observer = Observer(
-            self.worlds,
-            [transform.make() for transform in options.transforms],
-            streams=lambda rows, key: [
-                side_stream(self._random_states[row], *key) for row in rows.tolist()
-            ],
+        self._env = DroneEnv(
+            num_envs,
+            as_task(self.task),
+            options.camera,
+            transforms=[transform.make() for transform in options.transforms],
+            pixels=self.has_images,
+            device=options.device,
+            dynamics=options.dynamics,
+            actions=options.actions,
+            renderer=options.renderer,
         )
+        self.worlds = self._env.worlds
+        self._every = torch.arange(num_envs, device=self.worlds.device)
         self.names = tuple(name for name in self.worlds.entries if name != END)
         """Entries of `info` that make up the state vector, in order."""
         self.observation_space: spaces.Box = (
-            image_space(self._observer.example()[0])
+            image_space(self._env.observer.example()[0])
             if self.has_images
             else vector_space({name: self.worlds.entries[name] for name in self.names})
         )
@@ -152,10 +146,9 @@ class WorldBatch:
     def reset(self, env_ids: Tensor, generators: Sequence[np.random.Generator]) -> None:
         """Reset environments by index, shape (k,), each with its own random generator."""
         # each RandomState shares its generator's bit generator, so both advance together
-        states = [np.random.RandomState(generator.bit_generator) for generator in generators]
-        for row, state in zip(env_ids.tolist(), states, strict=True):
-            self._random_states[row] = state
-        self.worlds.reset(env_ids, states)
+        for row, generator in zip(env_ids.tolist(), generators, strict=True):
+            self._env.random_states[row] = np.random.RandomState(generator.bit_generator)
+        self._env.start(env_ids)
 
     def step(self, actions: Tensor) -> NDArray[np.float64]:
         """Step all environments; return their rewards. Shapes: (num_envs, *) to (num_envs,)."""
@@ -163,17 +156,16 @@ class WorldBatch:
         return self.worlds.step(self._every, actions).cpu().numpy()
 
     def observe(self, starts: Starts, env_ids: Tensor | None = None) -> NDArray[Any]:
-        """Return new observations, once after each step and each reset.
+        """Return the observations of all environments as a new array, after a step or reset.
 
         Args:
             starts: Where episodes start, see `drone_rl.envs.observer.Starts`.
-            env_ids: Indices of environments, (k,); all by default.
+            env_ids: Environments with a new state, (k,); all by default.
         """
-        state = self.worlds.state if env_ids is None else self.worlds.state[env_ids]
         if self.has_images:
-            rows = self._every if env_ids is None else env_ids
-            return self._observer.observe(state, rows, starts, None)["pixels"].cpu().numpy()
-        info = self.worlds.info(state)
+            pixels = self._env.observe(self._every if env_ids is None else env_ids, starts)
+            return pixels.cpu().numpy().copy()
+        info = self.worlds.info()
         flat = [info[name][:, None].flatten(1).float().nan_to_num() for name in self.names]
         return torch.cat(flat, 1).cpu().numpy()
 
