@@ -2,7 +2,7 @@
 
 import logging
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import drone_rl
 from drone_rl.cli.settings import CommandSettings, RolloutCommandSettings, finish
@@ -15,11 +15,11 @@ from drone_rl.config.commands import (
     JudgeSettings,
     ShiftSettings,
 )
-from drone_rl.utils.errors import InputError
+from drone_rl.config.values import NumEpisodes, Seed
 from drone_rl.utils.models import Seeded
 from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.progress import log, silent
-from drone_rl.utils.schema import FileName, OneOf, Whole
+from drone_rl.utils.schema import FileName, Whole
 
 _log = logging.getLogger(__name__)
 
@@ -74,14 +74,14 @@ class PlayCommand(AppearanceCommandSettings, DeviceSettings):
     A recording, format=rerun, needs pip install -e '.[rerun]'.
     """
 
-    episodes: Annotated[int, Whole(1, unit="episodes")] = 3
+    episodes: NumEpisodes = 3
     """Episodes to record, each in files of its own."""
-    format: Annotated[str, OneOf(("video", "rerun"))] = "video"
+    format: Literal["video", "rerun"] = "video"
     """video: an MP4 and a GIF file; or rerun: a recording of cameras, poses, action probabilities
     and heat maps on one timeline, for the viewer of Rerun."""
     greedy: bool = True
     """Whether to take the most probable action instead of sampling."""
-    seed: Annotated[int, Whole(0)] = 0
+    seed: Seed = 0
     """Root of the environments' random streams."""
     viewer: bool = False
     """Whether to open dm_control's viewer, which needs a display, instead of recording."""
@@ -89,10 +89,7 @@ class PlayCommand(AppearanceCommandSettings, DeviceSettings):
     def check(self) -> None:
         """Reject a format of files for the viewer, which writes none."""
         if self.viewer and self.format != "video":
-            raise InputError(
-                f"format={self.format} is for recordings, which viewer=true does not make; leave "
-                "one of them out"
-            )
+            self.refuse("format", "is for recordings, which viewer=true does not make; omit one")
 
     def ends_alone(self) -> bool:
         """See `CommandSettings`."""
@@ -128,7 +125,7 @@ class VerdictCommand(AppearanceCommandSettings, JudgeSettings):
     certificate: str | None = None
     """Certificate file to quote; null takes the one next to the policy, if it matches:
     certificate.json in the folder of a run, NAME.certificate.json next to NAME.safetensors."""
-    require: Annotated[str, OneOf(("good", "proved"))] | None = None
+    require: Literal["good", "proved"] | None = None
     """good or null: exit status 0 only if the policy is certainly good, otherwise one per kind.
     proved: 0 only if there is a certificate of success from every placement, episodes do not refute
     it, and the proof is computed again (minutes), otherwise 16."""
@@ -200,7 +197,7 @@ class ExportCommand(CommandSettings, HeldOutSettings):
     """Policy: a .pt or .safetensors file, folder of a run, latest, or name of a shipped policy."""
     name: Annotated[str, FileName()] = "policy"
     """Name of the files, without extension."""
-    format: Annotated[str, OneOf(("safetensors", "onnx"))] = "safetensors"
+    format: Literal["safetensors", "onnx"] = "safetensors"
     """safetensors with model card, or onnx: a model from RGB image to action probabilities."""
     command: Annotated[str, COMMAND] | None = None
     """Training command for the card or the ONNX metadata; null takes that of the policy's run."""
@@ -214,25 +211,17 @@ class ExportCommand(CommandSettings, HeldOutSettings):
         """Reject extensions, and files for the model card with an ONNX model, which has none."""
         stem, _, extension = self.name.rpartition(".")
         if extension in ("safetensors", "onnx", "pt"):
-            raise InputError(f"name={self.name} has an extension; give name={stem or 'policy'}")
+            self.refuse("name", f"has an extension; give name={stem or 'policy'}")
         for name in ("certificate", "shifts"):
             if self.format == "onnx" and getattr(self, name) is not None:
-                raise InputError(
-                    f"{name} applies only to the model card, which format=onnx does not write; "
-                    "leave it out or give format=safetensors"
-                )
+                self.refuse(name, "is for a model card, which format=onnx does not write; omit it")
 
     def run(self, folder: Path) -> tuple[int, str]:
         """Export one policy; return the exit status and the file's path."""
         from drone_rl.sweeps.rows import choice_in_sweep
         from drone_rl.trust.export import export
         from drone_rl.trust.onnx_export import export_onnx
-        from drone_rl.trust.recorded import (
-            describe,
-            read_verdicts,
-            record_verdict,
-            recorded_verdict,
-        )
+        from drone_rl.trust.recorded import record_verdict
         from drone_rl.utils.seeding import root_seed  # imports torch
         from drone_rl.verification.claim import find_claim
 
@@ -241,18 +230,15 @@ class ExportCommand(CommandSettings, HeldOutSettings):
         recorded_command, choice = choice_in_sweep(policy.path) or (None, None)
         command = self.command or recorded_command
         if self.format == "onnx":
-            seed = root_seed(self.seed)
             _log.info("compares the model with PyTorch in the policy's episodes")
+            seed = root_seed(self.seed)
             exported = export_onnx(policy, target, command=command, seed=seed.value)
             difference = f"{exported.difference:.1e} in {exported.frames:,} images"
-            _log.info("written: %s, which differs from PyTorch by at most %s", target, difference)
-            recorded = recorded_verdict(policy, read_verdicts(self.paths.outputs))
-            kind, success = ("not judged", "") if recorded is None else describe(recorded)
-            print(f"recorded verdict: {' '.join(filter(None, (kind, success)))}")
+            print(f"differs from PyTorch by at most {difference}")
             seeded = Seeded(**seed.as_dict())
         else:
             _log.info("judges the policy in %s episodes for the model card", f"{self.episodes:,}")
-            verdict = export(
+            seeded = export(
                 policy,
                 target,
                 self,
@@ -263,9 +249,7 @@ class ExportCommand(CommandSettings, HeldOutSettings):
                 outputs=self.paths.outputs,
                 find_claim=find_claim,
             )
-            _log.info("written: %s and %s", target, target.with_suffix(".md").name)
-            record_verdict(folder, policy, verdict)
-            print(verdict.line)
-            seeded = verdict
-        _log.info("%s", seeded.seed_line())
+            record_verdict(folder, policy, seeded)
+            print(seeded.line)
+        _log.info("written: %s; %s", target, seeded.seed_line())
         return 0, str(target)

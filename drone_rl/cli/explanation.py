@@ -9,11 +9,12 @@ import pydantic
 import drone_rl
 from drone_rl.cli.settings import CommandSettings, PolicyCommandSettings, finish
 from drone_rl.config.configuration import DynamicsChanges, TaskChanges
+from drone_rl.config.values import NumEnvs
 from drone_rl.explanations.chapter_figures import FigureSettings
 from drone_rl.explanations.settings import ClassModelsSettings, ExplainSettings
 from drone_rl.trust.rule import VerdictKind
 from drone_rl.utils.progress import log
-from drone_rl.utils.schema import Listed, OneOf, Whole
+from drone_rl.utils.schema import Listed, OneOf
 
 _log = logging.getLogger(__name__)
 
@@ -27,7 +28,7 @@ class ExplainCommand(CommandSettings, ExplainSettings):
     policy: Annotated[Any, Listed("policy")] = ("latest",)
     """Policy, or a list of policies that one report compares, as in policy=[good,poor]: files,
     folders of runs, latest, or names of shipped policies."""
-    num_envs: Annotated[int, Whole(1, unit="environments")] = 128
+    num_envs: NumEnvs = 128
     """Environments in a batch; bounds memory."""
     require: Annotated[str, OneOf(tuple(VerdictKind))] | None = None
     """Kind of verdict to require, such as good; other kinds and uncertain verdicts end with exit

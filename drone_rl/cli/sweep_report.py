@@ -3,10 +3,9 @@
 import logging
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
 
 from drone_rl.cli.settings import CommandSettings, with_name
-from drone_rl.utils.schema import Whole
+from drone_rl.config.values import NumEpisodes
 
 _log = logging.getLogger(__name__)
 
@@ -23,7 +22,7 @@ class SweepReportCommand(CommandSettings):
     """Path of a PNG chart of verdicts, one-sided policies and entropies to write; null for none."""
     judge: bool = False
     """Whether to repeat the verdict on each finished run's last.pt with the current rule."""
-    episodes: Annotated[int, Whole(1, unit="episodes")] = 200
+    episodes: NumEpisodes = 200
     """Episodes of each of these verdicts, in environments reserved for model selection."""
     device: str = "cpu"
     """Device of these episodes: cpu, cuda or cuda:N."""

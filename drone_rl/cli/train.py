@@ -13,10 +13,10 @@ from drone_rl.cli.settings import CommandSettings
 from drone_rl.config.commands import ProvableSettings
 from drone_rl.config.parts import Parts
 from drone_rl.config.training import Logger, Tensorboard, TrainSettings
+from drone_rl.config.values import Seed
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import bar_or_lines
 from drone_rl.utils.readers import read_result
-from drone_rl.utils.schema import Whole
 from drone_rl.utils.text import render
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ class TrainCommand(CommandSettings, TrainSettings):
     new one."""
     provable: ProvableSettings = ProvableSettings()
     """Training in rounds until a proof succeeds, if provable.rounds is above 0."""
-    trial: Annotated[int, Whole(0)] | None = None
+    trial: Seed | None = None
     """Number of this run in a search, which hydra/sweeper=optuna sets; null for no search."""
 
     def check(self) -> None:

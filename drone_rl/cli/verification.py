@@ -74,7 +74,7 @@ class PlacesCommand(PolicyCommandSettings, PlacesSettings):
         settings = self.as_base(PlacesSettings)
         result = drone_rl.places(self.policy, settings, **self.shared(), progress=silent)
         finish(result, folder, "places.json, places.png and places.svg")
-        return 0, result.numbers["blind"]
+        return 0, result.blind
 
 
 class ChainCommand(PolicyCommandSettings, ChanceSettings):

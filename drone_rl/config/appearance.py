@@ -8,6 +8,7 @@ from pydantic_core import PydanticCustomError
 
 from drone_rl.config.camera import FRONT, CameraSettings
 from drone_rl.config.task import Color, ObjectRegion
+from drone_rl.config.values import Fraction
 from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.schema import Listed, Real, Several, Span, Whole
 from drone_rl.utils.settings import Settings, conf_dir
@@ -61,7 +62,7 @@ class AppearanceSettings(Settings):
     """Red, green, blue of the sun's light."""
     ambient_strength: Annotated[NumberOrRange, _Light] = 0.35
     """Ambient light, equal from all directions."""
-    shadows: Annotated[float, Real(0.0, 1.0)] = 0.0
+    shadows: Fraction = 0.0
     """Probability that the sun casts shadows in an episode."""
     sky_horizon: Annotated[ColorOrRange, _Tint] = (0.62, 0.74, 0.92)
     """Color of the sky at the horizon, and of fog."""

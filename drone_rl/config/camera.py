@@ -3,7 +3,8 @@
 import math
 from typing import Annotated
 
-from drone_rl.utils.schema import OneOf, Real, Whole
+from drone_rl.config.values import Pixels
+from drone_rl.utils.schema import OneOf, Real
 from drone_rl.utils.settings import Settings
 
 FRONT = (0.4, 0.0, 0.0)
@@ -13,9 +14,9 @@ FRONT = (0.4, 0.0, 0.0)
 class CameraSettings(Settings):
     """Settings of the policy's camera."""
 
-    width: Annotated[int, Whole(1, 1024, "pixels")] = 64
+    width: Pixels = 64
     """Width of the image in pixels."""
-    height: Annotated[int, Whole(1, 1024, "pixels")] = 25
+    height: Pixels = 25
     """Height of the image in pixels."""
     horizontal_fov: Annotated[float, Real(4.0, 170.0, unit="degrees")] = 135.0
     """Horizontal field of view in degrees."""

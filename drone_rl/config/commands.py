@@ -1,12 +1,12 @@
 """Settings of commands: evaluation, verdict, robustness, verification, benchmarks, Gymnasium."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from drone_rl.config import ActionSettings, CameraSettings, DynamicsSettings, RendererName
 from drone_rl.config.camera import DeviceSettings, RendererSettings
 from drone_rl.config.parts import Parts
 from drone_rl.config.transforms import MOST_TRANSFORMS, Transform
-from drone_rl.utils.errors import InputError
+from drone_rl.config.values import Fraction, NumEnvs, NumEpisodes, OpenFraction, Seed
 from drone_rl.utils.schema import Listed, Maybe, OneOf, Real, Several, Whole
 from drone_rl.utils.settings import Settings
 
@@ -14,12 +14,12 @@ from drone_rl.utils.settings import Settings
 class HeldOutSettings(DeviceSettings):
     """Settings of held-out episodes."""
 
-    episodes: Annotated[int, Whole(1, unit="episodes")] = 1000
+    episodes: NumEpisodes = 1000
     """Held-out episodes, each in its own scene; all policies get the same scenes."""
-    seed: Annotated[int, Whole(0)] | None = None
+    seed: Seed | None = None
     """Root of the held-out environments' random streams; null takes a fresh one from the operating
     system, which is printed and recorded."""
-    num_envs: Annotated[int, Whole(1, unit="environments")] = 250
+    num_envs: NumEnvs = 250
     """Environments in a batch; bounds memory."""
 
     @property
@@ -38,12 +38,12 @@ class EvaluateSettings(HeldOutSettings):
 class JudgeSettings(HeldOutSettings):
     """Settings of a verdict."""
 
-    episodes: Annotated[int, Whole(1, unit="episodes")] = 400
+    episodes: NumEpisodes = 400
     """Held-out episodes of the greedy and the sampled policy, the baselines and the oracle."""
-    num_envs: Annotated[int, Whole(1, unit="environments")] = 400
+    num_envs: NumEnvs = 400
     sampled: bool = True
     """Evaluate the policy with sampled actions, too; reported next to the verdict."""
-    good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
+    good_share: OpenFraction = 0.9
     """Fraction of the oracle's success rate that a good policy exceeds."""
     certificate_flights: Annotated[int, Whole(0, 10_000_000, "rollouts")] = 3000
     """Episodes that check a certificate like drone-rl check; they can refute it, not prove it."""
@@ -71,9 +71,9 @@ class BodiesSettings(JudgeSettings):
     """Policies: files, folders of runs, latest, or names of shipped policies."""
     bodies: Annotated[tuple[str, ...], Several(OneOf(BODIES), 1, len(BODIES))] = BODIES
     """Dynamics to test."""
-    episodes: Annotated[int, Whole(1, unit="episodes")] = 400
+    episodes: NumEpisodes = 400
     """Held-out greedy episodes of each policy under each dynamics; all get the same scenes."""
-    num_envs: Annotated[int, Whole(1, unit="environments")] = 400
+    num_envs: NumEnvs = 400
     sampled: bool = False
     """Evaluate with sampled actions, too."""
     certificate_flights: Annotated[int, Whole(0, 10_000_000, "rollouts")] = 0
@@ -87,7 +87,7 @@ class BodiesSettings(JudgeSettings):
         """Refuse duplicate bodies."""
         super().check()
         if len({*self.bodies}) < len(self.bodies):
-            raise InputError(f"bodies={[*self.bodies]} has one twice; give each once")
+            self.refuse("bodies", "has one twice; give each once")
 
 
 MODES = ("constant", "drifting", "onset")
@@ -108,31 +108,28 @@ class ShiftSettings(DeviceSettings):
     """Episodes under each perturbation, each in its own scene; all get the same scenes."""
     domain_episodes: Annotated[int, Whole(1, 100_000, "episodes")] = 400
     """Episodes at each strength of the search for the range: more episodes make it wider."""
-    seed: Annotated[int, Whole(0)] | None = None
+    seed: Seed | None = None
     """Root of the held-out environments' random streams; null takes a fresh one from the operating
     system, which is printed and recorded."""
-    good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
+    good_share: OpenFraction = 0.9
     """Fraction of the oracle's success rate that a good policy exceeds."""
-    possible_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
+    possible_share: OpenFraction = 0.9
     """A strength is impossible if the oracle's success rate is certainly below this."""
 
     def check(self) -> None:
         """Refuse strengths that don't rise, duplicate modes, and modes without the constant one."""
         if [*self.strengths] != sorted({*self.strengths}):
-            raise InputError(f"strengths={[*self.strengths]} don't rise; give each once, in order")
+            self.refuse("strengths", "don't rise; give each once, in order")
         if len({*self.modes}) < len(self.modes):
-            raise InputError(f"modes={[*self.modes]} has one twice; give each once")
+            self.refuse("modes", "has one twice; give each once")
         if MODES[0] not in self.modes:
-            raise InputError(
-                f"modes={[*self.modes]} leaves out constant, with which all others are compared; "
-                "add it"
-            )
+            self.refuse("modes", "leaves out constant, the reference of all others; add it")
 
 
 class GymnasiumSettings(DeviceSettings):
     """Options of `gymnasium.make`; no command has them, so that no file of conf/ does."""
 
-    observations: Annotated[str, OneOf(("pixels", "state"))] = "pixels"
+    observations: Literal["pixels", "state"] = "pixels"
     """Observations: the camera's image or the state vector."""
     camera: CameraSettings = CameraSettings()
     """Camera of the policy."""
@@ -142,7 +139,7 @@ class GymnasiumSettings(DeviceSettings):
     """Vehicle dynamics."""
     actions: ActionSettings = ActionSettings()
     """Actions of the policy."""
-    render_mode: Annotated[str, OneOf(("rgb_array",))] | None = None
+    render_mode: Literal["rgb_array"] | None = None
     """Return value of `render`: None, or rgb_array for images of the drone from behind."""
 
 
@@ -155,9 +152,9 @@ class BenchSettings(Settings):
     """Run a short version of each benchmark with rough results."""
     seeds: Annotated[tuple[int, ...], Several(Whole(0), 1, 1000)] = (0, 1, 2, 3, 4)
     """Seeds of the timed trainings."""
-    episodes: Annotated[int, Whole(1, unit="episodes")] = 1000
+    episodes: NumEpisodes = 1000
     """Held-out episodes of each trained policy."""
-    num_envs: Annotated[int, Whole(1, unit="environments")] = 512
+    num_envs: NumEnvs = 512
     """Environments in a batch of the speed benchmarks."""
     memory_frames: Annotated[int, Whole(1, unit="frames")] = 1_000_000
     """Frames over which memory must stay constant."""
@@ -179,7 +176,7 @@ class CheckSettings(DeviceSettings):
 
     flights: Annotated[int, Whole(1, 10_000_000, "rollouts")] = 3000
     """Episodes from random placements, boxes, borders, and limits of all placements."""
-    seed: Annotated[int, Whole(0)] | None = None
+    seed: Seed | None = None
     """Seed of the rollouts' placements; null takes a fresh one from the operating system, which is
     printed and recorded."""
 
@@ -189,7 +186,7 @@ class ChanceSettings(DeviceSettings):
 
     placements: Annotated[int, Whole(1, unit="placements")] = 100
     """Held-out placements: those of the first episodes of a verdict."""
-    seed: Annotated[int, Whole(0)] | None = None
+    seed: Seed | None = None
     """Seed of the held-out placements; null takes a fresh one from the operating system, which is
     printed and recorded."""
     within: Annotated[float, Real(0.0, 10_000.0, unit="m")] = 0.0
@@ -202,7 +199,7 @@ class ChanceSettings(DeviceSettings):
 class ProveSettings(RendererSettings):
     """Settings of a proof."""
 
-    logit_gap: Annotated[float, Real(0.0, 1.0)] = 1e-4
+    logit_gap: Fraction = 1e-4
     """Logits closer than this count as equal because sums are rounded."""
     compared: Annotated[int, Whole(1, 10_000_000, "images")] = 4_000
     """Random images for which renderer and closed form must agree before the proof begins."""
@@ -225,7 +222,7 @@ class PlacesSettings(RendererSettings):
     """Metres from the camera to the centre of a cube, straight ahead, at most."""
     sideways: Annotated[float, Real(0.001, 1000.0, unit="m")] = 8.0
     """Metres to the left or right of the camera, at most."""
-    logit_gap: Annotated[float, Real(0.0, 1.0)] = 1e-4
+    logit_gap: Fraction = 1e-4
     """Logits closer than this count as equal because sums are rounded."""
     compared: Annotated[int, Whole(1, 10_000_000, "images")] = 4_000
     """Random images for which renderer and closed form must agree before results are claimed."""
@@ -235,9 +232,7 @@ class PlacesSettings(RendererSettings):
     def check(self) -> None:
         """Refuse a window without places."""
         if self.nearest >= self.farthest:
-            raise InputError(
-                f"nearest={self.nearest} leaves no place before farthest={self.farthest}; give less"
-            )
+            self.refuse("nearest", f"leaves no place before farthest={self.farthest}; give less")
 
 
 class ProvableSettings(Settings):
@@ -247,7 +242,7 @@ class ProvableSettings(Settings):
     """Most rounds of failure replay, each between two searches for failures; 0 disables proofs."""
     frames: Annotated[int, Whole(1, unit="frames")] = 50_000
     """Frames that a round collects."""
-    share: Annotated[float, Real(0.0, 1.0)] = 0.5
+    share: Fraction = 0.5
     """Fraction of a round's episodes that begin at failures; the others begin anywhere."""
     margin: Annotated[float, Real(0.0, 1_000.0, unit="m")] = 0.2
     """Metres by which replayed placements extend beyond a failure, to either side."""
@@ -286,7 +281,7 @@ class FlySettings(RendererSettings):
     """Whether the policy takes the most probable action instead of sampling."""
     saliency: bool = True
     """Whether to test heat maps in the background and show the best one that passes."""
-    seed: Annotated[int, Whole(0)] = 0
+    seed: Seed = 0
     """Root of the environment's random streams."""
     port: Annotated[int, Whole(0, 65535)] = 0
     """Port at 127.0.0.1; 0 for a free one."""
@@ -302,7 +297,7 @@ class ServeSettings(Settings):
     scene: str = "cubes"
     """Objects in the scene: cubes, which vanish when touched; blocks; pillars; empty; or the
     path of an MJCF file, *.xml."""
-    clock: Annotated[str, OneOf(("wall", "lockstep"))] = "wall"
+    clock: Literal["wall", "lockstep"] = "wall"
     """wall: real time, multiplied by ClockSpeed. lockstep: time advances only while a call waits
     for it, as fast as the machine can, with the same results every time if clients send their
     requests within `patience_s` of each other."""

@@ -6,6 +6,7 @@ Each file of conf/dynamics describes one drone by these settings.
 import math
 from typing import Annotated
 
+from drone_rl.config.values import Fraction
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import OneOf, Real, Several, Whole
 from drone_rl.utils.settings import Settings
@@ -65,7 +66,7 @@ class DynamicsSettings(Settings):
     """Time constant of a rotor's first-order response, in seconds; 0 for none."""
     drag_area: Annotated[Triple, Several(Real(0.0, 100.0), 3, 3)] = (0.00538, 0.00611, 0.02989)
     """Half the drag coefficient times the area that faces each axis, in square metres."""
-    restitution: Annotated[float, Real(0.0, 1.0)] = 0.55
+    restitution: Fraction = 0.55
     """Coefficient of restitution of a contact."""
     friction: Annotated[float, Real(0.0, 10.0)] = 0.5
     """Coefficient of friction of a contact."""
@@ -116,17 +117,12 @@ class DynamicsSettings(Settings):
         """Refuse impossible inertia, and a thrust that is too small to control the drone."""
         largest, others = max(self.inertia), sum(self.inertia) - max(self.inertia)
         if largest > others * (1.0 + 1e-9):
-            raise InputError(
-                f"inertia={list(self.inertia)} is that of no body: {largest:g} is more than the "
-                f"other two together; give at most {_rounded(others, up=False):g}"
-            )
-        weight, most = self.mass * GRAVITY, 4.0 * self.rotor_thrust
-        if most < _HEADROOM * weight:
-            raise InputError(
-                f"rotor_thrust={self.rotor_thrust:g} is too small to control the drone: four "
-                f"rotors give {most:.4g} N, needed are {_HEADROOM} times its weight, "
-                f"{_HEADROOM * weight:.4g} N; give at least {_rounded(_HEADROOM * weight / 4):g}"
-            )
+            most = f"at most {0.999 * others:.4g}"
+            self.refuse("inertia", f"is of no body: one exceeds the other two; give {most}")
+        least = _HEADROOM * self.mass * GRAVITY / 4.0
+        if self.rotor_thrust < least:
+            remedy = f"give at least {1.001 * least:.4g}"
+            self.refuse("rotor_thrust", f"can't carry and control mass={self.mass}; {remedy}")
 
     def check_air(self) -> None:
         """Raise an `InputError` for wind or gusts without effect, in computer-vision mode."""
@@ -136,15 +132,6 @@ class DynamicsSettings(Settings):
                 f"dynamics.{name}={value} moves nothing in computer-vision mode; give "
                 'dynamics=quadrotor, too (in Python mode="simple_flight")'
             )
-
-
-def _rounded(bound: float, *, up: bool = True) -> float:
-    """Round a positive bound to three digits, to the side that satisfies it."""
-    digits = 2 - math.floor(math.log10(bound))
-    if digits > 300:  # 10 to that power may be no float
-        return bound
-    scale = 10.0**digits
-    return (math.ceil if up else math.floor)(bound * scale) / scale
 
 
 COMPUTER_VISION = DynamicsSettings()

@@ -1,12 +1,11 @@
 """Settings of return estimators, objectives, optimizers, learning-rate schedules and collectors."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 from drone_rl.config.parts import Part
-from drone_rl.utils.schema import OneOf, Real, Whole
-
-Rate = Annotated[float, Real(0.0, 1.0)]
+from drone_rl.config.values import Fraction, NumEnvs, Steps
+from drone_rl.utils.schema import Real, Whole
 
 
 class Returns(Part):
@@ -17,7 +16,7 @@ class Returns(Part):
 
 
 class _Discounted(Returns):
-    gamma: Rate = 0.99
+    gamma: Fraction = 0.99
     """Discount rate, 0 to 1."""
 
 
@@ -50,7 +49,7 @@ class TimeBaseline(_Discounted, target="time_baseline"):
     scale: bool = True
     decay: Annotated[float, Real(0.0, 1.0, is_below=True)] = 0.9
     """Weight of the old mean at each batch, 0 to below 1."""
-    max_steps: Annotated[int, Whole(1, 100_000, "steps")] = 300
+    max_steps: Steps = 300
     """Time steps that have a mean of their own; later ones have 0. Give the task's step limit."""
 
 
@@ -58,7 +57,7 @@ class LeaveOneOut(_Discounted, target="leave_one_out"):
     """Discounted return minus the other episodes' mean at the same time step."""
 
     scale: bool = True
-    gamma: Rate = 0.95
+    gamma: Fraction = 0.95
 
 
 class BatchNormalized(_Discounted, target="batch_normalized"):
@@ -70,15 +69,15 @@ class Gae(_Discounted, target="gae"):
 
     scale: bool = True
     """Whether to standardize a batch's advantages."""
-    gamma: Rate = 0.95
-    lmbda: Rate = 0.95
+    gamma: Fraction = 0.95
+    lmbda: Fraction = 0.95
     """GAE's lambda, 0 to 1; 0 looks one step ahead."""
 
 
 class Collector(Part):
     """Settings of a collector."""
 
-    num_envs: Annotated[int, Whole(1, unit="environments")] = 16
+    num_envs: NumEnvs = 16
     """Environments. A batch is one complete episode of each; with collector=rollouts it is a fixed
     number of steps of each."""
     num_threads: Annotated[int, Whole(1, unit="threads")] = 1
@@ -118,7 +117,7 @@ class Rollouts(Collector, target="rollouts"):
     The objective sets the number of steps. Episodes continue in the next batch.
     """
 
-    num_envs: Annotated[int, Whole(1, unit="environments")] = 64
+    num_envs: NumEnvs = 64
     """Environments."""
 
 
@@ -151,7 +150,7 @@ class Scheduler(Part):
 class Constant(Scheduler, target="torch.optim.lr_scheduler.ConstantLR"):
     """Constant learning rate."""
 
-    factor: Annotated[float, Real(0.0, 1.0)] = 1.0
+    factor: Fraction = 1.0
     """Factor on the learning rate."""
     total_iters: Annotated[int, Whole(0, unit="updates")] = 0
     """Updates for which the factor holds."""
@@ -162,7 +161,7 @@ class StepDecay(Scheduler, target="torch.optim.lr_scheduler.StepLR"):
 
     step_size: Annotated[int, Whole(1, unit="updates")] = 5
     """Updates from one decay to the next."""
-    gamma: Annotated[float, Real(0.0, 1.0)] = 0.99
+    gamma: Fraction = 0.99
     """Factor of a decay."""
 
 
@@ -181,7 +180,7 @@ class Reinforce(Objective, target="reinforce"):
 
     entropy_coeff: Weight = 0.01
     """Weight of the entropy bonus, which keeps a policy exploring; 0 for none."""
-    reduction: Annotated[str, OneOf(("mean", "sum", "episode_mean"))] = "mean"
+    reduction: Literal["mean", "sum", "episode_mean"] = "mean"
     """Reduction over a batch's steps: mean; sum as in Algorithm 4; or episode_mean, the sum divided
     by the number of episodes (Eq. 12)."""
 

@@ -2,6 +2,7 @@
 
 from typing import Annotated
 
+from drone_rl.config.values import Fraction
 from drone_rl.utils.schema import OneOf, Real
 from drone_rl.utils.settings import Settings
 
@@ -51,7 +52,7 @@ class BarometerSettings(Settings):
     """Factor on all noise, bias and drift amplitudes below; 0 for a noise-free sensor."""
     white_noise: Annotated[float, Real(0.0, 10_000.0, unit="Pa")] = 2.7
     """Standard deviation of a reading, in pascals: about 0.2 m."""
-    drift: Annotated[float, Real(0.0, 1.0)] = 0.001825
+    drift: Fraction = 0.001825
     """Stationary standard deviation of the relative pressure drift (Gauss-Markov)."""
     drift_time: Seconds = 3600.0
     """Time constant of the drift, in seconds."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar
 
 from drone_rl.config.parts import Named
-from drone_rl.utils.errors import InputError
+from drone_rl.config.values import Steps
 from drone_rl.utils.schema import Real, Several, Whole
 
 Length = Annotated[float, Real(0.001, 10_000.0, unit="m")]
@@ -93,7 +93,7 @@ class TaskSettings(BaseTaskSettings):
     """z at which the drone starts and, in computer-vision mode, stays."""
     step_length: Length = 1.0
     """Length of one move."""
-    step_limit: Annotated[int, Whole(1, 100_000, "steps")] = 300
+    step_limit: Steps = 300
     """Steps after which an episode is truncated."""
     front_margin: Length = 11.0
     """How far behind the last cube the front boundary stands."""
@@ -139,32 +139,19 @@ class TaskSettings(BaseTaskSettings):
 
     def check(self) -> None:
         """Reject tasks that can't be simulated or solved."""
+        lowest = self.vertical_bound + 0.5 * self.cube_size
+        if self.altitude < lowest:
+            self.refuse("altitude", f"sinks cubes into the floor; give at least {lowest}")
         if self.must_climb and self.altitude <= self.height_bound:
-            raise InputError(
-                f"altitude={self.altitude} lets the drone fly into the floor; give more than "
-                f"{self.height_bound} (vertical_bound + (cube_size + drone_size) / 2)"
-            )
-        if self.altitude - self.vertical_bound - 0.5 * self.cube_size < 0:
-            raise InputError(
-                f"altitude={self.altitude} sinks cubes into the floor; give at least "
-                f"{self.vertical_bound + 0.5 * self.cube_size} (vertical_bound + cube_size / 2)"
-            )
+            self.refuse("altitude", f"is too low to climb; give more than {self.height_bound}")
+        reach = f"{self.touch_distance} ((cube_size + drone_size) / 2)"
         if self.step_length > self.touch_distance:
-            raise InputError(
-                f"step_length={self.step_length} makes the oracle overshoot cubes to both sides; "
-                f"give at most {self.touch_distance} ((cube_size + drone_size) / 2)"
-            )
+            self.refuse("step_length", f"makes the oracle overshoot cubes; give at most {reach}")
         if self.first_distance <= self.touch_distance:
-            raise InputError(
-                f"first_distance={self.first_distance} starts the drone inside the first "
-                f"cube; give more than {self.touch_distance} ((cube_size + drone_size) / 2)"
-            )
+            self.refuse("first_distance", f"starts inside the first cube; give more than {reach}")
         needed = math.ceil((self.last_distance - self.touch_distance) / self.step_length)
         if self.step_limit < needed:
-            raise InputError(
-                f"step_limit={self.step_limit} ends every episode before the last cube can be "
-                f"reached; give at least {needed}"
-            )
+            self.refuse("step_limit", f"ends before the last cube; give at least {needed}")
 
 
 _TRIED, _LEAST_OPEN = 400, 20
@@ -205,7 +192,7 @@ class PillarsSettings(BaseTaskSettings):
     """z at which the drone starts and, in computer-vision mode, stays."""
     step_length: Length = 1.0
     """Length of one move."""
-    step_limit: Annotated[int, Whole(1, 100_000, "steps")] = 120
+    step_limit: Steps = 120
     """Steps after which an episode is truncated."""
 
     @property
@@ -250,23 +237,17 @@ class PillarsSettings(BaseTaskSettings):
             ("finish_margin", self.touch_distance, "puts the line into the last row"),
         ):
             if getattr(self, name) <= least:
-                raise InputError(f"{name}={getattr(self, name)} {problem}; give more than {least}")
+                self.refuse(name, f"{problem}; give more than {least}")
         if self.height < self.altitude:
-            raise InputError(
-                f"height={self.height} puts pillars below the drone; give at least {self.altitude} "
-                "(altitude)"
-            )
+            self.refuse("height", f"is below the drone; give at least {self.altitude} (altitude)")
         steps = math.ceil(self.finish / self.step_length)
         if self.step_limit < steps:
-            raise InputError(
-                f"step_limit={self.step_limit} ends every episode before the line can be reached; "
-                f"give at least {steps}"
-            )
+            self.refuse("step_limit", f"ends before the line; give at least {steps}")
         if sum(self._is_open(row) for row in self._rows()) < _LEAST_OPEN:
-            raise InputError(
-                f"density={self.density} makes fields too dense to cross: fewer than {_LEAST_OPEN} "
-                f"of {_TRIED} sampled rows have a gap; give a lower density, a smaller width or a "
-                "larger spread"
+            self.refuse(
+                "density",
+                f"makes fields too dense to cross: fewer than {_LEAST_OPEN} of {_TRIED} rows have "
+                "a gap; give a lower density, a smaller width or a larger spread",
             )
 
     def _rows(self) -> Iterator[list[float]]:

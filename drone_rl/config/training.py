@@ -30,6 +30,7 @@ from drone_rl.config.learning import (
 from drone_rl.config.networks import Network, SmallCnn
 from drone_rl.config.parts import NetworkOptions, Part, Parts
 from drone_rl.config.transforms import DEFAULT_TRANSFORMS, MOST_TRANSFORMS, Transform
+from drone_rl.config.values import Fraction, NumEpisodes, Seed
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Whole
 from drone_rl.utils.settings import Settings
@@ -43,7 +44,7 @@ class TrainerSettings(Settings):
 
     total_frames: Annotated[int, Whole(0, unit="frames")] = 2_000_000
     """Stop after the batch that reaches this many frames; 0 collects none, to clone only."""
-    total_episodes: Annotated[int, Whole(1, unit="episodes")] | None = None
+    total_episodes: NumEpisodes | None = None
     """Stop after the batch that reaches this many episodes; null for no limit."""
     target_share: Annotated[float, Real(0.0, 1.0, is_above=True)] | None = 0.99
     """Stop once the running reward reaches this fraction of the task's `largest_reward`; null
@@ -51,7 +52,7 @@ class TrainerSettings(Settings):
     confirm_episodes: Annotated[int, Whole(0, unit="episodes")] = 200
     """Greedy episodes in other environments that must confirm the policy before `target_share`
     stops the training; 0 skips the confirmation."""
-    confirm_share: Annotated[float, Real(0.0, 1.0)] = 1.0
+    confirm_share: Fraction = 1.0
     """Fraction of these episodes that must reach every goal."""
     running_decay: Annotated[float, Real(0.0, 1.0, is_below=True)] = 0.99
     """Weight of the old value in the running reward, per episode: 0.99 averages about 100."""
@@ -117,7 +118,7 @@ class TrainSettings(Settings):
     """Folder of demonstrations that a new run clones before it collects episodes; null for none."""
     cloning: CloningSettings = CloningSettings()
     """Behavior cloning, if demonstrations are given."""
-    seed: Annotated[int, Whole(0)] = 0
+    seed: Seed = 0
     """Root of all random streams: scenes, actions, initial weights."""
     device: str = "cpu"
     """Device of renderer and networks: cpu, cuda or cuda:N."""
@@ -130,10 +131,7 @@ class TrainSettings(Settings):
     def check(self) -> None:
         """Refuse parts that don't work together."""
         if self.renderer != "raytrace" and not self.appearance.is_minimal:
-            raise InputError(
-                f"renderer={self.renderer} supports only appearance=minimal; give "
-                "renderer=raytrace or appearance=minimal"
-            )
+            self.refuse("renderer", "supports only appearance=minimal; give renderer=raytrace")
         self.dynamics.check_air()
         check_appearance(self.appearance, self.camera, self.task.object_region, self.task.name)
         needs, objective = self.objective.needs, self.objective.name

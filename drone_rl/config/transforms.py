@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 from drone_rl.config.parts import Part
+from drone_rl.config.values import Fraction, Pixels
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Several, Whole, shown
 from drone_rl.utils.settings import prefixed_errors
@@ -101,7 +102,7 @@ class Crop(Transform, target="crop"):
 
     top: Annotated[int, Whole(0, 1023, "pixels")] = 5
     """First row."""
-    bottom: Annotated[int, Whole(1, 1024, "pixels")] = 30
+    bottom: Pixels = 30
     """First row that is not kept."""
 
     def _transformed(self, frame: Frame) -> Frame:
@@ -123,9 +124,9 @@ class Resize(Transform, target="resize"):
     """Resize by area averaging; images that already have the size do not change."""
 
     needs: ClassVar[str] = "floats"
-    height: Annotated[int, Whole(1, 1024, "pixels")] = 25
+    height: Pixels = 25
     """Height of the output in pixels."""
-    width: Annotated[int, Whole(1, 1024, "pixels")] = 64
+    width: Pixels = 64
     """Width of the output in pixels."""
 
     def _transformed(self, frame: Frame) -> Frame:
@@ -175,7 +176,7 @@ class Fault(Transform):
 class Noise(Fault, target="noise"):
     """Sensor noise, clipped at black and white."""
 
-    strength: Annotated[float, Real(0.0, 1.0)] = 0.02
+    strength: Fraction = 0.02
     """Standard deviation; black is 0 and white is 1."""
     correlation_time: Annotated[float, Real(0.0, 10_000.0, unit="frames")] = 0.0
     """Time after which the correlation of a pixel's noise has fallen to 1/e; white noise at 0."""
@@ -188,13 +189,13 @@ class DeadRows(Fault, target="dead_rows"):
     """Rows sampled for each episode, in addition to `rows`."""
     rows: Annotated[tuple[int, ...], Several(Whole(0, 1023, "rows"), 0, 1024)] = ()
     """Rows that are always dead, from 0 at the top."""
-    level: Annotated[float, Real(0.0, 1.0)] = 0.0
+    level: Fraction = 0.0
     """Gray level of dead rows; 0 is black, 1 is white."""
 
     def check(self) -> None:
         """Reject duplicate rows."""
         if len(set(self.rows)) < len(self.rows):
-            raise InputError(f"rows={list(self.rows)} names a row twice; name each once")
+            self.refuse("rows", "names a row twice; name each once")
 
     def _transformed(self, frame: Frame) -> Frame:
         with prefixed_errors(f"transforms.{self.name}"):
@@ -204,20 +205,16 @@ class DeadRows(Fault, target="dead_rows"):
     def check_height(self, height: int) -> None:
         """Raise an `InputError` if an image of this height has too few rows."""
         if max(self.rows, default=0) >= height:
-            raise InputError(
-                f"rows={list(self.rows)}: the image has {height} rows; give at most {height - 1}"
-            )
-        if self.count + len(self.rows) > height:
-            raise InputError(
-                f"count={self.count}: the image has {height} rows, of which {len(self.rows)} are "
-                f"always dead; give at most {height - len(self.rows)}"
-            )
+            self.refuse("rows", f"are beyond the image's {height} rows; give at most {height - 1}")
+        most = height - len(self.rows)
+        if self.count > most:
+            self.refuse("count", f"exceeds the image's other rows; give at most {most}")
 
 
 class FrozenFrames(Fault, target="frozen_frames"):
     """Frames that repeat the previous one at random."""
 
-    share: Annotated[float, Real(0.0, 1.0)] = 0.05
+    share: Fraction = 0.05
     """Probability that a frame repeats the previous one."""
 
 

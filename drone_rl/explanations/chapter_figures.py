@@ -5,7 +5,7 @@ import io
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import torch
@@ -15,6 +15,7 @@ from PIL import Image, ImageOps
 from scipy.spatial.distance import cdist
 
 from drone_rl.config.configuration import from_arguments
+from drone_rl.config.values import Seed
 from drone_rl.envs.three_state import SUCCESS_PROBABILITY, exact_gradient
 from drone_rl.explanations.class_model_gallery import CHAPTER, class_models
 from drone_rl.explanations.embedding import embed
@@ -31,7 +32,7 @@ from drone_rl.utils.display import Result, picture
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.palette import INK, MUTED, css
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.schema import OneOf, Whole
+from drone_rl.utils.schema import Whole
 from drone_rl.utils.seeding import legacy_seed
 from drone_rl.utils.settings import Settings
 
@@ -54,13 +55,13 @@ class FigureSettings(Settings):
     episodes: Annotated[int, Whole(1, 1000, "episodes")] | None = None
     """Episodes from which the frames of Figs. 7 to 9 and 13 to 15 come; null for the chapter's
     number, in Figs. 13 to 15 for 20."""
-    tint: Annotated[str, OneOf(("predicted", "sampled"))] = "predicted"
+    tint: Literal["predicted", "sampled"] = "predicted"
     """Action whose color tints a frame of Figs. 7 and 8: the most probable one, or the one that
     was sampled."""
-    kernel: Annotated[str, OneOf(("student", "gaussian"))] = "student"
+    kernel: Literal["student", "gaussian"] = "student"
     """Similarity of points on the maps of Figs. 7 and 8: Student's t, as t-SNE is defined, or the
     Gaussian that Eq. 17 prints."""
-    seed: Annotated[int, Whole(0)] = 0
+    seed: Seed = 0
     """Root of all random streams."""
 
 

@@ -1,10 +1,11 @@
 """Settings of an explanation."""
 
-from typing import Annotated, TypedDict
+from typing import Annotated, Literal, TypedDict
 
 from drone_rl.config import RendererName
+from drone_rl.config.values import NumEpisodes, OpenFraction, Seed, Steps
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import OneOf, Real, Whole
+from drone_rl.utils.schema import Real, Whole
 from drone_rl.utils.settings import Settings
 
 MIN_EPISODES = 30  # intervals from fewer episodes are too wide to be useful
@@ -21,9 +22,9 @@ class ExplainSettings(Settings):
     """Frames that are analysed, spread evenly over the episodes of the data set."""
     data_episodes: Annotated[int, Whole(MIN_EPISODES, unit="episodes")] = MIN_EPISODES
     """Least number of complete episodes with sampled actions in the data set."""
-    episodes: Annotated[int, Whole(1, unit="episodes")] = 400
+    episodes: NumEpisodes = 400
     """Episodes on which the verdict rests."""
-    good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
+    good_share: OpenFraction = 0.9
     """Fraction of the oracle's success rate that a good policy exceeds."""
     layer: str | None = None
     """Layer whose features t-SNE embeds; null for the last one before the logits."""
@@ -31,7 +32,7 @@ class ExplainSettings(Settings):
     """Layer of Grad-CAM; null for the last convolution's nonlinearity."""
     perplexity: Annotated[float, Real(1.0, unit="neighbours")] = 30.0
     """Perplexity of t-SNE."""
-    seed: Annotated[int, Whole(0)] | None = None
+    seed: Seed | None = None
     """Root of all random streams, those of the held-out environments included; null takes a fresh
     one from the operating system, which is printed and recorded."""
     renderer: RendererName = "raytrace"
@@ -54,20 +55,20 @@ class ClassModelSettings(Settings):
         InputError: A value is out of range.
     """
 
-    maximize: Annotated[str, OneOf(("logit", "probability"))] = "logit"
+    maximize: Literal["logit", "probability"] = "logit"
     """Maximized for each action: its probability (Eq. 18), or its logit minus the mean logit."""
-    parameterisation: Annotated[str, OneOf(("pixel", "fourier"))] = "pixel"
+    parameterisation: Literal["pixel", "fourier"] = "pixel"
     """What the ascent changes: pixels, or Fourier coefficients divided by their frequency."""
-    initial: Annotated[str, OneOf(("random", "constant"))] = "random"
+    initial: Literal["random", "constant"] = "random"
     """Initial image: uniformly random pixels, or the mean pixel of the policy's observations."""
-    steps: Annotated[int, Whole(1, 100_000, "steps")] = 64
+    steps: Steps = 64
     """Steps of gradient ascent."""
-    step: Annotated[str, OneOf(("length", "plain"))] = "length"
+    step: Literal["length", "plain"] = "length"
     """Step of pixels: lr times the gradient (plain), or along the gradient with a length of lr
     tenths of the observations' standard deviation (length)."""
     lr: Annotated[float, Real(0.0, 1e9, is_above=True)] = 20.0
     """Learning rate, see step; the chapter's example is 20. With fourier, 400 times Adam's."""
-    normalize: Annotated[str, OneOf(("match", "training_set", "none"))] = "match"
+    normalize: Literal["match", "training_set", "none"] = "match"
     """After each step: give the image the observations' mean and deviation (match), subtract their
     mean and divide by their deviation as in the chapter (training_set), or neither (none)."""
     blur: Annotated[float, Real(0.0, 100.0, unit="pixels")] = 0.6
@@ -89,7 +90,7 @@ class ClassModelsSettings(ClassModelSettings):
     """Whether to show the chapter's refinements one after the other instead of these settings."""
     episodes: Annotated[int, Whole(1, 10_000, "episodes")] = 30
     """Episodes with sampled actions whose observations are the training set."""
-    seed: Annotated[int, Whole(0)] | None = None
+    seed: Seed | None = None
     """Root of the random streams; null takes a fresh one from the operating system, which is
     printed and recorded."""
 

@@ -20,6 +20,7 @@ import numpy as np
 from drone_rl.flight.in_the_loop.control import RcSticks
 from drone_rl.flight.in_the_loop.drone import FlightControllerError
 from drone_rl.flight.in_the_loop.instruments import Readings, Vector, rotation
+from drone_rl.flight.server_thread import listening
 from drone_rl.sim.coordinates import frd_from_body, ned_from_world, world_from_ned
 from drone_rl.utils.errors import InputError, extra
 
@@ -137,13 +138,8 @@ class TcpLink(Link):
         super().__init__("the autopilot", patience=1.0)
         self._listener = socket.socket()
         self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
+        with listening(host, port):
             self._listener.bind((host, port))
-        except (OSError, OverflowError) as error:
-            self._listener.close()
-            raise InputError(
-                f"can't listen at port={port} of host={host}: {error}; give another port or host"
-            ) from error
         self._listener.listen(1)
         self.port: int = self._listener.getsockname()[1]
         """The port."""

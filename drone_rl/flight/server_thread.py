@@ -1,13 +1,28 @@
-"""A server of asyncio in a thread of this process."""
+"""Servers of this process: the thread that runs one, and the error of one that can't listen."""
 
 import asyncio
 import contextlib
 import logging
 import threading
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterator
 from typing import Any, Self
 
+from drone_rl.utils.errors import InputError, shown
+
 _log = logging.getLogger(__name__)
+
+
+@contextlib.contextmanager
+def listening(host: str, port: int) -> Iterator[None]:
+    """Raise an `InputError` where a server can't listen at a port of a host."""
+    try:
+        yield
+    except (OSError, OverflowError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(
+            f"port={port} of address={shown(host)} can't be opened ({reason}); give another one, "
+            "such as port=0, or stop the server that has it"
+        ) from error
 
 
 class ServerThread:

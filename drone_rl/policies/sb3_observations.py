@@ -35,7 +35,7 @@ from drone_rl.envs.gymnasium.environments import DroneWorld, DroneWorlds
 from drone_rl.envs.sb3.worlds import Sb3Worlds
 from drone_rl.envs.transforms import PixelTransform
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Instance, Whole
+from drone_rl.utils.schema import Whole
 
 Function = Callable[[NDArray[Any]], NDArray[Any]]
 """A batch of observations to a batch of observations."""
@@ -151,10 +151,9 @@ class Observations:
                 functions += map(_function, some)
                 continue
             for wrapper in some:
-                steps += [Wrapped(functions=Functions(functions)), _stack(wrapper)]
+                steps += [Wrapped(functions=functions), _stack(wrapper)]
                 functions = []
-        functions.append(_from(self.space))
-        return (*first, *steps, Wrapped(functions=Functions(functions)))
+        return (*first, *steps, Wrapped(functions=[*functions, _from(self.space)]))
 
     def of_episode(
         self, frames: Tensor, transforms: Sequence[Transform] | None = None
@@ -177,24 +176,11 @@ class Observations:
         return np.concatenate(seen)
 
 
-class Functions:
-    """Functions of NumPy arrays, applied in order."""
-
-    def __init__(self, functions: Sequence[Function]) -> None:
-        self.functions = tuple(functions)
-
-    def __call__(self, batch: NDArray[Any]) -> NDArray[Any]:
-        """Apply them to a batch."""
-        for function in self.functions:
-            batch = function(batch)
-        return batch
-
-
 class Wrapped(Transform):
     """What wrappers do to observations; it has no name, so that no file can contain it."""
 
-    functions: Annotated[Functions, Instance(Functions)] = Functions(())
-    """From a batch of observations to one."""
+    functions: tuple[Function, ...] = ()
+    """Applied in order to batches of observations."""
 
     def output(self, frame: Frame) -> Frame | None:
         """Return None: only a call shows the shape."""
@@ -203,12 +189,15 @@ class Wrapped(Transform):
 
 @implements(Wrapped)
 class _WrappedPixels(PixelTransform):
-    def __init__(self, functions: Functions) -> None:
+    def __init__(self, functions: Sequence[Function]) -> None:
         super().__init__()
         self._functions = functions
 
     def _apply_transform(self, obs: Tensor) -> Tensor:
-        return torch.from_numpy(self._functions(obs.cpu().numpy())).to(obs.device)
+        batch = obs.cpu().numpy()
+        for function in self._functions:
+            batch = function(batch)
+        return torch.from_numpy(batch).to(obs.device)
 
 
 class StackedFrames(Stack):

@@ -47,7 +47,6 @@ class ComposerTask(composer.Task):
         dynamics: Dynamics | DynamicsSettings | None = None,
         actions: ActionSettings | None = None,
         pixels: bool = True,
-        distractors: int = 0,
         appearance: AppearanceSettings | None = None,
     ) -> None:
         """Assemble the scene; the task is cube collection by default.
@@ -59,14 +58,13 @@ class ComposerTask(composer.Task):
             actions: Action space, if `dynamics` are settings; the moves by default.
             pixels: Whether to observe the front-center camera, "drone/front_center". OpenGL renders
                 it, or the ray tracer if there is an appearance.
-            distractors: Number of distractors in the model; only an appearance places them.
             appearance: Visual appearance, sampled for each episode; the task's by default.
 
         Raises:
             InputError: A texture can't be read, camera or distractors do not fit, or dynamics with
                 actions of their own are given other ones.
         """
-        self._sampler = None
+        self._sampler, distractors = None, 0
         if appearance is not None and not appearance.is_minimal:
             self._sampler = AppearanceSampler(appearance, 1, task=task, camera=camera)
             distractors = self._sampler.distractors
@@ -201,7 +199,6 @@ def make_environment(
     dynamics: Dynamics | DynamicsSettings | None = None,
     actions: ActionSettings | None = None,
     pixels: bool = True,
-    distractors: int = 0,
     appearance: AppearanceSettings | None = None,
 ) -> composer.Environment:
     """Return the task as a dm_control environment; see `ComposerTask` for the arguments."""
@@ -211,7 +208,6 @@ def make_environment(
         dynamics=dynamics,
         actions=actions,
         pixels=pixels,
-        distractors=distractors,
         appearance=appearance,
     )
     return composer.Environment(

@@ -22,7 +22,7 @@ MAX_PANELS = 6
 UNIFORM = float(np.log(len(SHOWN_MOVES.names)))
 """Entropy of the uniform distribution over the chapter's three moves, nats."""
 _COLORS = map(css, (GOOD, light(GOOD), ONE_SIDED, BAD, MUTED, FAINT))
-_STYLES = {
+_STYLES: dict[str, dict[str, Any]] = {
     kind: {"marker": marker, "color": color}
     for kind, marker, color in zip((*KINDS, FAILED), "oDsvPX", _COLORS, strict=True)
 }

@@ -171,11 +171,7 @@ class Proof(Seeded):
     """Whether it states success from every placement."""
     share: float = 0.0
     """Fraction of placements from which all cubes are collected."""
-    lost: float = 0.0
-    """Fraction from which they are not."""
     undecided: float = 0.0
-    finished: bool = True
-    """Whether the proof was not stopped early."""
     checked: int = 0
     """Episodes that checked it, all of which ended as it states."""
     wrong_at_most: float | None = None
@@ -186,7 +182,7 @@ class Proof(Seeded):
 
     @property
     def status(self) -> str:
-        """How far the certificate is to be believed, as text."""
+        """What the certificate states, and how far it is to be believed, as text."""
         return render("drone_rl.trust", "certificate.j2", p=self)
 
 

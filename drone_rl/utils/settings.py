@@ -13,7 +13,7 @@ import types
 import typing
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Self, TypeVar
+from typing import Annotated, Any, NoReturn, Self, TypeVar
 
 import pydantic
 
@@ -64,6 +64,10 @@ class Settings(Model):
 
     def check(self) -> None:
         """Raise an `InputError` if valid values don't go together."""
+
+    def refuse(self, name: str, problem: str) -> NoReturn:
+        """Raise an `InputError` about a field: its value, what is wrong, and the remedy."""
+        raise InputError(f"{name}={plain(getattr(self, name))} {problem}")
 
     def as_base(self, cls: type[S]) -> S:
         """Return these settings as an instance of a base class, without the fields it lacks."""

@@ -73,9 +73,7 @@ def _read_and_check(
         path=str(path),
         every=stated.is_full_success,
         share=stated.success,
-        lost=stated.lost,
         undecided=stated.undecided.share,
-        finished=stated.finished,
     )
     if not flights:
         return claim

@@ -1,7 +1,5 @@
 """`drone-rl places`: the exact map of a greedy policy's action over all positions of one cube."""
 
-import dataclasses
-import json
 import time
 from collections.abc import Mapping
 from contextlib import closing
@@ -10,37 +8,43 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from pydantic import Field
 
 from drone_rl.config.commands import PlacesSettings
 from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.envs import Pipeline
 from drone_rl.explanations.report.places import chart, describe, rows
-from drone_rl.explanations.results import ExactMap
+from drone_rl.explanations.results import ExactMap, Outlines
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.trust.plots.saving import save_drawn
 from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
-from drone_rl.utils.provenance import provenance
+from drone_rl.utils.provenance import Provenance, provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.utils.threads import torch_threads
 from drone_rl.verification.prover.action_map import ActionMap, map_policy
 from drone_rl.verification.prover.policy_spec import make_policy_spec
 
 
-@dataclasses.dataclass(frozen=True)
-class Places(TableResult):
-    """The actions of a greedy policy over all positions of one cube: areas, not samples."""
+class Places(TableResult, ExactMap, Provenance):
+    """The actions of a greedy policy over all positions of one cube, as in `places.json`."""
 
-    policy: Policy
-    settings: PlacesSettings
-    places: ActionMap
+    policy: str
+    """Its name."""
+    path: str
+    task: dict[str, Any]
+    """Settings of the task."""
+    names: tuple[str, ...] = SHOWN_MOVES.names
+    """Of the actions."""
+    compared: int
+    """Rendered images that equal the closed form."""
+    seconds: float
+    share: float = Field(1.0, exclude=True)
+    outlines: Outlines = Field(exclude=True)
+    places: ActionMap = Field(exclude=True)
     """The cells."""
-    summary: ExactMap
-    """The map in figures."""
-    numbers: dict[str, Any]
-    """The same with its origin, as in `places.json`."""
 
     def at(self, ahead: float, left: float) -> str:
         """Return the action for a cube at a position.
@@ -66,20 +70,20 @@ class Places(TableResult):
 
     def save(self, folder: Path) -> None:
         """Write `places.json`, `places.png` and the zoomable `places.svg`."""
-        (folder / "places.json").write_text(json.dumps(self.numbers | provenance(), indent=2))
+        self.write_json(folder / "places.json")
         save_drawn(self.figure(), folder / "places")
 
     def rows(self) -> list[list[str]]:
         """Return the fractions of the area as a table: a header, then a row for each side."""
-        return rows(self.summary, SHOWN_MOVES.names)
+        return rows(self, self.names)
 
     def notes(self) -> list[str]:
         """Return the findings in words."""
-        return [describe(self.summary, SHOWN_MOVES.names)]
+        return [describe(self, self.names)]
 
     def figure(self) -> Figure:
         """Return the map."""
-        return chart(self.summary, SHOWN_MOVES)
+        return chart(self, SHOWN_MOVES)
 
 
 def places(
@@ -122,14 +126,13 @@ def places(
         progress("deciding the cells")
         action_map = map_policy(spec.images, transform, network, settings)
     progress("mapped", 1, 1)
-    summary = action_map.summary(settings.logit_gap)
-    numbers = {
-        "policy": policy.name,
-        "path": str(policy.path),
-        "task": policy.task.values(),
-        "names": list(SHOWN_MOVES.names),
-        **summary.model_dump(exclude={"outlines", "share"}),
-        "compared": compared,
-        "seconds": time.perf_counter() - begin,
-    }
-    return Places(policy, settings, action_map, summary, numbers)
+    return Places(
+        **dict(action_map.summary(settings.logit_gap)),
+        policy=policy.name,
+        path=str(policy.path),
+        task=policy.task.values(),
+        places=action_map,
+        compared=compared,
+        seconds=time.perf_counter() - begin,
+        **provenance(),
+    )

@@ -35,8 +35,8 @@ def good():
 @pytest.mark.parametrize(
     ("undecided", "status", "words"),
     [
-        (False, 0, "it collects every cube from every placement."),
-        (True, 16, "from 75.0% of all placem"),
+        (False, 0, "from every placement is proved"),
+        (True, 16, "from 75.0% of all placements (25.0% undecided)"),
     ],
 )
 def test_a_proof_can_be_required(in_process, tmp_path, good, undecided, status, words):
@@ -93,7 +93,7 @@ def test_a_verdict_under_another_appearance_says_so(in_process, tmp_path):
     proved = ["verdict", "policy=proved", "appearance=fog", "episodes=10", "sampled=false"]
     done = in_process(*proved, "require=proved", "hydra.run.dir=p")
     assert done.returncode == 16, done.stdout
-    assert "A certificate states" not in done.stdout
+    assert "A certificate of" not in done.stdout
 
 
 def test_latest_is_recorded_as_its_folder(run, in_process, tmp_path, monkeypatch, caplog):

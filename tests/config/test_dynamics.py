@@ -10,8 +10,8 @@ FLIGHT = DynamicsSettings(mode="simple_flight")
     ("changes", "message"),
     [
         ({"mass": 0.0}, r"mass=0\.0: it must be a number above 0"),
-        ({"mass": 2.0}, r"rotor_thrust=4\.17945 is too small .* 16\.72 N, .* 21\.58 N"),
-        ({"inertia": (1.0, 1.0, 2.1)}, r"inertia=\[1\.0, 1\.0, 2\.1\] is that of no body"),
+        ({"mass": 2.0}, r"rotor_thrust=4\.179\d* can't carry .* mass=2\.0; give at least 5\.401"),
+        ({"inertia": (1.0, 1.0, 2.1)}, r"inertia=\[1\.0, 1\.0, 2\.1\] is of no body"),
         ({"wind": (float("nan"), 0.0, 0.0)}, r"wind\[0\]=nan"),
         ({"mode": "hardware"}, "mode='hardware': it must be 'computer_vision' or"),
     ],

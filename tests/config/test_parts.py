@@ -33,7 +33,7 @@ def test_settings_round_trip():
     ("config", "message"),
     [
         ({"task": {"num_cubes": 0}}, "task.num_cubes=0: it must"),
-        ({"task": {"vertical_bound": 3.0}}, "task.altitude=2.5 lets the drone fly into"),
+        ({"task": {"vertical_bound": 3.0}}, "task.altitude=2.5 sinks cubes"),
         ({"trainer": 3}, "trainer=3: it must be a valid dictionary"),
         (
             {"optimizer": {"_target_": Adam.target, "lr": 0}},

@@ -80,7 +80,7 @@ def test_changed_task_changes_only_the_environment():
     [
         ({"num_cubes": 0}, "task.num_cubes=0: it must"),
         ({"wind": 1}, "task.wind is unknown"),
-        ({"step_limit": 5}, "task.step_limit=5 ends every episode"),
+        ({"step_limit": 5}, "task.step_limit=5 ends before"),
     ],
 )
 def test_invalid_task_changes_raise(changes, message):

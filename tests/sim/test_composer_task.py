@@ -164,13 +164,6 @@ def test_images_of_an_appearance_equal_those_of_the_batch():
     ours.close()
 
 
-def test_distractors_without_an_appearance_are_out_of_sight():
-    env = make_environment(pixels=False, distractors=2, random_state=0)
-    env.reset()
-    env.step(0)
-    assert env.physics.data.mocap_pos[-2:, 2].tolist() == [-HIDDEN_DEPTH] * 2
-
-
 class Lost(CollectCubes):
     """Its props are of a mesh that is not there."""
 

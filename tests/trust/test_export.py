@@ -72,7 +72,7 @@ def test_card_quotes_and_copies_a_certificate(tmp_path):
     target = tmp_path / "mine.safetensors"
     export(policy, target, FEW, certificate=made, find_claim=find_claim)
     card = (tmp_path / "mine.md").read_text()
-    assert "it collects every cube from every placement" in card
+    assert "A certificate of success from every placement is" in card
     assert "not refuted by 3,000 episodes from fresh placements" in card
     assert "All figures except those of the certificate are from 4 episodes" in card
     beside = tmp_path / "mine.certificate.json"

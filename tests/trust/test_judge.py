@@ -59,11 +59,11 @@ def test_verdict_with_a_certificate(good, tmp_path):
     how = {"certificate": path, "episodes": 8, "sampled": False, "progress": silent}
     one = {**how, "task": {"num_cubes": 1}, "certificate_flights": 50}
     read = drone_rl.judge(good, **one)
-    assert "it collects every cube from every placement." in str(read)
+    assert "A certificate of success from every placement is not refuted" in str(read)
     assert "is not refuted by 50 episodes from fresh placements" in str(read)
     assert (read.certificate, read.is_proved, read.status("proved")) == (str(path), False, 16)
     proved = drone_rl.judge(good, require="proved", **one)
-    assert "The certificate is proved: computed here" in str(proved)
+    assert "from every placement is proved: computed here" in str(proved)
     assert (proved.is_proved, proved.status("proved")) == (True, 0)
     assert read.proof.seed != proved.proof.seed
     with pytest.raises(InputError, match="require='prooved'"):

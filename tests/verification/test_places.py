@@ -50,16 +50,15 @@ def test_actions_equal_those_for_rendered_images(small, done):
     assert len(set(taken)) == 3
     assert (done.places.at(places) != taken).sum() == 0
     shares = np.bincount(taken, minlength=3) / 2000
-    assert done.numbers["actions"] == pytest.approx(shares, abs=0.05)
+    assert done.actions == pytest.approx(shares, abs=0.05)
 
 
 def test_areas_fill_the_window(done):
-    numbers = done.numbers
-    assert numbers["area"] == pytest.approx(17.5 * 16, rel=1e-12)
-    assert sum(numbers["actions"]) == pytest.approx(1)
-    assert sum(side["share"] for side in numbers["sides"].values()) == pytest.approx(1)
-    assert numbers["sides"]["ahead"]["share"] == pytest.approx(2 * 1.65 / 16)
-    assert 190 <= numbers["compared"] <= 200
+    assert done.area == pytest.approx(17.5 * 16, rel=1e-12)
+    assert sum(done.actions) == pytest.approx(1)
+    assert sum(side.share for side in done.sides.values()) == pytest.approx(1)
+    assert done.sides["ahead"].share == pytest.approx(2 * 1.65 / 16)
+    assert 190 <= done.compared <= 200
 
 
 def test_at(done):
@@ -95,8 +94,8 @@ def test_unusable_settings_are_refused(small, change, message):
 
 
 def test_rows(done):
-    _, *sides, anywhere = rows(done.summary, SHOWN_MOVES.names)
-    left = done.numbers["sides"]["left"]
-    values = [left["share"], *left["actions"], left["unseen"], left["blind"]]
+    _, *sides, anywhere = rows(done, SHOWN_MOVES.names)
+    left = done.sides["left"]
+    values = [left.share, *left.actions, left.unseen, left.blind]
     assert sides[0] == ["on its left", *map(exact_percent, values)]
     assert anywhere[:2] == ["anywhere", "100%"]

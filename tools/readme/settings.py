@@ -132,6 +132,8 @@ def _may_be(hint: Any) -> str:
             return f"{count} values, each {_may_be(kind.kind)}"
         case OneOf():
             return " or ".join(f"`{name}`" for name in kind.names)
+    if typing.get_origin(kind) is typing.Literal:
+        return " or ".join(f"`{name}`" for name in typing.get_args(kind))
     return "true or false" if kind is bool else getattr(kind, "words", "") or "a text"
 
 

@@ -168,23 +168,13 @@ def _job_return(run: Run) -> JobReturn:
     return job
 
 
-_NOT_SOLVED = {
-    "frames": "not solved in trainer.total_frames",
-    "episodes": "not solved in trainer.total_episodes",
-}
-
-
 def _outcome(run: Run) -> str:
     result = read_result(run.folder)
     if result is None:
         return f"failed: {read_failure(run) or 'reason unknown'}"
-    why = str(_NOT_SOLVED.get(result["reason"], result["reason"]))
-    collapsed_at = result.get("collapsed_at_frames")
-    if collapsed_at is not None and result["reason"] in _NOT_SOLVED:
-        why += f" (learning collapsed after {collapsed_at:,.0f} frames)"
     verdict = result.get("verdict")
     kind = f", verdict: {verdict['kind']}" if verdict else ""
-    return f"{why}, running reward {result['running_reward']:.3f}{kind}"
+    return f"ended ({result['reason']}), running reward {result['running_reward']:.3f}{kind}"
 
 
 def _shortened(name: str) -> str:

@@ -10,7 +10,6 @@ and not when exactly.
 import asyncio
 import contextlib
 import time
-from collections.abc import Callable
 
 from drone_rl.flight.airsim.simulation import Simulation
 
@@ -35,7 +34,7 @@ class Lockstep:
         self._simulation, self._patience = simulation, patience
         self._quiet_since = 0.0
         self._count = 0
-        self._held: dict[Callable[[], None], None] = {}
+        self._held: list[asyncio.Future[None]] = []
         self._wake = asyncio.Event()
 
     def note(self, *, is_pilot: bool) -> None:
@@ -54,9 +53,12 @@ class Lockstep:
             if self._count >= MOST_REQUESTS:
                 self.is_running = True
 
-    def hold(self, release: Callable[[], None]) -> None:
-        """Call a function once, in the order of these calls, when time stands."""
-        self._held[release] = None
+    async def stands(self) -> None:
+        """Wait until time stands; requests go on in the order of these calls."""
+        while self.is_running:
+            held = asyncio.get_running_loop().create_future()
+            self._held.append(held)
+            await held
 
     async def run(self) -> None:
         """Alternate until cancelled."""
@@ -91,6 +93,8 @@ class Lockstep:
             await asyncio.sleep(0)
         self.is_running, self._count = False, 0
         self._quiet_since = time.monotonic()
-        held, self._held = self._held, {}
-        for release in held:
-            release()
+        held, self._held = self._held, []
+        for request in held:
+            if not request.done():  # its connection may be closed
+                request.set_result(None)
+        await asyncio.sleep(0)  # they are handled now

@@ -16,12 +16,13 @@ from drone_rl.flight.airsim.calls import Calls, remark
 from drone_rl.flight.airsim.lockstep import SLICE, Lockstep
 from drone_rl.flight.airsim.methods import UnknownMethodError
 from drone_rl.flight.airsim.simulation import Simulation, Wait
+from drone_rl.flight.server_thread import listening
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import shown
 
 _log = logging.getLogger(__name__)
 
-REQUEST, RESPONSE, NOTIFICATION = 0, 1, 2
+RESPONSE = 1
 MAX_REQUEST = 2**22
 """Bytes of a request: no method needs more."""
 TURN = 0.005
@@ -37,70 +38,47 @@ _POLL = 0.05
 """Longest sleep, seconds."""
 
 
-class Connection(asyncio.Protocol):
+class _ProtocolError(Exception):
+    """What a client has sent is no msgpack-rpc."""
+
+
+class Connection:
     """One connection."""
 
-    def __init__(self, server: "AirsimServer") -> None:
-        """Create a connection of a server."""
-        self._server = server
-        self._unpacker = _unpacker()
-        self._transport: Any = None
-        self._name = "client"
+    def __init__(
+        self, server: "AirsimServer", reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
+        """Take the server and the streams."""
+        self._server, self._reader, self._writer = server, reader, writer
+        self._writer.transport.set_write_buffer_limits(high=MAX_UNSENT)
+        peer = writer.get_extra_info("peername")
+        self._name = f"{peer[0]}:{peer[1]}" if peer else "client"
         self._calls = Calls()
-        self._is_full = False
-        """Whether the client leaves too many replies unread."""
-        self._is_held = False
-        """Whether its requests wait for a call of `release`."""
+        self._unpacker = _unpacker()
         self._backlog: deque[Any] = deque()
         self._replies: dict[Callable[[Any], None], int | None] = {}
         """Calls that wait, and the numbers of their requests; None for notifications."""
-        self.is_open = False
         self.is_pilot = False
         """Whether one of its calls has ever waited for simulated time."""
 
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """See `asyncio.Protocol`."""
-        self._transport = transport
-        peer = transport.get_extra_info("peername")
-        self._name = f"{peer[0]}:{peer[1]}" if peer else "client"
-        self.is_open = True
-        self._server.clients.add(self)
-        self._transport.set_write_buffer_limits(high=MAX_UNSENT)
+    async def serve(self) -> None:
+        """Answer requests until the client goes."""
         _log.info("%s connects", self._name)
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        """See `asyncio.Protocol`: calls that wait are answered no more."""
-        self.is_open = False
-        self._backlog.clear()
-        for reply in self._replies:
-            self._server.simulation.forget(reply)
-        self._replies.clear()
-        self._server.clients.discard(self)
-        _log.info("%s has gone after %s", self._name, self._calls)
-
-    def pause_writing(self) -> None:
-        """See `asyncio.Protocol`: the client doesn't read its replies."""
-        self._is_full = True
-        self._transport.pause_reading()
-
-    def resume_writing(self) -> None:
-        """See `asyncio.Protocol`."""
-        self._is_full = False
-        self._work()
-
-    def data_received(self, data: bytes) -> None:
-        """See `asyncio.Protocol`."""
-        self._acknowledge()
         try:
-            self._unpacker.feed(data)
-            self._backlog.extend(self._unpacker)
-        except msgpack.BufferFull:
-            self._break(f"a request has more than {MAX_REQUEST} bytes")
-            return
-        except Exception as error:
-            self._break(f"its bytes are no msgpack ({type(error).__name__})")
-            return
-        self._work()
+            while data := await self._reader.read(MAX_REQUEST):
+                self._acknowledge()
+                self._unpack(data)
+                await self._work()
+        except _ProtocolError as error:
+            _log.warning("%s is disconnected: %s", self._name, error)
+            self._writer.transport.abort()
+        except (ConnectionError, asyncio.CancelledError):  # the client or the server ends
+            pass
+        finally:
+            for reply in self._replies:
+                self._server.simulation.forget(reply)
+            self._writer.close()
+            _log.info("%s has gone after %s", self._name, self._calls)
 
     def _acknowledge(self) -> None:
         """Acknowledge at once what has come.
@@ -109,84 +87,71 @@ class Connection(asyncio.Protocol):
         and by default this system would take up to 40 ms.
         """
         if _QUICK_ACK is not None:
-            self._transport.get_extra_info("socket").setsockopt(socket.IPPROTO_TCP, _QUICK_ACK, 1)
+            self._writer.get_extra_info("socket").setsockopt(socket.IPPROTO_TCP, _QUICK_ACK, 1)
 
-    def release(self) -> None:
-        """Go on with the requests that have come."""
-        self._is_held = False
-        self._work()
+    def _unpack(self, data: bytes) -> None:
+        try:
+            self._unpacker.feed(data)
+            self._backlog.extend(self._unpacker)
+        except Exception as error:  # of many kinds
+            name = type(error).__name__
+            raise _ProtocolError(f"no msgpack of up to {MAX_REQUEST} bytes ({name})") from error
 
-    def _work(self) -> None:
-        """Handle the requests that have come, as long as others need not wait for them."""
+    async def _work(self) -> None:
+        """Handle the requests that have come; others have their turn after `TURN` seconds."""
         end = time.monotonic() + TURN
-        while self._backlog and self.is_open and not self._is_full and not self._is_held:
-            if self._server.must_wait(self):
-                self._is_held = True
-            elif time.monotonic() > end:
-                self._is_held = True
-                asyncio.get_running_loop().call_soon(self.release)
-            else:
-                self._handle(self._backlog.popleft())
-                self._server.note(self)
-        if self.is_open and not self._is_full:
-            if self._is_held:
-                self._transport.pause_reading()
-            else:
-                self._transport.resume_reading()
-
-    def _break(self, reason: str) -> None:
-        _log.warning("%s is disconnected: %s", self._name, reason)
-        self._backlog.clear()
-        self._transport.abort()
+        while self._backlog:
+            await self._server.may_ask()
+            self._handle(self._backlog.popleft())
+            self._server.note(self)
+            await self._writer.drain()  # until the client has read enough of its replies
+            if time.monotonic() > end:
+                await asyncio.sleep(0)
+                end = time.monotonic() + TURN
 
     def _handle(self, message: Any) -> None:
-        if not isinstance(message, list | tuple) or not message:
-            self._break(f"{shown(message)} is no request")
-            return
-        if message[0] == NOTIFICATION and len(message) == 3:
-            self._call(None, message[1], message[2])
-        elif _is_request(message):
-            self._call(message[1], message[2], message[3])
-        elif message[0] != RESPONSE:
-            self._break(f"{shown(message)} is no request")
+        match message:
+            case [0, int(number), name, args]:
+                self._call(number, name, args)
+            case [2, name, args]:  # a notification
+                self._call(None, name, args)
+            case [1, *_]:  # a response
+                pass
+            case _:
+                raise _ProtocolError(f"{shown(message)} is no request")
 
     def _call(self, number: int | None, name: Any, args: Any) -> None:
         label = name.decode("utf-8", "replace") if isinstance(name, bytes) else name
         if not isinstance(label, str) or not isinstance(args, list | tuple):
-            self._break("a request has no name or no list of arguments")
-            return
+            raise _ProtocolError("a request has no name or no list of arguments")
         label = label[:_MOST_SHOWN]  # all names of methods are shorter
         with self._calls.call(self._name, label):
-            self._compute(number, label, args)
+            try:
+                result = methods.call(self._server.simulation, label, args)
+                if isinstance(result, Wait):
+                    self._wait(number, result)
+                else:
+                    self._answer(number, None, result)
+            except Exception as error:
+                self._answer(number, self._explain(error, label, len(args)), None)
 
-    def _compute(self, number: int | None, label: str, args: Any) -> None:
-        try:
-            result = methods.call(self._server.simulation, label, args)
-            if isinstance(result, Wait):
-                self._wait(number, result)
-            else:
-                self._answer(number, None, result)
-        except UnknownMethodError:
+    def _explain(self, error: Exception, label: str, count: int) -> str:
+        """Return AirSim's words for an error of a call, and note it."""
+        if isinstance(error, UnknownMethodError):
             hint = methods.suggestion(label)
             remark(f"unknown{hint}")
-            self._answer(
-                number,
-                f"rpclib: server could not find function '{label}' with argument count "
-                f"{len(args)}.{hint}",
-                None,
+            return (
+                f"rpclib: server could not find function '{label}' with argument count {count}."
+                f"{hint}"
             )
-        except InputError as error:
+        if isinstance(error, InputError):
             remark(str(error))
-            self._answer(
-                number,
-                f"rpclib: function '{label}' (called with {len(args)} arg(s)) threw an exception. "
-                f"The exception contained this information: {error}.",
-                None,
+            return (
+                f"rpclib: function '{label}' (called with {count} arg(s)) threw an exception. The "
+                f"exception contained this information: {error}."
             )
-        except Exception as error:
-            _log.exception("%s: %s failed", self._name, label)
-            reason = type(error).__name__
-            self._answer(number, f"rpclib: function '{label}' failed: {reason}.", None)
+        _log.error("%s: %s failed", self._name, label, exc_info=error)
+        return f"rpclib: function '{label}' failed: {type(error).__name__}."
 
     def _wait(self, number: int | None, wait: Wait) -> None:
         def reply(result: Any) -> None:
@@ -198,27 +163,19 @@ class Connection(asyncio.Protocol):
         self._server.simulation.wait_for(wait, reply)
 
     def _answer(self, number: int | None, error: str | None, result: Any) -> None:
-        if number is not None and self.is_open:
-            self._transport.write(_packed([RESPONSE, number, error, result]))
+        if number is not None and not self._writer.is_closing():
+            self._writer.write(_packed([RESPONSE, number, error, result]))
 
     def close(self) -> None:
         """Answer all calls that wait with an error, and close.
 
         Clients do not notice a closed connection: without an answer they wait for an hour.
         """
-        for reply in self._replies:
-            self._server.simulation.forget(reply)
-        held = [message[1] for message in self._backlog if _is_request(message)]
+        held = [message[1] for message in self._backlog if len(message) == 4]
         for number in [*self._replies.values(), *held]:
             self._answer(number, "the server has stopped; connect again", None)
-        self._replies.clear()
         self._backlog.clear()
-        self._transport.close()
-
-
-def _is_request(message: Any) -> bool:
-    is_list = isinstance(message, list | tuple) and len(message) == 4
-    return is_list and message[0] == REQUEST and isinstance(message[1], int)
+        self._writer.close()
 
 
 def _unpacker() -> Any:
@@ -261,11 +218,15 @@ class AirsimServer:
         host, port = self._server.sockets[0].getsockname()[:2]
         return host, port
 
-    def must_wait(self, client: Connection) -> bool:
-        """Return whether requests have to wait; the client is then released when they need not."""
-        if self._lockstep.is_running:
-            self._lockstep.hold(client.release)
-        return self._lockstep.is_running
+    async def may_ask(self) -> None:
+        """Wait until requests are answered."""
+        await self._lockstep.stands()
+
+    async def _connect(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        client = Connection(self, reader, writer)
+        self.clients.add(client)
+        await client.serve()
+        self.clients.discard(client)
 
     def note(self, client: Connection) -> None:
         """Take note of a request that was answered, or that waits."""
@@ -279,16 +240,8 @@ class AirsimServer:
         Raises:
             InputError: The port is in use, or the address is not this machine's.
         """
-        loop = asyncio.get_running_loop()
-        try:
-            self._server = await loop.create_server(lambda: Connection(self), host, port)
-        except OSError as error:
-            raise InputError(
-                f"port {port} of {host} can't be opened ({error.strerror}); give another port or "
-                "address, or stop the server that has it"
-            ) from error
-        except UnicodeError as error:  # of a host that can't be a name in a network
-            raise InputError(f"address={shown(host)} is no address; give 127.0.0.1") from error
+        with listening(host, port):
+            self._server = await asyncio.start_server(self._connect, host, port)
 
     async def serve(self) -> None:
         """Advance simulated time until cancelled."""

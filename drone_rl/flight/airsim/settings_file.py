@@ -1,7 +1,7 @@
 """AirSim's settings.json: vehicles, cameras, clock, wind and server.
 
 The file may have single quotes, comments and trailing commas, as in the chapter's listings. Keys
-that this package does not know are ignored; those that are like known ones are warned about.
+that this package does not use are ignored, with a warning.
 """
 
 import functools
@@ -67,8 +67,8 @@ class _Section(Model):
             return data
         names = [str(field.alias) for field in cls.model_fields.values()]
         for key in data:
-            if key not in (*names, *cls.model_fields) and (meant := did_you_mean(key, names)):
-                _log.warning("settings: %s is unknown and ignored%s", key, meant)
+            if key not in (*names, *cls.model_fields):
+                _log.warning("settings: %s has no effect here%s", key, did_you_mean(key, names))
         return {k: v for k, v in data.items() if v not in (None, "") and v == v}
 
 

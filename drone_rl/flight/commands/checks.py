@@ -1,25 +1,54 @@
 """Validation of the numbers that commands take, and of a drone's dynamics."""
 
-import math
-from collections.abc import Mapping
-from typing import Any
+import functools
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, TypeVar, cast
 
 import numpy as np
+import pydantic
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.sim.dynamics import Quadrotor
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Real, Several, shown
+from drone_rl.utils.models import input_error
+from drone_rl.utils.schema import Instance, Real, Several, as_plain, shown
 
+F = TypeVar("F", bound=Callable[..., Any])
 FARTHEST = 1e6
 """Greatest magnitude of a coordinate, metres, and by default of any number."""
 COORDINATE = Real(-FARTHEST, FARTHEST)
-DURATION = Real(0.0, FARTHEST)
+Coordinate = Annotated[float, COORDINATE]
+Height = Annotated[float, Real(0.0, FARTHEST)]
+"""Metres above the ground."""
+Duration = Annotated[float, Real(0.0, FARTHEST)]
 """Seconds."""
-SPEED = Real(0.0, 100.0, is_above=True)
+Speed = Annotated[float, Real(0.0, 100.0, is_above=True)]
 """Metres per second."""
+Velocity = Annotated[float, Real(-100.0, 100.0)]
+DEGREES = Real(-3600.0, 3600.0)
+Degrees = Annotated[float, DEGREES]
+"""Of an angle, or a rate per second."""
+Tilt = Annotated[float, Real(-90.0, 90.0)]
+"""Degrees of roll or pitch."""
 SHARE = Real(0.0, 1.0)
+Share = Annotated[float, SHARE]
+
+
+def checked(function: F) -> F:
+    """Check a method's arguments by its annotations; an `InputError` names a wrong one."""
+    signature, validate = inspect.signature(function), pydantic.validate_call(function)
+
+    @functools.wraps(function)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        given = signature.bind(*args, **kwargs).arguments
+        try:
+            return validate(**{name: as_plain(value) for name, value in given.items()})
+        except pydantic.ValidationError as error:
+            raise input_error(error) from None
+
+    return cast(F, call)
 
 
 def numbers(values: Any, name: str, count: int, kind: Real = COORDINATE) -> tuple[float, ...]:
@@ -28,30 +57,15 @@ def numbers(values: Any, name: str, count: int, kind: Real = COORDINATE) -> tupl
     return Several(kind, count, count).read(items, name)
 
 
-def degrees(value: Any, name: str, limit: float = 3600.0) -> float:
-    """Return an angle or rate in degrees, at most `limit` either way."""
-    return Real(-limit, limit).read(value, name)
-
-
-def radians(value: Any, name: str, limit: float = 3600.0) -> float:
-    """Convert an angle or rate in degrees, at most `limit` either way."""
-    return math.radians(degrees(value, name, limit))
-
-
-def height(value: Any, name: str = "z") -> float:
-    """Return a height above the ground, metres; a negative one is an `InputError`."""
-    number = COORDINATE.read(value, name)
-    if number < 0.0:
-        raise InputError(f"{name}={number:g} is below the ground; z points up here, give 0 or more")
-    return number
-
-
 def time_limit(timeout: float | None, length: float, speed: float) -> float:
     """Return the time limit of a movement of this length (metres) and speed, seconds.
 
-    By default it is three times the expected time plus 10 s; a negative one is an `InputError`.
+    By default it is three times the expected time plus 10 s.
     """
-    return 10.0 + 3.0 * length / speed if timeout is None else DURATION.read(timeout, "timeout")
+    return 10.0 + 3.0 * length / speed if timeout is None else timeout
+
+
+_POINTS = Several(Instance(tuple[Coordinate, Coordinate, Height]), 1, 1_000_000)
 
 
 def path(points: Any) -> list[list[float]]:
@@ -66,10 +80,7 @@ def path(points: Any) -> list[list[float]]:
         places = np.zeros(0)
     if places.ndim != 2 or places.shape[1] != 3 or not len(places):
         raise InputError(f"path={shown(points)} has no points; give some, each (x, y, z)")
-    for number, (x, y, z) in enumerate(places.tolist()):
-        COORDINATE.read(x, f"path[{number}].x")
-        COORDINATE.read(y, f"path[{number}].y")
-        height(z, f"path[{number}].z")
+    _POINTS.read(places.tolist(), "path")
     return places.tolist()
 
 

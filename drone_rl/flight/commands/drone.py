@@ -7,7 +7,7 @@ import copy
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 import torch
@@ -16,6 +16,7 @@ from torch import Tensor
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.sensors import SensorSettings
 from drone_rl.flight.commands import checks
+from drone_rl.flight.commands.checks import Degrees, Duration, checked
 from drone_rl.flight.commands.command import (
     Command,
     FlightFuture,
@@ -131,7 +132,7 @@ class Drone:
         height = [] if self.is_computer_vision and np.size(start) == 3 else [self.settings.radius]
         coordinates = checks.numbers(start, "start", 3 - len(height))
         place = [[*coordinates, *height]]
-        attitude = attitude_of(0.0, 0.0, checks.degrees(yaw, "yaw"))
+        attitude = attitude_of(0.0, 0.0, checks.DEGREES.read(yaw, "yaw"))
         self._seed = Whole(0, 2**31 - 1).read(seed, "seed")
         self.body = FlightState.at_rest(
             torch.tensor(place, dtype=torch.float64),
@@ -213,9 +214,10 @@ class Drone:
         self._begin(sensors)
         return self.state
 
-    def advance(self, seconds: float) -> PilotState:
+    @checked
+    def advance(self, seconds: Duration) -> PilotState:
         """Advance simulated time and return the state; a negative duration is an `InputError`."""
-        self._advance(self._ticks_of(checks.DURATION.read(seconds, "seconds")))
+        self._advance(self._ticks_of(seconds))
         return self.state
 
     def cancel(self) -> None:
@@ -274,8 +276,9 @@ class Drone:
         worlds, state = self._scene("images")
         return images(worlds, state, requests, height=height, width=width)
 
+    @checked
     def set_pose(
-        self, position: Sequence[float], *, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0
+        self, position: Any, *, roll: Degrees = 0.0, pitch: Degrees = 0.0, yaw: Degrees = 0.0
     ) -> PilotState:
         """Put the drone somewhere, in computer-vision mode; no time passes.
 
@@ -292,13 +295,13 @@ class Drone:
         if not self.is_computer_vision:
             raise PilotError("set_pose: the drone has dynamics; make Pilot(mode='computer_vision')")
         place = checks.numbers(position, "position", 3)
-        named = ((roll, "roll"), (pitch, "pitch"), (yaw, "yaw"))
-        attitude = attitude_of(*(checks.degrees(value, name) for value, name in named))[None]
+        attitude = attitude_of(roll, pitch, yaw)[None]
         self.body = self.body.moved(torch.tensor([place], dtype=torch.float64), attitude)
         self.trajectory.append(self.time, self.body)
         return self.state
 
-    def press(self, key: str, times: int = 1) -> PilotState:
+    @checked
+    def press(self, key: str, times: Annotated[int, Whole(1, 100_000)] = 1) -> PilotState:
         """Move or turn the drone by the steps of a key, one of `KEYS`; see `set_pose` for errors.
 
         A key moves in the heading of the drone, level, by `STEP`, or changes an angle by `TURN`.
@@ -307,10 +310,10 @@ class Drone:
             raise InputError(
                 f"key={key!r} is unknown; give one of: {', '.join(KEYS)}{did_you_mean(key, KEYS)}"
             )
-        count, state = Whole(1, 100_000).read(times, "times"), self.state
+        state = self.state
         axis, step = KEYS[key]
         change = [0.0] * 6
-        change[axis] = count * step
+        change[axis] = times * step
         forward, left, up = change[:3]
         *_, heading = to_simulator(0.0, 0.0, math.radians(state.attitude.yaw))
         cos, sin = math.cos(heading), math.sin(heading)

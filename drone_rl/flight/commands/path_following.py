@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.dynamics import GRAVITY
-from drone_rl.flight.commands.checks import degrees, time_limit
+from drone_rl.flight.commands.checks import DEGREES, time_limit
 from drone_rl.flight.commands.command import ACCURACY, PERIOD, Command, Land, goals_of
 from drone_rl.sim.coordinates import to_simulator
 from drone_rl.sim.dynamics import FlightGoals, FlightState, Mode
@@ -59,7 +59,7 @@ class YawMode:
     def __post_init__(self) -> None:
         """Check both values."""
         Flag().read(self.is_rate, "is_rate")
-        number = degrees(self.yaw_or_rate, "yaw_or_rate")
+        number = DEGREES.read(self.yaw_or_rate, "yaw_or_rate")
         object.__setattr__(self, "yaw_or_rate", number)
 
 

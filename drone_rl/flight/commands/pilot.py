@@ -2,12 +2,22 @@
 
 import dataclasses
 import math
-from collections.abc import Sequence
-from typing import Any, TypedDict, Unpack
+from typing import Annotated, Any, Literal, TypedDict, Unpack
 
 import torch
 
 from drone_rl.flight.commands import checks
+from drone_rl.flight.commands.checks import (
+    Coordinate,
+    Degrees,
+    Duration,
+    Height,
+    Share,
+    Speed,
+    Tilt,
+    Velocity,
+    checked,
+)
 from drone_rl.flight.commands.command import (
     LANDING_SPEED,
     FlightFuture,
@@ -35,7 +45,7 @@ from drone_rl.sim.coordinates import to_simulator
 from drone_rl.sim.dynamics import FlightGoals, FlightState, Mode
 from drone_rl.sim.dynamics.control import Modes, rotor_goals
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Instance, OneOf, Real
+from drone_rl.utils.schema import Instance, Real
 
 MOVING = 0.05
 """Speed in m/s above which a drone can't take off."""
@@ -109,7 +119,10 @@ class Pilot(Drone):
     sticks = Sticks()
     """Stick positions for `move_by_manual`; may be replaced at any time."""
 
-    def take_off(self, timeout: float | None = None, *, wait: bool = True) -> bool | FlightFuture:
+    @checked
+    def take_off(
+        self, timeout: Duration | None = None, *, wait: bool = True
+    ) -> bool | FlightFuture:
         """Climb 2 m at 0.5 m/s."""
         self._require_armed("take_off")
         speed = speed_of(self.body)
@@ -119,39 +132,40 @@ class Pilot(Drone):
             )
         return self._start("take_off", TakeoffCommand(self.body, timeout), wait)
 
-    def land(self, timeout: float | None = None, *, wait: bool = True) -> bool | FlightFuture:
+    @checked
+    def land(self, timeout: Duration | None = None, *, wait: bool = True) -> bool | FlightFuture:
         """Descend at 0.2 m/s until the drone stands."""
         height = float(self.body.position[0, 2])
         limit = checks.time_limit(timeout, height, LANDING_SPEED)
         return self._run("land", Land(self.body, limit), wait)
 
+    @checked
     def go_home(
-        self, timeout: float | None = None, *, speed: float = TAKEOFF_SPEED, wait: bool = True
+        self, timeout: Duration | None = None, *, speed: Speed = TAKEOFF_SPEED, wait: bool = True
     ) -> bool | FlightFuture:
         """Fly to the starting position at the present height and land there."""
-        pace = checks.SPEED.read(speed, "speed")
         (x, y, _), height = self.home.tolist(), float(self.body.position[0, 2])
         braking = braking_time(self.settings)
-        path = PathCommand(self.body, [(x, y, height)], pace, timeout, braking=braking)
+        path = PathCommand(self.body, [(x, y, height)], speed, timeout, braking=braking)
         landing = checks.time_limit(None, height, LANDING_SPEED) if timeout is None else 0.0
         return self._run("go_home", GoHomeCommand(path, landing), wait)
 
-    def hover(self, duration: float = 0.0, *, wait: bool = True) -> bool | FlightFuture:
+    @checked
+    def hover(self, duration: Duration = 0.0, *, wait: bool = True) -> bool | FlightFuture:
         """Hold the position for some seconds and afterwards."""
-        return self._run(
-            "hover", Hover(self.body, checks.DURATION.read(duration, "duration")), wait
-        )
+        return self._run("hover", Hover(self.body, duration), wait)
 
+    @checked
     def move_by_angle(
         self,
-        roll: float,
-        pitch: float,
-        duration: float,
+        roll: Tilt,
+        pitch: Tilt,
+        duration: Duration,
         *,
-        z: float | None = None,
-        throttle: float | None = None,
-        yaw: float | None = None,
-        yaw_rate: float | None = None,
+        z: Height | None = None,
+        throttle: Share | None = None,
+        yaw: Degrees | None = None,
+        yaw_rate: Degrees | None = None,
         wait: bool = True,
     ) -> bool | FlightFuture:
         """Hold roll (right side down) and pitch (nose up: backward), degrees.
@@ -162,9 +176,8 @@ class Pilot(Drone):
         """
         if yaw is not None and yaw_rate is not None:
             raise InputError(f"yaw={yaw} and yaw_rate={yaw_rate} are both given; give one of them")
-        tilt = checks.radians(roll, "roll", 90.0), checks.radians(pitch, "pitch", 90.0)
-        name, value = ("yaw", yaw) if yaw_rate is None else ("yaw_rate", yaw_rate)
-        x, y, wanted = to_simulator(*tilt, checks.radians(0.0 if value is None else value, name))
+        value = yaw if yaw_rate is None else yaw_rate
+        x, y, wanted = to_simulator(*map(math.radians, (roll, pitch, value or 0.0)))
         turn = float(self.body.heading[0]) if value is None else wanted
         turn_mode = Mode.ANGLE if yaw_rate is None else Mode.RATE
         lift_mode, lift = self._lift(z, throttle)
@@ -172,41 +185,43 @@ class Pilot(Drone):
         goals = goals_of(modes, x, y, turn, lift)
         return self._hold("move_by_angle", goals, duration, wait)
 
+    @checked
     def move_by_rates(
         self,
-        roll: float,
-        pitch: float,
-        yaw: float,
-        duration: float,
+        roll: Degrees,
+        pitch: Degrees,
+        yaw: Degrees,
+        duration: Duration,
         *,
-        z: float | None = None,
-        throttle: float | None = None,
+        z: Height | None = None,
+        throttle: Share | None = None,
         wait: bool = True,
     ) -> bool | FlightFuture:
         """Hold body rates, degrees per second; see `move_by_angle`."""
-        named = ((roll, "roll"), (pitch, "pitch"), (yaw, "yaw"))
-        x, y, turn = to_simulator(*(checks.radians(value, name) for value, name in named))
+        x, y, turn = to_simulator(*map(math.radians, (roll, pitch, yaw)))
         lift_mode, lift = self._lift(z, throttle)
         goals = goals_of((Mode.RATE, Mode.RATE, Mode.RATE, lift_mode), x, y, turn, lift)
         return self._hold("move_by_rates", goals, duration, wait)
 
+    @checked
     def move_by_rotors(
-        self, shares: Sequence[float], duration: float, *, wait: bool = True
+        self, shares: Any, duration: Duration, *, wait: bool = True
     ) -> bool | FlightFuture:
         """Set all rotors: front right, rear left, front left, rear right, each from 0 to 1."""
         rotors = checks.numbers(shares, "shares", 4, checks.SHARE)
         goals = rotor_goals(torch.tensor([rotors], dtype=torch.float64))
         return self._hold("move_by_rotors", goals, duration, wait)
 
+    @checked
     def move_by_velocity(
         self,
-        vx: float,
-        vy: float,
-        vz: float = 0.0,
-        duration: float = 1.0,
+        vx: Velocity,
+        vy: Velocity,
+        vz: Velocity = 0.0,
+        duration: Duration = 1.0,
         *,
-        z: float | None = None,
-        frame: str = "world",
+        z: Height | None = None,
+        frame: Literal["world", "body"] = "world",
         drivetrain: str = _FREE,
         yaw_mode: YawMode | None = None,
         wait: bool = True,
@@ -216,37 +231,36 @@ class Pilot(Drone):
         `z` is the height to hold in place of `vz`, metres. `frame` is "world", or "body" for `vx`
         ahead of the drone and `vy` to its left, not with `Drivetrain.FORWARD_ONLY`.
         """
-        x, y, up = (Real(-100.0, 100.0).read(v, n) for v, n in ((vx, "vx"), (vy, "vy"), (vz, "vz")))
-        if z is not None and up != 0.0:
-            raise InputError(f"z={z} and vz={up:g} are both given; give one of them")
+        if z is not None and vz != 0.0:
+            raise InputError(f"z={z} and vz={vz:g} are both given; give one of them")
         control = YawControl(self.body, drivetrain, yaw_mode)
-        is_body = OneOf(("world", "body")).read(frame, "frame") == "body"
+        is_body = frame == "body"
         if is_body and control.is_forward:
             raise InputError(
                 "frame=body turns with the drone and can't be combined with "
                 "drivetrain=forward_only; give frame=world, or max_degree_of_freedom"
             )
         sideways = Mode.HEADING_VELOCITY if is_body else Mode.VELOCITY
-        height = up if z is None else checks.height(z)
+        height = vz if z is None else z
         up_mode = Mode.VELOCITY if z is None else Mode.POSITION
         modes: Modes = (sideways, sideways, control.mode, up_mode)
 
         def goals(body: FlightState) -> FlightGoals:
-            return goals_of(modes, x, y, control.goal(x, y), height)
+            return goals_of(modes, vx, vy, control.goal(vx, vy), height)
 
-        command = TimedCommand(goals, checks.DURATION.read(duration, "duration"))
-        return self._run("move_by_velocity", command, wait)
+        return self._run("move_by_velocity", TimedCommand(goals, duration), wait)
 
+    @checked
     def move_along(
         self,
         path: Any,
-        speed: float = 1.0,
-        timeout: float | None = None,
+        speed: Speed = 1.0,
+        timeout: Duration | None = None,
         *,
         drivetrain: str = _FREE,
         yaw_mode: YawMode | None = None,
-        lookahead: float = AUTOMATIC,
-        adaptive_lookahead: float = 1.0,
+        lookahead: Coordinate = AUTOMATIC,
+        adaptive_lookahead: Annotated[float, Real(0.0, 100.0)] = 1.0,
         wait: bool = True,
     ) -> bool | FlightFuture:
         """Follow a path from the present position by pure pursuit.
@@ -256,21 +270,20 @@ class Pilot(Drone):
         from the speed if negative; `adaptive_lookahead` is added per metre of distance from the
         path. A lookahead that is too short is an `InputError`.
         """
-        points, pace = checks.path(path), checks.SPEED.read(speed, "speed")
         command = PathCommand(
             self.body,
-            points,
-            pace,
+            checks.path(path),
+            speed,
             timeout,
             yaw_control=YawControl(self.body, drivetrain, yaw_mode),
-            lookahead=checks.COORDINATE.read(lookahead, "lookahead"),
-            adaptive=Real(0.0, 100.0).read(adaptive_lookahead, "adaptive_lookahead"),
+            lookahead=lookahead,
+            adaptive=adaptive_lookahead,
             braking=braking_time(self.settings),
         )
         return self._run("move_along", command, wait)
 
     def move_to(
-        self, x: float, y: float, z: float, speed: float = 1.0, timeout: float | None = None,
+        self, x: float, y: float, z: float, speed: float = 1.0, timeout: Duration | None = None,
         **options: Unpack[PathOptions],
     ) -> bool | FlightFuture:  # fmt: skip
         """Fly to a position; see `move_along` for the options."""
@@ -280,39 +293,47 @@ class Pilot(Drone):
         self,
         z: float,
         speed: float = 1.0,
-        timeout: float | None = None,
+        timeout: Duration | None = None,
         **options: Unpack[PathOptions],
     ) -> bool | FlightFuture:
         """Fly straight up or down to a height; see `move_along`."""
         x, y, _ = self.body.position[0].tolist()
         return self.move_along([(x, y, z)], speed, timeout, **options)
 
+    @checked
     def rotate_to(
-        self, yaw: float, timeout: float | None = None, *, margin: float = 5.0, wait: bool = True
+        self,
+        yaw: Degrees,
+        timeout: Duration | None = None,
+        *,
+        margin: Annotated[float, Real(0.0, 180.0, is_above=True)] = 5.0,
+        wait: bool = True,
     ) -> bool | FlightFuture:
         """Turn to a heading the shorter way round, degrees to the right of the world's x axis.
 
         It fails after 20 s by default. `margin` is the heading error in degrees at which it
         succeeds, once the drone no longer turns.
         """
-        limit = 20.0 if timeout is None else checks.DURATION.read(timeout, "timeout")
-        near = math.radians(Real(0.0, 180.0, is_above=True).read(margin, "margin"))
-        *_, heading = to_simulator(0.0, 0.0, checks.radians(yaw, "yaw"))
-        command = RotateToCommand(self.body, heading, near, limit)
+        limit = 20.0 if timeout is None else timeout
+        *_, heading = to_simulator(0.0, 0.0, math.radians(yaw))
+        command = RotateToCommand(self.body, heading, math.radians(margin), limit)
         return self._run("rotate_to", command, wait)
 
-    def rotate_by(self, rate: float, duration: float, *, wait: bool = True) -> bool | FlightFuture:
+    @checked
+    def rotate_by(
+        self, rate: Degrees, duration: Duration, *, wait: bool = True
+    ) -> bool | FlightFuture:
         """Turn at a rate, degrees per second to the right, for some seconds."""
-        *_, turn = to_simulator(0.0, 0.0, checks.radians(rate, "rate"))
-        command = RotateByCommand(self.body, turn, checks.DURATION.read(duration, "duration"))
-        return self._run("rotate_by", command, wait)
+        *_, turn = to_simulator(0.0, 0.0, math.radians(rate))
+        return self._run("rotate_by", RotateByCommand(self.body, turn, duration), wait)
 
+    @checked
     def move_by_manual(
         self,
-        vx_max: float,
-        vy_max: float,
-        z_max: float,
-        duration: float,
+        vx_max: Speed,
+        vy_max: Speed,
+        z_max: Annotated[float, Real(0.0)],
+        duration: Duration,
         *,
         drivetrain: str = _FREE,
         yaw_mode: YawMode | None = None,
@@ -323,8 +344,6 @@ class Pilot(Drone):
         `vx_max` and `vy_max` are the speeds at full stick, forward in the heading at the start and
         sideways, m/s; `z_max` is the goal's height above the drone at full throttle, metres.
         """
-        fastest = checks.SPEED.read(vx_max, "vx_max"), checks.SPEED.read(vy_max, "vy_max")
-        climb = Real(0.0).read(z_max, "z_max")
         control = YawControl(self.body, drivetrain, yaw_mode)
         modes: Modes = (Mode.VELOCITY, Mode.VELOCITY, control.mode, Mode.POSITION)
         ahead = float(self.body.heading[0])
@@ -332,22 +351,19 @@ class Pilot(Drone):
 
         def goals(body: FlightState) -> FlightGoals:
             sticks = Instance(Sticks).read(self.sticks, "sticks")
-            forward, left = sticks.pitch * fastest[0], -sticks.roll * fastest[1]
+            forward, left = sticks.pitch * vx_max, -sticks.roll * vy_max
             x, y = cos * forward - sin * left, sin * forward + cos * left
             heading = control.goal(x, y) - math.radians(YAW_AT_FULL_STICK) * sticks.yaw
-            z = max(0.0, float(body.position[0, 2]) + sticks.throttle * climb)
+            z = max(0.0, float(body.position[0, 2]) + sticks.throttle * z_max)
             return goals_of(modes, x, y, heading, z)
 
-        command = TimedCommand(goals, checks.DURATION.read(duration, "duration"))
-        return self._run("move_by_manual", command, wait)
+        return self._run("move_by_manual", TimedCommand(goals, duration), wait)
 
     def _hold(
-        self, name: str, goals: FlightGoals, duration: float, wait: bool
+        self, name: str, goals: FlightGoals, duration: Duration, wait: bool
     ) -> bool | FlightFuture:
         """Keep the same goals for some seconds."""
-        return self._run(
-            name, TimedCommand(lambda body: goals, checks.DURATION.read(duration, "duration")), wait
-        )
+        return self._run(name, TimedCommand(lambda body: goals, duration), wait)
 
     def _lift(self, z: float | None, throttle: float | None) -> tuple[Mode, float]:
         """Return the vertical goal and its mode; hold the present height by default.
@@ -356,8 +372,8 @@ class Pilot(Drone):
             InputError: Both are given, or one is invalid.
         """
         if throttle is None:
-            height = float(self.body.position[0, 2]) if z is None else checks.height(z)
+            height = float(self.body.position[0, 2]) if z is None else z
             return Mode.POSITION, height
         if z is not None:
             raise InputError(f"z={z} and throttle={throttle} are both given; give one of them")
-        return Mode.THROTTLE, checks.SHARE.read(throttle, "throttle")
+        return Mode.THROTTLE, throttle

@@ -7,7 +7,7 @@ import struct
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import pydantic
 import torch
@@ -43,7 +43,7 @@ def message(**fields: Any) -> type[Model]:
 _MESSAGES = {
     "hold": message(controls=tuple[Annotated[str, OneOf(CONTROLS)], ...]),
     "sticks": message(values=Annotated[Axes, Several(Real(-1.0, 1.0), 4, 4)]),
-    "pilot": message(pilot=Annotated[str, OneOf(("person", "policy"))]),
+    "pilot": message(pilot=Literal["person", "policy"]),
     "mode": message(mode=Annotated[str, OneOf(FLY_MODES)]),
     "camera": message(camera=Camera),
     "set": message(name=Annotated[str, OneOf(tuple(LIMITS))], value=float),

@@ -20,7 +20,7 @@ from typing import Any, Protocol
 from drone_rl.config.commands import FlySettings
 from drone_rl.config.configuration import from_arguments
 from drone_rl.flight.fly_page.flight import Flight
-from drone_rl.flight.server_thread import ServerThread
+from drone_rl.flight.server_thread import ServerThread, listening
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.utils.errors import InputError, extra
 from drone_rl.utils.files import as_path
@@ -156,7 +156,7 @@ class FlyPage(ServerThread):
     async def _serve(self, ready: Callable[[], None]) -> None:
         logger = logging.getLogger("drone_rl.websockets")
         logger.setLevel(logging.CRITICAL)  # browsers open connections that they do not use
-        try:
+        with listening(ADDRESS, self._port):
             server = await self._websockets.serve(
                 self._talk,
                 ADDRESS,
@@ -168,11 +168,6 @@ class FlyPage(ServerThread):
                 server_header=None,
                 logger=logger,
             )
-        except OSError as error:
-            raise InputError(
-                f"port={self._port} can't be used ({error.strerror}); give another one, or 0 for a "
-                "free one"
-            ) from error
         async with server:
             self._port = server.sockets[0].getsockname()[1]
             ready()

@@ -54,8 +54,6 @@ def find_partition_error(boxes: NDArray[np.float64], bound: float) -> list[float
     return every[box, np.arange(n), ends[end]].tolist()
 
 
-MAX_MISSING = 0.05  # largest fraction of the stated placements without a stated number of steps
-MIN_STATED = 1e-3  # fraction of placements from which on an outcome must state a number of steps
 TOLERANCE = 1e-12  # relative error of a stated fraction from summing floats
 
 
@@ -73,7 +71,6 @@ def find_inconsistencies(certificate: Certificate) -> Iterator[str]:
             *_wrong_share(outcome.share, volume(outcome.boxes) / whole),
         ]
         yield from (f"outcome {i} ({outcome}) {what}" for what in wrong)
-    yield from _missing(certificate)
     left = volume(certificate.undecided.boxes) / whole
     yield from (f"undecided {what}" for what in _wrong_share(certificate.undecided.share, left))
     if not certificate.finished and not left:
@@ -84,17 +81,6 @@ def missing_steps(outcome: Outcome) -> float:
     """Return the fraction of placements with this outcome but no stated number of steps."""
     missing = outcome.share - sum(outcome.steps.values())
     return missing if missing > TOLERANCE * outcome.share else 0.0
-
-
-def _missing(certificate: Certificate) -> Iterator[str]:
-    """Yield missing numbers of steps, which no simulation could refute."""
-    for i, outcome in enumerate(certificate.outcomes):
-        if not outcome.steps and outcome.share > MIN_STATED:
-            yield f"outcome {i} ({outcome}) states no number of steps"
-    stated = sum(outcome.share for outcome in certificate.outcomes)
-    missing = sum(map(missing_steps, certificate.outcomes))
-    if missing > MAX_MISSING * stated:
-        yield f"numbers of steps are left open for a share of {missing:.6g} of all placements"
 
 
 def _misfits(certificate: Certificate, whole: Fraction) -> Iterator[str]:

@@ -101,12 +101,13 @@ def test_null_nan_and_nothing_mean_the_default():
     assert found.model_copy(update={"text": "{}"}) == AirsimSettings.read({"Wind": {"Y": 2}})
 
 
-def test_misspelled_keys_are_warned_about_and_others_are_not(caplog):
+def test_keys_without_effect_are_warned_about(caplog):
     with caplog.at_level(logging.WARNING):
         parse_settings('{"SimMod": "Multirotor", "ViewMode": "", "Vehicles": {"A": {"Camera": 1}}}')
-    first, second = (record.getMessage() for record in caplog.records)
-    assert "SimMod is unknown and ignored" in first and "SimMode" in first
-    assert "did you mean Cameras" in second
+    first, second, third = (record.getMessage() for record in caplog.records)
+    assert first == "settings: SimMod has no effect here; did you mean SimMode?"
+    assert second == "settings: ViewMode has no effect here"
+    assert "did you mean Cameras" in third
 
 
 @pytest.mark.parametrize(

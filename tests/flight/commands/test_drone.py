@@ -89,7 +89,7 @@ def test_settings_one_by_one():
     ("given", "told"),
     [
         ({"wind": [math.nan, 0, 0]}, "wind"),
-        ({"mass": 3}, "too small to control"),
+        ({"mass": 3}, "can't carry and control"),
         ({"wings": 2}, "wings is unknown"),
         ({"start": (0, 0, 5)}, r"start=\[0,0,5\]"),
         ({"seed": 0.5}, "seed=0.5"),

@@ -187,7 +187,9 @@ def test_a_port_in_use_is_one_line():
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        with pytest.raises(InputError, match=f"port={port} can't be used .* or 0 for a free one"):
+        with pytest.raises(
+            InputError, match=f"port={port} of .* can't be opened .*, such as port=0"
+        ):
             drone_rl.fly("good", port=port)
 
 

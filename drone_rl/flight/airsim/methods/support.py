@@ -5,38 +5,26 @@ def _each(names: str, words: str) -> dict[str, str]:
     return dict.fromkeys(names.split(), words)
 
 
-_FILM = "film cameras of Unreal"
 UNSUPPORTED = {
-    "simGetLidarSegmentation": "lidar",
-    "getLidarData": "lidar; use depth images by simGetImages",
-    "getDistanceSensorData": "distance sensors; use depth images by simGetImages",
-    "simSetObjectMaterial": "materials of Unreal; give a scene as an MJCF file",
-    "simSetObjectMaterialFromTexture": "materials of Unreal; give a scene as an MJCF file",
-    "simSwapTextures": "textures of Unreal; give a scene as an MJCF file",
-    "simLoadLevel": "levels of Unreal; start a server with another scene",
-    "simSpawnAsset": "assets of Unreal; simSpawnObject makes cubes, spheres and cylinders",
-    "simGetMeshPositionVertexBuffers": "meshes of Unreal; give a scene as an MJCF file",
-    "simCharSetFacePreset": "characters of Unreal",
-    "simGetWorldExtents": "voxel grids",
-    "simCreateVoxelGrid": "voxel grids; use depth images by simGetImages",
-    **_each("setCarControls getCarControls", "cars; use a multirotor"),
-    "getCarState": "cars; use getMultirotorState",
+    **_each(
+        "getLidarData simGetLidarSegmentation getDistanceSensorData simGetWorldExtents "
+        "simCreateVoxelGrid",
+        "lidar, distance sensors and voxel grids; use depth images by simGetImages",
+    ),
+    **_each(
+        "simSetObjectMaterial simSetObjectMaterialFromTexture simSwapTextures simLoadLevel "
+        "simSpawnAsset simGetMeshPositionVertexBuffers simCharSetFacePreset",
+        "materials, levels and assets of Unreal; give a scene as an MJCF file",
+    ),
+    **_each("setCarControls getCarControls getCarState", "cars; use a multirotor"),
     **_each(
         "simGetFilmbackSettings simGetPresetFilmbackSettings simGetPresetLensSettings "
-        "simGetLensSettings simGetFocalLength simGetCurrentFieldOfView",
-        f"{_FILM}; use simGetCameraInfo",
-    ),
-    **_each(
-        "simSetFilmbackSettings simSetPresetFilmbackSettings simSetPresetLensSettings "
-        "simSetFocalLength",
-        f"{_FILM}; use simSetCameraFov",
-    ),
-    **_each(
+        "simGetLensSettings simGetFocalLength simGetCurrentFieldOfView simSetFilmbackSettings "
+        "simSetPresetFilmbackSettings simSetPresetLensSettings simSetFocalLength "
         "simEnableManualFocus simSetFocusDistance simGetFocusDistance simSetFocusAperture "
-        "simGetFocusAperture simEnableFocusPlane",
-        _FILM,
+        "simGetFocusAperture simEnableFocusPlane simSetDistortionParam simGetDistortionParams",
+        "lenses and film cameras of Unreal; use simGetCameraInfo and simSetCameraFov",
     ),
-    **_each("simSetDistortionParam simGetDistortionParams", "lens distortion of Unreal"),
 }
 """Methods that AirSim has and this server does not, with what is missing and the alternative."""
 GAINS = (
