@@ -140,7 +140,8 @@ class VerdictCommand(AppearanceCommandSettings, JudgeSettings):
         """Judge one policy; return the exit status and the kind's name."""
         names = ("dynamics", "appearance", "certificate", "require", "shifts", "require_domain")
         options = {name: getattr(self, name) for name in names}
-        result = drone_rl.judge(self.policy, self, **options, **self.shared(), progress=silent)
+        options["progress"] = None if self.require == "proved" else silent  # a bar of the proof
+        result = drone_rl.judge(self.policy, self, **options, **self.shared())
         finish(result, folder / "verdict.json")
         if self.require == "proved" and result.proof is None:
             _log.info(

@@ -4,11 +4,13 @@ import logging
 from pathlib import Path
 from typing import Annotated, Any
 
-import pydantic
-
 import drone_rl
-from drone_rl.cli.settings import CommandSettings, PolicyCommandSettings, finish
-from drone_rl.config.configuration import DynamicsChanges, TaskChanges
+from drone_rl.cli.settings import (
+    CommandSettings,
+    PolicyCommandSettings,
+    RolloutCommandSettings,
+    finish,
+)
 from drone_rl.config.values import NumEnvs
 from drone_rl.explanations.chapter_figures import FigureSettings
 from drone_rl.explanations.settings import ClassModelsSettings, ExplainSettings
@@ -19,7 +21,7 @@ from drone_rl.utils.schema import Listed, OneOf
 _log = logging.getLogger(__name__)
 
 
-class ExplainCommand(CommandSettings, ExplainSettings):
+class ExplainCommand(RolloutCommandSettings, ExplainSettings):
     """Analyse what a policy responds to and test the analyses.
 
     The analyses are t-SNE, class models and saliency maps. Writes report.html.
@@ -33,10 +35,6 @@ class ExplainCommand(CommandSettings, ExplainSettings):
     require: Annotated[str, OneOf(tuple(VerdictKind))] | None = None
     """Kind of verdict to require, such as good; other kinds and uncertain verdicts end with exit
     status 10 to 13 or 18. null accepts all kinds."""
-    task: TaskChanges = pydantic.Field(default_factory=dict)
-    """Changes of the policy's task settings (see conf/task), as in task.num_cubes=5."""
-    dynamics: DynamicsChanges = pydantic.Field(default_factory=dict)
-    """Changes of the vehicle dynamics (see conf/dynamics), as in dynamics=quadrotor."""
 
     def run(self, folder: Path) -> tuple[int, str]:
         """Explain policies in a report; return the exit status and the report's path."""

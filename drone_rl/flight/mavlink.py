@@ -12,7 +12,6 @@ import socket
 import termios
 import time
 import tty
-from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
@@ -106,23 +105,20 @@ class SerialLink(Link):
         Raises:
             InputError: The device can't be opened, is no serial port, or the speed is invalid.
         """
-        speed = getattr(termios, f"B{baud}", None)
-        if not speed:  # B0, which is 0, hangs up
-            raise InputError(f"baud={baud} is no serial speed; give one such as 921600")
-        if not Path(device).exists():
-            raise InputError(f"device={device} doesn't exist; is the controller plugged in?")
+        file, speed = None, getattr(termios, f"B{baud}", None)
         try:
             file = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-        except OSError as error:
-            raise InputError(f"device={device} can't be opened: {error.strerror}") from error
-        try:
             tty.setraw(file)
             settings = termios.tcgetattr(file)
-            settings[4:6] = [speed, speed]
+            settings[4:6] = [speed or -1] * 2  # 0 would hang up
             termios.tcsetattr(file, termios.TCSANOW, settings)
-        except termios.error as error:
-            os.close(file)
-            raise InputError(f"device={device} is no serial port; give one") from error
+        except (OSError, OverflowError, termios.error) as error:
+            if file is not None:
+                os.close(file)
+            raise InputError(
+                f"device={device} with baud={baud} can't be used ({error}); give a serial port "
+                "such as /dev/ttyACM0 and its speed such as 921600"
+            ) from error
         super().__init__(device, patience, file)
 
 

@@ -98,7 +98,7 @@ def scale_to_unit(returns: Tensor) -> Tensor:
 
 
 def pad(values: Tensor, done: Tensor) -> tuple[Tensor, list[int]]:
-    """Return episodes side by side, (longest, episodes), with zeros after their ends; and lengths."""
+    """Return episodes side by side, (longest, episodes), zero after their ends, and lengths."""
     if values.shape != done.shape or values.shape[-1] != 1:
         raise ValueError(
             f"values {tuple(values.shape)} and done {tuple(done.shape)} must both be (*batch, T, 1)"

@@ -55,16 +55,14 @@ class Check(Result, CheckFindings, Seeded, Provenance):
         """Return the result, the statements, and each finding in one line."""
         stated, usual = self.stated, TaskSettings().values()
         changed = [f"{n}={v}" for n, v in self.task.items() if usual.get(n) != v]
-        found = "accepted: not refuted" if self.accepted else "refused"
-        bound = (
-            f", wrong on at most {percent(self.wrong_at_most, 2)} of placements (95% confidence)"
-        )
+        bound = f": not refuted, wrong on at most {percent(self.wrong_at_most, 2)} of placements"
         return [
-            f"{found}: {self.certificate}, of policy {stated.policy.name}"
+            f"{'accepted' if self.accepted else 'refused'}: {self.certificate}, "
+            f"of policy {stated.policy.name}"
             f"{' with ' if changed else ''}{', '.join(changed)}, "
             f"{sum(map(len, stated.groups))} boxes, {sum(self.flights.values())} flights, "
             f"{self.contradicted} of them ended otherwise than stated"
-            f"{bound if self.accepted else ''}",
+            f"{f'{bound} (95% confidence)' if self.accepted else ''}",
             *(f"stated: {exact_percent(of.share)} {of}" for of in stated.outcomes),
             f"stated: {exact_percent(stated.undecided.share)} undecided",
             *(f"refused: {line}" for line in super().lines()),

@@ -82,7 +82,7 @@ def test_each_command_has_a_class_and_help(command):
     settings = find_command(command)
     assert issubclass(settings, CommandSettings) and settings().paths.outputs == "outputs"
     assert f"\n  {command} " in USAGE
-    assert TABLE[command].keys() == {"module", "about", "examples", "next"}
+    assert TABLE[command].keys() - {"next"} == {"module", "about", "examples"}
 
 
 @pytest.mark.parametrize("args", [["--help"], ["policies", "most=0"]])

@@ -102,9 +102,10 @@ def workplace(tmp_path, monkeypatch):
     monkeypatch.setattr(report_page, "PARTS", dict(report_page.PARTS))
     known, threads = set(sys.modules), torch.get_num_threads()
     templates = jinja2.FileSystemLoader(inside / "explanations" / "report" / "templates")
-    theirs = jinja2.PackageLoader("drone_rl.explanations.report")
-    loader = jinja2.ChoiceLoader([theirs, templates])
-    monkeypatch.setattr(jinja2, "PackageLoader", lambda _: loader)
+    load = jinja2.PackageLoader
+    monkeypatch.setattr(
+        jinja2, "PackageLoader", lambda package: jinja2.ChoiceLoader([load(package), templates])
+    )
     report_page._environment.cache_clear()  # another tutorial may have made it, with another loader
     few = few_sections("dataset", "verdict")
     with (

@@ -31,7 +31,9 @@ def test_an_accepted_certificate(path, tmp_path):
     assert done.accepted and done.exit_code == 0
     assert reports[-1] == ("flown", 50, 50)
     assert (
-        str(done).startswith("accepted: not refuted: ") and "<td>stated</td>" in done._repr_html_()
+        str(done).startswith("accepted: ")
+        and ": not refuted, wrong" in str(done)
+        and "<td>stated</td>" in done._repr_html_()
     )
     done.save(tmp_path / "check.json")
     kept = json.loads((tmp_path / "check.json").read_text())

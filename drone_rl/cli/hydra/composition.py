@@ -238,8 +238,7 @@ def _job(
             with Heartbeat() if settings.ends_alone() else contextlib.nullcontext():
                 status, value = settings.run(folder)
             if status < 128 and sys.stdout.isatty():  # pipes get only the results
-                used = settings.used_policy(folder)
-                print(next_steps(name.replace("_", "-"), used, folder, IMPORTED))
+                print(next_steps(name.replace("_", "-"), settings.used_policy(folder), IMPORTED))
         except Exception as error:  # a failed run of a sweep does not stop the others
             status, value = USER_ERROR, None
             if isinstance(error, BrokenPipeError) and is_output_closed():

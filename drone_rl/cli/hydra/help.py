@@ -1,11 +1,9 @@
 """`drone-rl COMMAND --help`: print settings and examples."""
 
 import inspect
-import re
 import shlex
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import yaml
@@ -90,22 +88,14 @@ def _about(topic: str, keys: Sequence[str], command: str) -> list[str]:
     return [key for key in keys if f"{key}.".startswith(f"{setting}.")]
 
 
-def next_steps(name: str, policy: str, folder: Path, plugins: Sequence[str] = ()) -> str:
+def next_steps(name: str, policy: str, plugins: Sequence[str] = ()) -> str:
     """Return the lines about the policy that a command used, and what a user may do next."""
-    quoted = {"policy": shlex.quote(policy), "folder": shlex.quote(str(folder))}
-    files = re.compile(r"\{folder\}/([\w.]+)")
+    words = [f"policy={policy}"]
     if plugins:
-        override = f"plugins=[{','.join(dict.fromkeys(plugins))}]"
-        quoted["policy"] += f" {shlex.quote(override)}"
-    possible = [
-        line
-        for line in TABLE[name]["next"]
-        if all((folder / f).exists() for f in files.findall(line))
-    ]
-    lines = ["next:", *(f"  {line.format(**quoted)}" for line in possible)] if possible else []
-    if any("{policy}" in line for line in possible):
-        lines.insert(0, f"policy: {policy}")
-    return "\n".join(lines)
+        words.append(f"plugins=[{','.join(dict.fromkeys(plugins))}]")
+    following = TABLE[name].get("next", ())
+    lines = [f"  {shlex.join(['drone-rl', command, *words])}" for command in following]
+    return "\n".join([f"policy: {policy}", "next:", *lines]) if lines else ""
 
 
 def _inside(values: Any, key: str) -> Any:

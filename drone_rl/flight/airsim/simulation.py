@@ -154,22 +154,19 @@ class Simulation:
         self.add(name, VehicleChoice(vehicle_type=vehicle_kind, **place, **turn))
         return True
 
-    def find(self, name: str, *, is_sim_api: bool = False) -> Vehicle:
+    def find(self, name: str) -> Vehicle:
         """Return a vehicle; "" is the first one.
 
-        Raises an `InputError` with AirSim's message for an unknown name, for its Sim-API if
-        `is_sim_api`.
+        Raises an `InputError` with AirSim's message for an unknown name.
         """
         if name == "":
             return next(iter(self.vehicles.values()))
         if name in self.vehicles:
             return self.vehicles[name]
-        meant = did_you_mean(name, self.vehicles)
-        api = "Vehicle Sim-API" if is_sim_api else "Vehicle API"
-        why = "this is not a simulation" if is_sim_api else "this is simulation-only API"
         raise InputError(
-            f"{api} for '{name}' is not available. This could either because {why} or this vehicle "
-            f"does not exist{meant}"
+            f"Vehicle API for '{name}' is not available. This could either because this is "
+            "simulation-only API or this vehicle does not exist"
+            f"{did_you_mean(name, self.vehicles)}"
         )
 
     def set_wind(self, wind: tuple[float, float, float]) -> None:

@@ -6,7 +6,8 @@ import torch
 import drone_rl
 from drone_rl.config.commands import CAMERAS
 from drone_rl.config.networks import Lstm, SmallCnn
-from drone_rl.config.transforms import Gray, Stack
+from drone_rl.config.transforms import Gray, Noise, Stack
+from drone_rl.envs import GrayPixels
 from drone_rl.sim.dynamics import FlightState, Quadrotor
 from tests.untrained import untrained
 
@@ -136,6 +137,21 @@ def test_a_policy_that_remembers_keeps_its_memory_from_step_to_step(make_world):
         change()
         memory = network.start(1)
         assert_follows()
+
+
+def test_a_policy_observes_through_its_camera_faults(make_world):
+    world = make_world(untrained(SmallCnn(channels=(2,), hidden=(4,)), Gray(), Noise(strength=0.2)))
+    noises = []
+    for _ in range(3):
+        world.step(FORWARD)
+        seen = world.see()
+        noises.append(seen.observation - GrayPixels()._apply_transform(seen.frame))
+        world.set_light(0.5)
+        world.see()
+        world.set_light(1.0)  # the noise of a state is the same in any light
+        assert torch.equal(world.see().observation, seen.observation)
+    assert all(0.1 < noise.std() < 0.25 for noise in noises)
+    assert not torch.equal(noises[0], noises[1])
 
 
 def test_wind_blows_from_its_direction(make_world):

@@ -17,7 +17,7 @@ from drone_rl.flight.airsim.messages import (
     text,
     to_world,
 )
-from drone_rl.flight.airsim.methods.registry import given, sim_vehicle_method
+from drone_rl.flight.airsim.methods.registry import given, vehicle_method
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.flight.image_types import ImageType
 from drone_rl.sim.entities import find_camera
@@ -42,13 +42,13 @@ def camera_in_world(vehicle: Vehicle, camera: str) -> Pose:
     return Pose.of(vehicle.place_of(state) - vehicle.home, turn)
 
 
-@sim_vehicle_method("getCameraInfo", CAMERA)
+@vehicle_method("getCameraInfo", CAMERA)
 def _camera_pose(vehicle: Vehicle, camera: str) -> Map:
     fov = vehicle.cameras[camera].capture(ImageType.SCENE).fov
     return {"pose": messages.pose(camera_in_world(vehicle, camera)), "fov": fov}
 
 
-@sim_vehicle_method("simGetCameraInfo", CAMERA)
+@vehicle_method("simGetCameraInfo", CAMERA)
 def _camera_info(vehicle: Vehicle, camera: str) -> Map:
     capture = vehicle.cameras[camera].capture(ImageType.SCENE)
     matrix = _projection(capture.fov, capture.width, capture.height)
@@ -74,7 +74,7 @@ def change_camera(vehicle: Vehicle, camera: str, changes: Map) -> None:
     vehicle.cameras[camera] = dataclasses.replace(vehicle.cameras[camera], **changes)
 
 
-@sim_vehicle_method("simSetCameraPose", CAMERA, given(read_pose, "pose"))
+@vehicle_method("simSetCameraPose", CAMERA, given(read_pose, "pose"))
 def _set_camera_pose(vehicle: Vehicle, camera: str, pose: Pose) -> None:
     state = vehicle.cameras[camera]
     whole = pose.merged(Pose.of(torch.tensor(state.position, dtype=torch.float64), state.attitude))
@@ -83,13 +83,13 @@ def _set_camera_pose(vehicle: Vehicle, camera: str, pose: Pose) -> None:
     change_camera(vehicle, camera, {"position": place, "attitude": attitude})
 
 
-@sim_vehicle_method(
+@vehicle_method(
     "simSetCameraOrientation setCameraOrientation", CAMERA, given(read_attitude, "orientation")
 )
 def _set_camera_orientation(vehicle: Vehicle, camera: str, attitude: list[float]) -> None:
     change_camera(vehicle, camera, {"attitude": attitude_to_world(attitude)})
 
 
-@sim_vehicle_method("simSetCameraFov", CAMERA, given(number, "fov_degrees", 1.0, 170.0))
+@vehicle_method("simSetCameraFov", CAMERA, given(number, "fov_degrees", 1.0, 170.0))
 def _set_camera_fov(vehicle: Vehicle, camera: str, fov: float) -> None:
     change_camera(vehicle, camera, {"fov": fov})

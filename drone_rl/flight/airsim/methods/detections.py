@@ -8,7 +8,7 @@ import torch
 from drone_rl.flight.airsim import messages
 from drone_rl.flight.airsim.messages import MAX_NAME, Map, Pose, number, text, to_world, whole
 from drone_rl.flight.airsim.methods.cameras import CAMERA, change_camera
-from drone_rl.flight.airsim.methods.registry import SIM_VEHICLE, given, method, sim_vehicle_method
+from drone_rl.flight.airsim.methods.registry import VEHICLE, given, method, vehicle_method
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.flight.image_types import ImageType
@@ -22,7 +22,7 @@ _OF_TYPE = (CAMERA, given(whole, "image_type", 0, 10))
 """A camera, and an image type, which does not matter."""
 
 
-@sim_vehicle_method("simAddDetectionFilterMeshName", *_OF_TYPE, given(text, "mesh_name", MAX_NAME))
+@vehicle_method("simAddDetectionFilterMeshName", *_OF_TYPE, given(text, "mesh_name", MAX_NAME))
 def _add_pattern(vehicle: Vehicle, camera: str, kind: int, pattern: str) -> None:
     patterns = vehicle.cameras[camera].detected
     if len(patterns) >= MAX_PATTERNS:
@@ -32,17 +32,17 @@ def _add_pattern(vehicle: Vehicle, camera: str, kind: int, pattern: str) -> None
     change_camera(vehicle, camera, {"detected": (*patterns, pattern)})
 
 
-@sim_vehicle_method("simSetDetectionFilterRadius", *_OF_TYPE, given(number, "radius_cm", 0.0, 1e9))
+@vehicle_method("simSetDetectionFilterRadius", *_OF_TYPE, given(number, "radius_cm", 0.0, 1e9))
 def _set_radius(vehicle: Vehicle, camera: str, kind: int, radius: float) -> None:
     change_camera(vehicle, camera, {"detection_radius": radius / 100.0})
 
 
-@sim_vehicle_method("simClearDetectionMeshNames", *_OF_TYPE)
+@vehicle_method("simClearDetectionMeshNames", *_OF_TYPE)
 def _clear_patterns(vehicle: Vehicle, camera: str, kind: int) -> None:
     change_camera(vehicle, camera, {"detected": ()})
 
 
-@method("simGetDetections", *_OF_TYPE, SIM_VEHICLE)
+@method("simGetDetections", *_OF_TYPE, VEHICLE)
 def _detections(simulation: Simulation, name: str, kind: int, vehicle: Vehicle) -> list[Map]:
     stage, camera, detections = simulation.stage, vehicle.cameras[name], []
     names = [n for n in stage.names if any(fnmatch.fnmatch(n, p) for p in camera.detected)]

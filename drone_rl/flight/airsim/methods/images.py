@@ -10,7 +10,7 @@ from torch import Tensor
 from drone_rl.flight.airsim import messages
 from drone_rl.flight.airsim.messages import Map, flag, text, whole
 from drone_rl.flight.airsim.methods.cameras import CAMERA, camera_in_world, read_camera
-from drone_rl.flight.airsim.methods.registry import SIM_VEHICLE, given, method
+from drone_rl.flight.airsim.methods.registry import VEHICLE, given, method
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.stage import Shot, png
 from drone_rl.flight.airsim.vehicle import Vehicle
@@ -63,7 +63,7 @@ def _read_type(value: Any, name: str) -> ImageType:
     return ImageType(number)
 
 
-@method("simGetImages", given(_read_requests, "requests"), SIM_VEHICLE)
+@method("simGetImages", given(_read_requests, "requests"), VEHICLE)
 def _images(simulation: Simulation, requests: Sequence[_Request], vehicle: Vehicle) -> list[Map]:
     cameras = [read_camera(request.camera) for request in requests]
     responses: dict[int, Map] = {}
@@ -116,7 +116,7 @@ def _raw(image: Tensor, channels: str) -> bytes:
     return pixels.tobytes()
 
 
-@method("simGetImage", CAMERA, given(_read_type, "image_type"), SIM_VEHICLE)
+@method("simGetImage", CAMERA, given(_read_type, "image_type"), VEHICLE)
 def _image(simulation: Simulation, camera: str, kind: ImageType, vehicle: Vehicle) -> bytes:
     (shot,) = simulation.stage.render(vehicle.body, vehicle.cameras[camera], [kind])
     return png(simulation.stage.image(kind, shot, as_float=False))

@@ -1,6 +1,5 @@
 """The registry of RPC methods: their names, arguments and functions."""
 
-import functools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -27,14 +26,10 @@ def given(read: Callable[..., Any], name: str, *limits: Any, default: Any = _REQ
     return Argument(lambda simulation, value: read(value, name, *limits), default)
 
 
-def _find(simulation: Simulation, value: Any, *, is_sim_api: bool = False) -> Any:
-    return simulation.find(text(value, "vehicle_name"), is_sim_api=is_sim_api)
-
-
-VEHICLE = Argument(_find, "")
-"""A vehicle by its name, the first one by default; errors name its API, as in AirSim."""
-SIM_VEHICLE = Argument(lambda simulation, value: _find(simulation, value, is_sim_api=True), "")
-"""The same; errors name its Sim-API."""
+VEHICLE = Argument(
+    lambda simulation, value: simulation.find(text(value, "vehicle_name")), default=""
+)
+"""A vehicle by its name, the first one by default."""
 
 
 class Method(NamedTuple):
@@ -65,18 +60,14 @@ def method(names: str, *arguments: Argument) -> _Decorator:
     return register
 
 
-def vehicle_method(names: str, *arguments: Argument, vehicle: Argument = VEHICLE) -> _Decorator:
+def vehicle_method(names: str, *arguments: Argument) -> _Decorator:
     """Register a function of a vehicle and arguments; clients send the vehicle's name last."""
 
     def register(compute: Callable[..., Any]) -> Callable[..., Any]:
-        method(names, *arguments, vehicle)(lambda _, *values: compute(values[-1], *values[:-1]))
+        method(names, *arguments, VEHICLE)(lambda _, *values: compute(values[-1], *values[:-1]))
         return compute
 
     return register
-
-
-sim_vehicle_method = functools.partial(vehicle_method, vehicle=SIM_VEHICLE)
-"""Like `vehicle_method`; errors name the vehicle's Sim-API."""
 
 
 def call(simulation: Simulation, name: str, args: Sequence[Any]) -> Any:

@@ -15,11 +15,9 @@ from drone_rl.flight.airsim.messages import (
     text,
 )
 from drone_rl.flight.airsim.methods.registry import (
-    SIM_VEHICLE,
     VEHICLE,
     given,
     method,
-    sim_vehicle_method,
     vehicle_method,
 )
 from drone_rl.flight.airsim.simulation import Simulation
@@ -29,9 +27,9 @@ from drone_rl.sim.sensors.instruments import standard_pressure
 
 vehicle_method("getMultirotorState")(Vehicle.multirotor_state)
 vehicle_method("getRotorStates")(Vehicle.rotor_states)
-sim_vehicle_method("simGetVehiclePose simGetPose")(lambda vehicle: messages.pose(vehicle.pose))
-sim_vehicle_method("simGetGroundTruthKinematics")(Vehicle.kinematics)
-sim_vehicle_method("simGetCollisionInfo")(Vehicle.collision)
+vehicle_method("simGetVehiclePose simGetPose")(lambda vehicle: messages.pose(vehicle.pose))
+vehicle_method("simGetGroundTruthKinematics")(Vehicle.kinematics)
+vehicle_method("simGetCollisionInfo")(Vehicle.collision)
 
 # of version 1.1
 vehicle_method("getCollisionInfo")(lambda vehicle: vehicle.collision(is_legacy=True))
@@ -109,7 +107,7 @@ for _names, _read in (
     "simSetVehiclePose simSetPose",
     given(read_pose, "pose"),
     given(flag, "ignore_collision"),
-    SIM_VEHICLE,
+    VEHICLE,
 )
 def _set_pose(simulation: Simulation, pose: Pose, ignore_collision: bool, vehicle: Vehicle) -> None:
     simulation.teleport(vehicle, pose, ignore_collision=ignore_collision)
@@ -128,7 +126,7 @@ def _read_kinematics(value: Any, name: str) -> tuple[Pose, list[float], list[flo
     "simSetKinematics",
     given(_read_kinematics, "state"),
     given(flag, "ignore_collision"),
-    SIM_VEHICLE,
+    VEHICLE,
 )
 def _set_kinematics(
     simulation: Simulation, state: Any, ignore_collision: bool, vehicle: Vehicle
@@ -141,7 +139,7 @@ _STRATOSPHERE = 11_000.0
 """Altitude in metres from which the temperature counts as constant."""
 
 
-@sim_vehicle_method("simGetGroundTruthEnvironment")
+@vehicle_method("simGetGroundTruthEnvironment")
 def _environment(vehicle: Vehicle) -> Map:
     altitude = vehicle.geo_point()["altitude"]
     kelvin = 288.15 - 0.0065 * min(altitude, _STRATOSPHERE)
@@ -160,7 +158,7 @@ def _read_place(value: Any, name: str) -> GeoPoint:
     return GeoPoint(*read_map(value, name, ("latitude", "longitude", "altitude")))
 
 
-sim_vehicle_method("simTestLineOfSightToPoint", given(_read_place, "point"))(Vehicle.sees)
+vehicle_method("simTestLineOfSightToPoint", given(_read_place, "point"))(Vehicle.sees)
 
 
 @method(

@@ -80,7 +80,7 @@ def test_several_cameras_and_types_in_one_call(start):
         (([{"camera_name": "0"}], ""), "image_type=None is not a number"),
         ((7, ""), "requests are not a list"),
         (([request()] * 65, ""), "requests are not a list of at most 64"),
-        (([request()], "Drone9"), "Vehicle Sim-API for 'Drone9' is not available"),
+        (([request()], "Drone9"), "Vehicle API for 'Drone9' is not available"),
     ],
 )
 def test_wrong_image_requests(start, args, message):

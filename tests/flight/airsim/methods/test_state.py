@@ -113,5 +113,5 @@ def test_kinematics_are_set_and_go_on(start):
     assert after["y_val"] == pytest.approx(2.3, abs=0.05)
     with pytest.raises(RuntimeError, match=r"state\.linear_velocity"):
         client.call("simSetKinematics", pose(1.0, 2.0, -30.0), True, "")
-    with pytest.raises(RuntimeError, match="Vehicle Sim-API for 'Who' is not available"):
+    with pytest.raises(RuntimeError, match="Vehicle API for 'Who' is not available"):
         client.call("simSetKinematics", state, True, "Who")
