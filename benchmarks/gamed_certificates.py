@@ -115,8 +115,8 @@ def certificate_of(
         "format_version": 1,
         "policy": {
             "name": policy.name,
-            "weights": fingerprint(policy.state["policy"]),
-            "description": policy.description.as_dict(),
+            "weights": fingerprint(policy.state.weights),
+            "description": policy.description.model_dump(mode="json"),
         },
         "outcomes": outcomes,
         "undecided": {"share": share_undecided, "boxes": list(undecided)},
@@ -143,7 +143,7 @@ def steps_of(
     bound, cubes, rng = task.lateral_bound, task.num_cubes, np.random.default_rng(7)
     places = rng.uniform(-bound, bound, (episodes, cubes))
     places[:, 0] = rng.uniform(-bound, bound if high is None else high, episodes)
-    with closing(Simulator(policy.description, policy.state["policy"])) as simulator:
+    with closing(Simulator(policy.description, policy.state.weights)) as simulator:
         steps = simulator.fly(places).steps
     numbers, counts = np.unique(steps, return_counts=True)
     pairs = zip(numbers.tolist(), counts.tolist(), strict=True)

@@ -24,7 +24,6 @@ from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import ExternalPolicy, policy_from
 from drone_rl.policies.policy import BasePolicy, load_policy
 from drone_rl.policies.zoo import describe
-from drone_rl.policies.zoo.files import exported_bytes
 from drone_rl.sim.actions import Move
 from drone_rl.trust.evaluate import evaluate
 from drone_rl.trust.judge import judge
@@ -145,8 +144,8 @@ def write_memorising_policy(path: Path) -> Path:
     network = MLP(frames.shape[1:], len(Move), hidden=(WIDTH,), generator=generator)
     _fit(network, frames, actions)
     origin = load_policy("good").state
-    about = {name: origin[name] for name in ("progress", "provenance", "command")}
-    path.write_bytes(exported_bytes(network.state_dict(), described.as_dict(), about))
+    policy = origin.replace(description=described, weights=network.state_dict())
+    path.write_bytes(policy.replace(verdict=None, seed=None, chosen=None).to_bytes())
     return path
 
 

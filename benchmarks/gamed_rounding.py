@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.policies.policy import load_policy
-from drone_rl.policies.zoo.files import exported_bytes
+from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.actions import Move
 from drone_rl.trust.judge import judge
 from drone_rl.trust.shifts import shifts
@@ -28,7 +28,6 @@ _STRONG = 1000.0
 """Exceeds every logit of "good"."""
 _PLACES = 4 * 14
 """Outputs of each channel of the last convolution."""
-_ABOUT = ("progress", "provenance", "command", "verdict", "worlds", "seed", "chosen")
 
 
 def cases(folder: Path) -> dict[str, Callable[[], bool]]:
@@ -82,21 +81,21 @@ def in_domain(path: Path) -> bool:
     return result.domain is not None and result.domain.plain.good
 
 
-def widened() -> tuple[dict[str, Any], dict[str, Tensor]]:
+def widened() -> tuple[PolicyDescription, dict[str, Tensor]]:
     """Return description and weights of "good" with an additional channel and hidden unit.
 
     The channel of the last convolution is 1 everywhere. The unit, the last one of "fc1", has zero
     input and output weights.
     """
     good = load_policy("good")
-    described = good.description.as_dict()
-    channels, (hidden,) = described["network"]["channels"], described["network"]["hidden"]
-    network = {**described["network"], "channels": [channels[0], channels[1] + 1]}
-    weights = {name: value.clone() for name, value in good.state["policy"].items()}
-    weights = {name: _grown(name, value, channels[1], hidden) for name, value in weights.items()}
+    network: Any = good.description.network
+    (first, channels), (hidden,) = network.channels, network.hidden
+    weights = {name: value.clone() for name, value in good.state.weights.items()}
+    weights = {name: _grown(name, value, channels, hidden) for name, value in weights.items()}
     bias = next(name for name in weights if "conv2.bias" in name)
     weights[bias][-1] = 1.0
-    return {**described, "network": {**network, "hidden": [hidden + 1]}}, weights
+    wider = network.replace(channels=(first, channels + 1), hidden=(hidden + 1,))
+    return good.description.replace(network=wider), weights
 
 
 def _grown(name: str, value: Tensor, channels: int, hidden: int) -> Tensor:
@@ -116,11 +115,13 @@ def _grown(name: str, value: Tensor, channels: int, hidden: int) -> Tensor:
     return grown
 
 
-def write(folder: Path, name: str, described: dict[str, Any], weights: dict[str, Tensor]) -> Path:
+def write(
+    folder: Path, name: str, described: PolicyDescription, weights: dict[str, Tensor]
+) -> Path:
     """Write a policy file as `drone-rl export` does, with the metadata of "good"."""
-    state, path = load_policy("good").state, folder / f"{name}.safetensors"
-    about = {key: state[key] for key in _ABOUT if key in state}
-    path.write_bytes(exported_bytes(weights, described, about))
+    path = folder / f"{name}.safetensors"
+    policy = load_policy("good").state.replace(description=described, weights=weights)
+    path.write_bytes(policy.to_bytes())
     return path
 
 

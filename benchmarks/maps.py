@@ -18,7 +18,7 @@ from drone_rl.explanations.scenes import Scenes, alternatives, empty_scene
 from drone_rl.explanations.trust import Trial, check_maps, measure
 from drone_rl.policies import ImageNetwork, SmallCNN
 from drone_rl.policies.environment import make_env
-from drone_rl.policies.zoo import load_exported, parse, policy_names, policy_path
+from drone_rl.policies.zoo import policy_names, policy_path, read_policy
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, WorldState
 
 NUM_METHODS = 5
@@ -115,12 +115,14 @@ def shipped(absent: Tensor) -> dict[str, ImageNetwork]:
     """Return the shipped policies with discrete moves and this image shape, by name."""
     networks = {}
     for name in policy_names():
-        exported = load_exported(policy_path(name))
-        description = parse(exported["description"])
-        is_of_moves = description.actions.kind == "moves"  # else outputs are not three logits
+        exported = read_policy(policy_path(name))
+        description = exported.description
+        is_of_moves = (
+            description.actions.settings.kind == "moves"
+        )  # else outputs are not three logits
         if description.input.shape != tuple(absent.shape) or not is_of_moves:
             continue
-        parameters = exported["policy"]
+        parameters = exported.weights
         network = SmallCNN(absent.shape, 3, hidden=(128,))
         network.load_state_dict(parameters)
         networks[name] = network

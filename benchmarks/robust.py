@@ -63,7 +63,7 @@ def bench_robust(setup: Setup) -> dict[str, Any]:
 
     with ThreadPoolExecutor(_PARALLEL) as pool:
         frames = dict(zip(runs, pool.map(train_run, runs), strict=True))
-    kinds = untouched_kinds(settings_of(read_checkpoint(last_of(runs[ALL, seeds[0]]))["config"]))
+    kinds = untouched_kinds(settings_of(read_checkpoint(last_of(runs[ALL, seeds[0]])).config))
     shares = success_rates(runs.values(), *((5, 1) if setup.quick else (100,)))
     rows = {arm: [_row(shares[runs[arm, s]], kinds) for s in seeds] for arm in ARMS}
     return {

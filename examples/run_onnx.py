@@ -10,8 +10,8 @@ import sys
 import onnxruntime
 import torch
 
-from drone_rl import CameraSettings, TaskSettings
 from drone_rl.envs import DroneEnv
+from drone_rl.policies.zoo import PolicyDescription
 
 
 def fly(path: str, episodes: int = 10, seed: int = 0) -> list[float]:
@@ -19,8 +19,8 @@ def fly(path: str, episodes: int = 10, seed: int = 0) -> list[float]:
     session = onnxruntime.InferenceSession(path)
     metadata = session.get_modelmeta().custom_metadata_map
     read = {key: json.loads(text) for key, text in metadata.items()}
-    task = TaskSettings.read(read["task"], "task")
-    camera = CameraSettings.read(read["camera"], "camera")
+    description = PolicyDescription.read(read["description"])
+    task, camera = description.task.parameters, description.camera
     env, rewards = DroneEnv(1, task, camera, seed=seed), []
     for _ in range(episodes):
         state, reward = env.reset(), 0.0

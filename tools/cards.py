@@ -5,6 +5,7 @@ from pathlib import Path
 
 import drone_rl
 from drone_rl.trust.export import Card
+from drone_rl.trust.results import Verdict
 
 ZOO = Path(drone_rl.__file__).parent / "policies" / "zoo"
 
@@ -14,13 +15,10 @@ def card_of(path: Path) -> str:
 
     The figures are those of the file's metadata.
     """
-    state = drone_rl.load_policy(path).state
-    verdict = {"seed": state["seed"], "seed_is_fixed": True, **state["verdict"]}
-    described = state["description"]
-    origin = {name: described.get(name) for name in ("task", "appearance", "dynamics")}
+    policy = drone_rl.load_policy(path).state
+    verdict = {"seed": policy.seed, "seed_is_fixed": True, **(policy.verdict or {})}
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    about = {**state, **origin, "verdict": verdict, "name": path.stem, "digest": digest}
-    return Card.read(about, path.stem).text()
+    return Card(path.stem, digest, policy, Verdict.read(verdict)).text()
 
 
 if __name__ == "__main__":

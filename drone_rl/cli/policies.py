@@ -61,27 +61,26 @@ class PoliciesCommand(CommandSettings):
 
 
 class ConvertCommand(CommandSettings):
-    """Write a policy file of an older version in the present layout: drone-rl convert FILE."""
+    """Write files of older versions in the present layout: drone-rl convert FILE or FOLDER."""
 
-    policy: str = "latest"
-    """Policy of an older version: a .pt or .safetensors file, the folder of a run, or latest."""
+    file: str = ""
+    """Policy (.pt or .safetensors), certificate.json or shifts.json, or the folder of a run or
+    sweep, whose files are converted in their places and kept as NAME_former."""
     output: str | None = None
     """The new file; null for NAME_converted next to the old one."""
 
     @classmethod
     def prepare(cls, overrides: Sequence[str]) -> list[str]:
-        """Translate `drone-rl convert FILE` to `policy=FILE`; the command has no folder."""
-        return [*with_name(overrides, "policy"), *_NO_RUN_FOLDER]
+        """Translate `drone-rl convert FILE` to `file=FILE`; the command has no folder."""
+        return [*with_name(overrides, "file"), *_NO_RUN_FOLDER]
 
-    def run(self, folder: Path) -> tuple[int, str]:
-        """Convert one file; return the exit status and the path of the new file."""
-        from drone_rl.policies.convert import convert_policy  # imports torch
-        from drone_rl.policies.zoo import find_policy
+    def run(self, folder: Path) -> tuple[int, None]:
+        """Convert; print the new files and return the exit status."""
+        from drone_rl.policies.convert import convert  # imports torch
 
-        output = None if self.output is None else Path(self.output)
-        output = convert_policy(find_policy(self.policy, self.paths.outputs), output)
-        print(f"written: {output}")
-        return 0, str(output)
+        for path in convert(Path(self.file), None if self.output is None else Path(self.output)):
+            print(f"written: {path}")
+        return 0, None
 
 
 def _short(row: Sequence[str]) -> Sequence[str]:
@@ -100,7 +99,7 @@ def _row(path: Path, name: str, verdicts: Sequence[tuple[float, Any]]) -> list[s
     if path.suffix == ".pt":
         origin = time.strftime("%Y-%m-%d %H:%M", time.localtime(path.stat().st_mtime))
     else:
-        origin = f"revision {str(policy.state['provenance']['git_revision'])[:7]}"
+        origin = f"revision {str(policy.state.provenance.git_revision)[:7]}"
     verdict = recorded_verdict(policy, verdicts)
     figures = ("not judged", "") if verdict is None else describe(verdict)
     return [name, policy.task.name, *figures, origin]

@@ -7,7 +7,7 @@ from drone_rl.config.camera import DeviceSettings, RendererSettings
 from drone_rl.config.parts import Parts
 from drone_rl.config.transforms import MOST_TRANSFORMS, Transform
 from drone_rl.config.values import Fraction, NumEnvs, NumEpisodes, OpenFraction, Seed
-from drone_rl.utils.schema import Listed, Maybe, OneOf, Real, Several, Whole
+from drone_rl.utils.schema import Listed, OneOf, Real, Several, Whole
 from drone_rl.utils.settings import Settings
 
 
@@ -96,7 +96,7 @@ MODES = ("constant", "drifting", "onset")
 class ShiftSettings(DeviceSettings):
     """Settings of robustness tests."""
 
-    axes: Annotated[Any, Maybe(Listed("axis"))] = None
+    axes: Annotated[Any, Listed("axis")] | None = None
     """Axes or groups of axes, as in axes=[sun,fog]; null for all that the task has."""
     strengths: Annotated[tuple[int, ...], Several(Whole(1, 5), 1, 5)] = (1, 2, 3, 4, 5)
     """Strengths to test of the five of each axis, in rising order."""

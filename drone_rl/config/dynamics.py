@@ -8,6 +8,7 @@ from typing import Annotated
 
 from drone_rl.config.values import Fraction
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.models import Model
 from drone_rl.utils.schema import OneOf, Real, Several, Whole
 from drone_rl.utils.settings import Settings
 
@@ -142,6 +143,17 @@ ACTION_KINDS = ("moves", "moves_3d", "velocity")
 Speed = Annotated[float, Real(0.0, 50.0, is_above=True, unit="m/s")]
 
 
+class Axis(Model):
+    """One of the independent quantities that an action sets."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    step: float | None = None
+    """Distance of two values of a discrete axis; None if the axis is continuous."""
+
+
 class ActionSettings(Settings):
     """Settings of the actions, one at each control step."""
 
@@ -160,6 +172,22 @@ class ActionSettings(Settings):
     """Largest lateral speed command, in m/s."""
     yaw_rate: Annotated[float, Real(0.0, 720.0, unit="degrees/s")] = 45.0
     """Largest yaw rate command, in degrees/s; 0 for none."""
+
+    @property
+    def axes(self) -> tuple[Axis, ...]:
+        """The axes; discrete actions move along one of them at a time."""
+        if self.kind == "velocity":
+            return (
+                Axis(name="forward", unit="m/s", low=0.0, high=self.forward_speed),
+                Axis(name="left", unit="m/s", low=-self.sideways_speed, high=self.sideways_speed),
+                Axis(name="turn left", unit="degrees/s", low=-self.yaw_rate, high=self.yaw_rate),
+            )
+        moves = (
+            Axis(name="forward", unit="moves", low=0.0, high=1.0, step=1.0),
+            Axis(name="left", unit="moves", low=-1.0, high=1.0, step=1.0),
+            Axis(name="up", unit="moves", low=-1.0, high=1.0, step=1.0),
+        )
+        return moves if self.kind == "moves_3d" else moves[:2]
 
 
 MOVES_SETTINGS = ActionSettings()

@@ -49,6 +49,10 @@ class Named(Settings):
             return cls.named(data)()
         return cls.select(dict(data))
 
+    @pydantic.model_serializer
+    def _as_plain(self) -> dict[str, Any]:
+        return {"name": self.name, **self.values()}
+
     @classmethod
     def select(cls, values: dict[str, Any]) -> Self:
         """Return the choice that a mapping names, with its values."""

@@ -21,7 +21,7 @@ from drone_rl.explanations.settings import (
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
-from drone_rl.sim.vocabulary import ShownActions, shown_actions
+from drone_rl.sim.vocabulary import ShownActions
 from drone_rl.trust.plots import images
 from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
@@ -103,7 +103,7 @@ class ClassModels(TableResult):
         """Write `class_models.png`, `class_models.json` and `class_models.npz`."""
         self.figure().save(folder / "class_models.png")
         written = {
-            "policy": self.policy.origin["policy"],
+            "policy": self.policy.source,
             **self.seed.as_dict(),
             "statistics": self.statistics.model_dump(),
             "settings": {
@@ -172,7 +172,7 @@ def class_models(
             for title, one in tried.items()
         },
         statistics,
-        shown_actions({"actions": network.actions.as_dict()}),
+        network.actions.shown,
         channels,
         seed,
     )

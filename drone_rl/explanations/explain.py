@@ -17,7 +17,6 @@ from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
-from drone_rl.sim.vocabulary import shown_actions
 from drone_rl.trust.coverage import find_domain
 from drone_rl.trust.recorded import record_verdict
 from drone_rl.trust.repetition import require_repeatable
@@ -126,7 +125,7 @@ def explain(
                 Context(env, network, settings, claim, measured, unlike, seed),
                 folder,
                 name=policy.name,
-                provenance={**policy.origin, **provenance()},
+                provenance={"policy": policy.source, "trained": policy.trained, **provenance()},
                 progress=lambda title: progress(f"{policy.name}: {title}"),
                 sections={**SECTIONS, **(more_sections or {})},
             )
@@ -149,7 +148,7 @@ def _named(policies: Given | Sequence[Given], outputs: str | Path) -> dict[str, 
     loaded = [as_policy(policy, outputs) for policy in policies]
     by_name = {policy.name: policy for policy in loaded}
     if len(by_name) < len(loaded):
-        by_name = {policy.origin["policy"]: policy for policy in loaded}
+        by_name = {policy.source: policy for policy in loaded}
     if not loaded or len(by_name) < len(loaded):
         raise InputError(f"policy={[*by_name]} must name one or more policies, each once")
     return by_name
@@ -191,7 +190,7 @@ def explain_policy(
         settings=context.settings.values(),
         **context.seed.as_dict(),
         seconds=seconds,
-        actions=shown_actions({"actions": context.scenes.actions.as_dict()}),
+        actions=context.scenes.actions.shown,
         terms=context.scenes.task.vocabulary,
         provenance=provenance,
         left_out=left_out,

@@ -1,27 +1,35 @@
-"""Convert policy files of older versions to the present layout.
+"""Convert files of older versions to the present layout.
 
-Only this module knows the names that settings and figures had in older versions. The training
-command in a file is left as it is, since it repeats the training at the revision in the file.
+Only this module knows how descriptions of policies were laid out before, and the names that
+settings and figures had in version 0.1. The training command in a file is left as it is, since it
+repeats the training at the revision in the file.
 """
 
+import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from safetensors.torch import load
-
-from drone_rl.policies.zoo.files import (
-    ABOUT,
-    checked_state,
-    exported_bytes,
-    metadata_of,
-    parse_exported,
-    read_exported_bytes,
+from drone_rl.config import ActionSettings
+from drone_rl.config.task import DEFAULT_TASK
+from drone_rl.policies.zoo.description import (
+    FORMAT_VERSION,
+    IMAGE,
+    ActionSpace,
+    PolicyDescription,
 )
-from drone_rl.utils.checkpoint import FORMAT_VERSION, read_any_version, save_checkpoint
+from drone_rl.policies.zoo.files import (
+    SavedPolicy,
+    metadata_of,
+    parse_checkpoint,
+    read_exported_bytes,
+    weights_of,
+)
+from drone_rl.utils import checkpoint
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import write_atomically
+from drone_rl.utils.files import parse_json, read_json, refuse_links, write_atomically
+from drone_rl.utils.limits import SHIFTS_BYTES
 from drone_rl.utils.schema import as_mapping
 
 _FIGURES = {"running_cubes": "running_reward"}
@@ -37,58 +45,157 @@ _OVERRIDES = (
     (r"^(appearance=.*?)\brandomised\b", r"\1randomized"),
 )
 """Patterns of the names of settings and choices until version 0.1, and the present names."""
+_DESCRIBED = {"certificate.json": "policy", "shifts.json": "network"}
+"""The entry with the policy's description, by the end of the name of a file."""
+_FOLDERS = 100
+"""Most levels of folders to search."""
 
 
-def convert_policy(path: Path, output: Path | None = None) -> Path:
-    """Write a policy file of an older version in the present layout, and return the new path.
+class _PresentError(InputError):
+    """A file that has the present layout."""
+
+
+def convert(path: Path, output: Path | None = None) -> list[Path]:
+    """Convert a file, or in their places all files of a run or a sweep.
+
+    A converted file of a folder replaces the former one, which is kept as NAME_former.
 
     Args:
-        path: A .safetensors file of `drone-rl export`, or a checkpoint (.pt).
-        output: The new file; by default NAME_converted next to the old one.
+        path: A .safetensors file of `drone-rl export`, a checkpoint (.pt), a certificate.json, a
+            shifts.json, or a folder.
+        output: The new file; by default NAME_converted next to the old one. None for a folder.
+
+    Returns:
+        The new files.
 
     Raises:
-        InputError: The file is unusable or has the present layout, or the output exists.
+        InputError: A file is unusable, none has a former layout, or the output exists.
     """
-    output = output or path.with_stem(f"{path.stem}_converted")
-    if output.exists() or output.suffix != path.suffix:
-        fault = "exists" if output.exists() else f"does not end in {path.suffix}"
-        raise InputError(f"output={output} {fault}; give another path")
-    try:
-        if path.suffix == ".safetensors":
-            _write(output, _converted_export(read_exported_bytes(path)))
-        else:
-            save_checkpoint(output, _converted_state(read_any_version(path)))
-    except InputError as error:
+    if not path.exists() or path == Path():
         raise InputError(
-            f"policy {path} can't be converted ({error}); files from before version 0.1 must be "
-            "trained again"
-        ) from None
-    return output
-
-
-def _converted_export(content: bytes) -> bytes:
-    description, about = metadata_of(content)
-    present = {k: v for k, v in as_mapping(about, "about").items() if k in ABOUT.fields}
-    present["progress"] = _with_present_figures(present.get("progress"))
-    if present == about:
-        raise InputError("it has the present layout; use it as it is")
-    converted = exported_bytes(load(content), description, present)
-    parse_exported(converted)
+            f"file={path} does not exist; give a file, or the folder of a run or sweep"
+        )
+    if not path.is_dir():
+        output = output or path.with_stem(f"{path.stem}_converted")
+        if output.exists() or output.suffix != path.suffix:
+            fault = "exists" if output.exists() else f"does not end in {path.suffix}"
+            raise InputError(f"output={output} {fault}; give another path")
+        _convert_file(path, output)
+        return [output]
+    if output is not None:
+        raise InputError(f"{path} is a folder, which is converted in its place; leave output out")
+    refuse_links(path, _FOLDERS)
+    names = ("**/checkpoints/*.pt", *(f"**/{name}" for name in _DESCRIBED))
+    files = [file for name in names for file in sorted(path.glob(name)) if not _is_kept(file)]
+    converted = [file for file in files if _convert_in_place(file)]
+    if not converted:
+        raise InputError(f"{path} holds no files of a former layout; use it as it is")
     return converted
 
 
+def _is_kept(path: Path) -> bool:
+    return path.stem.endswith("_former")
+
+
+def _convert_in_place(path: Path) -> bool:
+    """Convert a file and keep the former one; return False if it has the present layout."""
+    new = path.with_stem(f"{path.stem}_converted")
+    try:
+        _convert_file(path, new)
+    except _PresentError:
+        return False
+    path.rename(path.with_stem(f"{path.stem}_former"))
+    new.rename(path)
+    return True
+
+
+def _convert_file(path: Path, output: Path) -> None:
+    """Write the converted file; raise `_PresentError` if there is nothing to do."""
+    try:
+        if path.suffix == ".safetensors":
+            _write(output, _converted_export(read_exported_bytes(path)))
+        elif path.suffix == ".json":
+            _write(output, _converted_result(path))
+        else:
+            state = _converted_state(checkpoint.read_any_version(path))
+            checkpoint.save_checkpoint(output, state)
+    except _PresentError:
+        raise _PresentError(f"{path} has the present layout; use it as it is") from None
+    except InputError as error:
+        raise InputError(
+            f"{path} can't be converted ({error}); files from before version 0.1 must be made again"
+        ) from None
+
+
+def _converted_export(content: bytes) -> bytes:
+    metadata = metadata_of(content)
+    if "policy" in metadata:
+        raise _PresentError
+    description, about = (
+        as_mapping(parse_json(str(metadata.get(name)), f"its {name}"), f"its {name}")
+        for name in ("description", "about")
+    )
+    known = {name: of for name, of in about.items() if name in SavedPolicy.model_fields}
+    converted = SavedPolicy.read(
+        {
+            **known,
+            "progress": _with_present_figures(about.get("progress")),
+            "description": _converted_description(description),
+            "weights": weights_of(content),
+        }
+    )
+    return converted.to_bytes()
+
+
+def _converted_result(path: Path) -> bytes:
+    """Return the content of a certificate or of robustness results."""
+    content = dict(as_mapping(read_json(path, SHIFTS_BYTES), "it"))
+    entry = next((e for end, e in _DESCRIBED.items() if path.name.endswith(end)), "policy")
+    of = as_mapping(content.get(entry), entry)
+    described = _converted_description(as_mapping(of.get("description"), "its description"))
+    content[entry] = {**of, "description": described.model_dump(mode="json")}
+    return json.dumps(content).encode()
+
+
+def _converted_description(former: Mapping[str, Any]) -> PolicyDescription:
+    """Return the description that was laid out as version 2."""
+    if former.get("format_version") == FORMAT_VERSION:
+        raise _PresentError
+    try:
+        task, camera = dict(former["task"]), former["camera"]
+        image = {
+            "camera": {"horizontal_fov": camera["horizontal_fov"]},
+            "size": [camera["height"], camera["width"]],
+            "transforms": former["transforms"],
+        }
+        optional = {n: former[n] for n in ("appearance", "dynamics") if n in former}
+        present = {
+            "task": {"name": task.pop("name", DEFAULT_TASK), "parameters": task},
+            "inputs": {IMAGE: image},
+            "actions": ActionSpace.of(ActionSettings.read(former.get("actions", {}), "actions")),
+            "network": former["network"],
+            **optional,
+        }
+    except (LookupError, TypeError, ValueError) as error:
+        raise InputError(f"its description is damaged ({error})") from None
+    return PolicyDescription.read(present)
+
+
 def _converted_state(state: Mapping[str, Any]) -> dict[str, Any]:
-    if state.get("format_version") == FORMAT_VERSION:
-        raise InputError("it has the present layout; use it as it is")
+    if state.get("format_version") == checkpoint.FORMAT_VERSION:
+        raise _PresentError
     present = {
         _with_present_names(name): value for name, value in state.items() if name != "policy"
     }
     present["policy"] = state.get("policy")
     present["progress"] = _with_present_figures(state.get("progress"))
     present["config"] = _with_present_settings(state.get("config"))
+    former = as_mapping(state.get("description"), "its description")
+    present["description"] = _converted_description(former).model_dump(mode="json")
     for name in ("format", "format_version"):
         del present[name]
-    return checked_state(present)
+    parse_checkpoint(present)
+    return present
 
 
 def _with_present_figures(progress: Any) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from drone_rl.sim.dynamics import Dynamics
 from drone_rl.sim.rendering.renderer import RendererFactory
 from drone_rl.sim.tasks import Task
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Instance, Maybe, shown
+from drone_rl.utils.schema import Instance, shown
 from drone_rl.utils.seeding import Stream
 
 
@@ -67,14 +67,14 @@ def make_env(
     Raises:
         InputError: A setting is out of range; the message begins with its name.
     """
-    camera = Maybe(Instance(CameraSettings)).read(camera, "camera")
-    actions = Maybe(Instance(ActionSettings)).read(options.get("actions"), "actions")
+    camera = Instance(CameraSettings | None).read(camera, "camera")
+    actions = Instance(ActionSettings | None).read(options.get("actions"), "actions")
     dynamics = options.get("dynamics")
     if isinstance(dynamics, str | dict):
         raise InputError(f"dynamics={shown(dynamics)} is no DynamicsSettings; give one")
     if isinstance(dynamics, DynamicsSettings):
         dynamics.check_air()
-    appearance = Maybe(Instance(AppearanceSettings)).read(options.get("appearance"), "appearance")
+    appearance = Instance(AppearanceSettings | None).read(options.get("appearance"), "appearance")
     others: Any = {**options, "actions": actions, "appearance": appearance}
     made = [step.make() for step in as_transforms(transforms)] if others.get("pixels", True) else ()
     base = envs.DroneEnv(

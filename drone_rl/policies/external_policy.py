@@ -73,9 +73,9 @@ class ExternalPolicy(BasePolicy):
     """The appearance of the scenes in the evaluation."""
 
     @property
-    def origin(self) -> dict[str, Any]:
-        """The policy's name; its training is unknown."""
-        return {"policy": self.name, "trained": None}
+    def source(self) -> str:
+        """Its name."""
+        return self.name
 
     def in_task(self, **changes: Any) -> "ExternalPolicy":
         """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`."""

@@ -15,6 +15,7 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.config import (
+    MOVES_SETTINGS,
     ActionSettings,
     AppearanceSettings,
     BaseTaskSettings,
@@ -25,13 +26,15 @@ from drone_rl.envs import Pipeline
 from drone_rl.policies import ImageNetwork, RecurrentNetwork, make_actor
 from drone_rl.policies.environment import EnvOptions
 from drone_rl.policies.recurrent import Memory
-from drone_rl.policies.zoo import PolicyDescription, find_policy, parse, read_policy
+from drone_rl.policies.zoo import PolicyDescription, SavedPolicy, find_policy, read_policy
+from drone_rl.policies.zoo.description import TaskDescription
 from drone_rl.sim.rendering.devices import check_defaults
 from drone_rl.sim.tasks import Task
 from drone_rl.utils.display import table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance, shown
 from drone_rl.utils.seeding import Stream, torch_generator
+from drone_rl.utils.settings import prefixed_errors
 
 
 class BasePolicy(abc.ABC):
@@ -96,8 +99,13 @@ class BasePolicy(abc.ABC):
 
     @property
     @abc.abstractmethod
-    def origin(self) -> dict[str, Any]:
-        """Plain values: "policy", its file or name, and how it was "trained"; None if unknown."""
+    def source(self) -> str:
+        """Its file, or else its name."""
+
+    @property
+    def trained(self) -> dict[str, Any] | None:
+        """How it was trained, as plain values; None if unknown."""
+        return None
 
     @abc.abstractmethod
     def in_task(self, **changes: Any) -> Self:
@@ -186,8 +194,8 @@ class Policy(BasePolicy):
     """Its file."""
     description: PolicyDescription = dataclasses.field(repr=False)
     """Task, camera, transforms and network."""
-    state: dict[str, Any] = dataclasses.field(repr=False)
-    """Content of its file, see `drone_rl.policies.zoo.read_policy`."""
+    state: SavedPolicy = dataclasses.field(repr=False)
+    """Content of its file."""
     _memory: list[Memory] = dataclasses.field(
         default_factory=list, init=False, repr=False, compare=False
     )
@@ -196,7 +204,7 @@ class Policy(BasePolicy):
     @property
     def task(self) -> BaseTaskSettings:
         """The task."""
-        return self.description.task
+        return self.description.task.parameters
 
     @property
     def dynamics(self) -> DynamicsSettings:
@@ -206,12 +214,12 @@ class Policy(BasePolicy):
     @property
     def actions(self) -> ActionSettings:
         """The action space."""
-        return self.description.actions
+        return self.description.actions.settings
 
     @property
     def own_dynamics(self) -> DynamicsSettings:
         """The vehicle dynamics in training."""
-        return parse(self.state["description"]).dynamics
+        return self.state.description.dynamics
 
     @property
     def appearance(self) -> AppearanceSettings:
@@ -221,34 +229,39 @@ class Policy(BasePolicy):
     @property
     def own_appearance(self) -> AppearanceSettings:
         """The appearance of the scenes in training."""
-        return parse(self.state["description"]).appearance
+        return self.state.description.appearance
 
     @property
-    def origin(self) -> dict[str, Any]:
-        """The file, and "description", "progress", "provenance" and "command" of the training."""
-        keys = ("description", "progress", "provenance")
-        trained = {**{key: self.state[key] for key in keys}, "command": self.state.get("command")}
-        return {"policy": str(self.path), "trained": trained}
+    def source(self) -> str:
+        """Its file."""
+        return str(self.path)
+
+    @property
+    def trained(self) -> dict[str, Any]:
+        """Description, progress, provenance and command of the training."""
+        names = {"description", "progress", "provenance", "command"}
+        return self.state.model_dump(mode="json", include=names)
 
     def in_task(self, **changes: Any) -> "Policy":
         """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`."""
         changed = Changes(type(self.task)).read(changes, "task")
-        described = self.description.as_dict()
-        described["task"] |= changed
-        return dataclasses.replace(self, description=parse(described))
+        with prefixed_errors("task"):
+            task = TaskDescription.of(self.task.replace(**changed))
+        return self._described(task=task)
 
     def in_dynamics(self, **changes: Any) -> "Policy":
         """Return the same policy with other dynamics, as in `in_dynamics(mode="simple_flight")`."""
         changed = Changes(DynamicsSettings).read(changes, "dynamics")
-        described = self.description.as_dict()
-        described["dynamics"] = {**self.dynamics.values(), **changed}
-        return dataclasses.replace(self, description=parse(described))
+        with prefixed_errors("dynamics"):
+            return self._described(dynamics=self.dynamics.replace(**changed))
 
     def in_appearance(self, appearance: AppearanceSettings | str) -> "Policy":
         """Return the same policy in scenes of another appearance, which may be a name."""
         appearance = Instance(AppearanceSettings).read(appearance, "appearance")
-        described = dataclasses.replace(self.description, appearance=appearance)
-        return dataclasses.replace(self, description=described)
+        return self._described(appearance=appearance)
+
+    def _described(self, **changes: Any) -> "Policy":
+        return dataclasses.replace(self, description=self.description.replace(**changes))
 
     def make_env(
         self,
@@ -266,7 +279,7 @@ class Policy(BasePolicy):
 
     def make_network(self, device: str | torch.device = "cpu") -> ImageNetwork:
         """Return its network."""
-        network = self.description.load_network(self.state["policy"]).to(device)
+        network = self.description.load_network(self.state.weights).to(device)
         network.owner = f"policy={self.name}"
         return network
 
@@ -332,16 +345,17 @@ class Policy(BasePolicy):
         return self.make_network(), Pipeline(self.description.without_faults().make_transforms())
 
     def _repr_html_(self) -> str:
-        progress, described = self.state["progress"], self.description.as_dict()
+        progress, described = self.state.progress, self.description
+        parts = {"network": described.network, "task": self.task}
+        parts |= {} if self.dynamics.is_computer_vision else {"dynamics": self.dynamics}
+        parts |= {} if self.actions == MOVES_SETTINGS else {"actions": self.actions}
         rows = {
-            "network": ", ".join(f"{k}={v}" for k, v in described["network"].items()),
-            "sees": " > ".join(step["name"] for step in described["transforms"]),
             **{
-                part: ", ".join(f"{k}={v}" for k, v in described[part].items())
-                for part in ("task", "dynamics", "actions")
-                if part in described
+                name: ", ".join(f"{k}={v}" for k, v in part.model_dump().items())
+                for name, part in parts.items()
             },
-            "trained": f"{progress['frames']:,} frames, {progress['episodes']:,} episodes",
+            "sees": " > ".join(transform.name for transform in described.transforms),
+            "trained": f"{progress.frames:,} frames, {progress.episodes:,} episodes",
             "file": str(self.path),
         }
         return table(["policy", self.name], [[name, text] for name, text in rows.items()])
@@ -379,7 +393,7 @@ def load_policy(which: str | Path | Policy, *, outputs: str | Path = "outputs") 
         )
     path = find_policy(which, outputs)
     state = read_policy(path)
-    return Policy(_name_of(path.absolute()), path, parse(state["description"]), state)
+    return Policy(_name_of(path.absolute()), path, state.description, state)
 
 
 def _name_of(path: Path) -> str:

@@ -8,14 +8,14 @@ import abc
 import dataclasses
 import enum
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.sim.vocabulary import SHOWN_MOVES
+from drone_rl.sim.vocabulary import SHOWN_MOVES, ShownActions
 from drone_rl.utils import palette
 from drone_rl.utils.palette import Rgb
 
@@ -112,16 +112,11 @@ class Actions(abc.ABC):
         here, there = _take(sides, part), _take(sides, other)
         return (part == other) | ((here == there) & (here != 0))
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return what reports need to name and plot the parts, as plain values."""
-        return {
-            "names": list(self.names),
-            "order": [*map(int, self.order)],
-            "arrows": [list(arrow) for arrow in self.arrows],
-            "mirrored": [*map(int, self.mirrored)],
-            "left": int(self.left),
-            "colors": [list(color) for color in self.colors],
-        }
+    @property
+    def shown(self) -> ShownActions:
+        """What reports need to name and plot the parts."""
+        order = tuple(map(int, self.order))
+        return ShownActions(names=self.names, order=order, arrows=self.arrows, colors=self.colors)
 
     @property
     @abc.abstractmethod

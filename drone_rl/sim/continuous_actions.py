@@ -13,7 +13,7 @@ the larger one. If it does neither, it belongs to "forward". Probabilities have 
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Self
 
 import torch
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from torch import Tensor
 
 from drone_rl.config.dynamics import ActionSettings
 from drone_rl.sim.actions import MOVES, Actions, Entry, listed
+from drone_rl.sim.vocabulary import ShownActions
 from drone_rl.utils import palette
 from drone_rl.utils.errors import InputError
 
@@ -150,10 +151,11 @@ class ContinuousActions(Actions):
         """Return the part, and the action in m/s and rad/s."""
         return {"actions": self.part(action), "rates": self.to_rates(action)}
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the values that `explanation.json` holds; "speeds" in m/s and degrees/s."""
+    @property
+    def shown(self) -> ShownActions:
+        """What reports need, with the speeds."""
         forward, aside, turning = self.speeds
-        return {**super().as_dict(), "speeds": [forward, aside, math.degrees(turning)]}
+        return super().shown.replace(speeds=(forward, aside, math.degrees(turning)))
 
     def is_reversible(self, kept: Mapping[str, Tensor]) -> Tensor:
         """Return whether actions go or turn to a side, forward at most at a third of full speed."""

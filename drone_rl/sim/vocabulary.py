@@ -1,17 +1,15 @@
 """Terms of reports; `vocabulary.toml` has those of the built-in tasks."""
 
-import dataclasses
 import tomllib
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import Field, StrictBool
+from pydantic import Field, StrictBool, model_validator
 
 from drone_rl.utils import palette
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.models import Model
-from drone_rl.utils.schema import Real, Record, Several, Text, Whole, shown
+from drone_rl.utils.schema import Real, Several, Text, Whole, shown
 
 MOST = 64
 """Most phrases of a kind."""
@@ -115,29 +113,35 @@ CUBES = TaskVocabulary(**_BUILT_IN["collect_cubes"])
 PILLARS = TaskVocabulary(**_BUILT_IN["pillars"])
 
 
-def some_cubes(task: Mapping[str, Any]) -> str:
-    """Describe the cubes of a task, from its settings."""
-    names = {1: "one cube", 2: "two cubes", 3: "three cubes", 4: "four cubes", 5: "five cubes"}
-    cubes = names.get(task["num_cubes"], f"{task['num_cubes']} cubes")
-    return (
-        f"{cubes} of {task['cube_size']:g} m, up to {task['lateral_bound']:g} m to either side "
-        f"and {task['vertical_bound']:g} m up or down"
-    )
-
-
 MOST_ACTIONS = 16
 
 
-@dataclasses.dataclass(frozen=True)
-class ShownActions:
-    """Actions by number, as `explanation.json` holds them under "actions"; see `Actions`."""
+class ShownActions(Model):
+    """Actions by number, as reports show them; see `Actions`."""
 
-    names: tuple[str, ...]
-    order: tuple[int, ...]
-    arrows: tuple[tuple[float, float], ...]
-    colors: tuple[palette.Rgb, ...]
-    speeds: tuple[float, float, float] | None = None
+    names: Annotated[tuple[str, ...], Several(Text(24), 1, MOST_ACTIONS)]
+    order: Annotated[tuple[int, ...], Several(Whole(0, MOST_ACTIONS - 1), 1, MOST_ACTIONS)]
+    arrows: Annotated[
+        tuple[tuple[float, float], ...],
+        Several(Several(Real(-1.0, 1.0), 2, 2), 1, MOST_ACTIONS),
+    ]
+    colors: Annotated[
+        tuple[palette.Rgb, ...], Several(Several(Whole(0, 255), 3, 3), 1, MOST_ACTIONS)
+    ]
+    speeds: Annotated[tuple[float, float, float], Several(Real(0.0, 1e6), 3, 3)] | None = None
     """Greatest speeds of continuous actions: forward and sideways, m/s; yaw rate, degrees/s."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        count = len(self.names)
+        if len({*self.names}) < count or sorted(self.order) != list(range(count)):
+            raise InputError(
+                f"order={shown(self.order)} or a name is invalid; give {count} different names, "
+                "and the index of each once"
+            )
+        if not len(self.arrows) == len(self.colors) == count:
+            raise InputError(f"actions have {count} names; give each an arrow and a color")
+        return self
 
     def css(self, action: int) -> str:
         """Return the color of an action for style sheets."""
@@ -145,41 +149,9 @@ class ShownActions:
 
 
 SHOWN_MOVES = ShownActions(
-    ("forward", "left", "right"),
-    (1, 0, 2),
-    ((0.0, 1.0), (-1.0, 0.0), (1.0, 0.0)),
-    (palette.FORWARD, palette.LEFT, palette.RIGHT),
+    names=("forward", "left", "right"),
+    order=(1, 0, 2),
+    arrows=((0.0, 1.0), (-1.0, 0.0), (1.0, 0.0)),
+    colors=(palette.FORWARD, palette.LEFT, palette.RIGHT),
 )
-"""The chapter's three moves, also of files without actions."""
-
-
-def shown_actions(numbers: Mapping[str, Any]) -> ShownActions:
-    """Return the actions of `explanation.json`; raises `InputError` if they are invalid."""
-    if "actions" not in numbers:
-        return SHOWN_MOVES
-    values = _ACTION_FIELDS.read(numbers["actions"], "actions")
-    names, count = values["names"], len(values["names"])
-    if len(set(names)) < count or sorted(values["order"]) != list(range(count)):
-        raise InputError(
-            f"actions.order={shown(str(values['order']))} or a name is invalid; give {count} "
-            "different names, and the index of each once"
-        )
-    if not len(values["arrows"]) == len(values["colors"]) == count:
-        raise InputError(f"actions have {count} names; give each an arrow and a color")
-    speeds = values.get("speeds")
-    return ShownActions(names, values["order"], values["arrows"], values["colors"], speeds)
-
-
-_INDICES = Several(Whole(0, MOST_ACTIONS - 1), 1, MOST_ACTIONS)
-_ACTION_FIELDS = Record(
-    {
-        "names": Several(Text(24), 1, MOST_ACTIONS),
-        "order": _INDICES,
-        "arrows": Several(Several(Real(-1.0, 1.0), 2, 2), 1, MOST_ACTIONS),
-        "colors": Several(Several(Whole(0, 255), 3, 3), 1, MOST_ACTIONS),
-        "mirrored": _INDICES,
-        "left": Whole(0, MOST_ACTIONS - 1),
-        "speeds": Several(Real(0.0, 1e6), 3, 3),
-    },
-    optional=frozenset({"mirrored", "left", "speeds"}),
-)
+"""The chapter's three moves."""

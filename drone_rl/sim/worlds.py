@@ -28,7 +28,7 @@ from drone_rl.sim.scene_model import SceneModel
 from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Instance, Maybe
+from drone_rl.utils.schema import Instance
 
 LARGEST_REWARD = 1e10
 """Largest reward of a step, so that sums of rewards and of their squares are finite in float32."""
@@ -85,7 +85,7 @@ class Worlds:
             InputError: An argument is unusable.
         """
         check_device(device)
-        self.appearance = Maybe(Instance(Appearance)).read(appearance, "appearance")
+        self.appearance = Instance(Appearance | None).read(appearance, "appearance")
         self.distractors = distractors
         self._combined: tuple[Appearance, Appearance | None, Appearance] | None = None
         """The last appearance given, the default one, and both combined."""

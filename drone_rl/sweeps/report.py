@@ -141,9 +141,9 @@ def judge_run(
             raise InputError(f"{folder} has no result.json; give the sweep's command to finish it")
         judged, progress = judge_for_selection(last_of(folder), episodes, device, seed=seed)
         verdict = judged.as_dict()
-        if progress["frames"] != result.get("frames"):
+        if progress.frames != result.get("frames"):
             raise InputError(
-                f"{folder}/checkpoints/last.pt is of frame {progress['frames']}, result.json of "
+                f"{folder}/checkpoints/last.pt is of frame {progress.frames}, result.json of "
                 f"frame {result.get('frames')}; resume with: drone-rl train resume={folder}"
             )
         content = json.dumps({**result, "verdict": verdict}, indent=2)

@@ -2,7 +2,6 @@
 
 import copy
 import csv
-import dataclasses
 import io
 import logging
 import time
@@ -13,24 +12,12 @@ from typing import Any, Protocol
 from torchrl.record.loggers import Logger
 
 from drone_rl.config.training import DETERMINISTIC
+from drone_rl.policies.zoo import TrainingProgress as TrainingProgress
 from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.files import make_folder, write_atomically
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import Instance, Several
-
-
-@dataclasses.dataclass
-class TrainingProgress:
-    """Progress of a training run."""
-
-    frames: int = 0
-    episodes: int = 0
-    updates: int = 0
-    seconds: float = 0.0
-    """Time spent, over all resumptions."""
-    running_reward: float = 0.0
-    """Running mean of the episodes' rewards, from 0, as in the original study."""
 
 
 class OngoingTraining(Protocol):

@@ -7,12 +7,10 @@ untrusted source: sizes are checked before memory is allocated, and nothing in i
 import dataclasses
 import functools
 import io
-import json
 import re
-from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import torch
@@ -43,23 +41,19 @@ from drone_rl.utils.files import (
     refuse_links,
     write_atomically,
 )
-from drone_rl.utils.schema import Instance, Plain, Record, Text, Whole, as_mapping, shown
+from drone_rl.utils.models import Model
+from drone_rl.utils.schema import Instance, Text, Whole, shown
 
-FORMAT = "drone_rl demonstration"
-FORMAT_VERSION = 1
 MOST_DEMONSTRATIONS = 10_000
 """Largest number of demonstrations in a folder."""
 _ARRAYS = ("images", "actions", "rewards", "done")
-_CONDITIONS = ("task", "camera", "dynamics", "actions")
 _PILOT = Text(100)
-_ABOUT = Record({name: Plain() for name in ("format", "format_version", "pilot", *_CONDITIONS)})
 _NAME = re.compile(r"flight_([0-9]{5,9})\.npz")
 _PATIENCE_S = 10.0
 """Seconds to wait for another process that adds a flight to the same folder."""
 
 
-@dataclasses.dataclass(frozen=True)
-class FlightConditions:
+class FlightConditions(Model):
     """Settings under which a flight was recorded, and under which a policy can learn from it."""
 
     task: BaseTaskSettings
@@ -72,21 +66,7 @@ class FlightConditions:
     def of(cls, settings: TrainSettings) -> Self:
         """Return the conditions of a training."""
         Instance(TrainSettings).read(settings, "settings")
-        return cls(*(getattr(settings, name) for name in _CONDITIONS))
-
-    @classmethod
-    def read(cls, data: Mapping[str, Any]) -> Self:
-        """Read conditions from plain data; see `Settings.read` for errors."""
-        return cls(
-            BaseTaskSettings.read(data["task"], "task"),
-            CameraSettings.read(data["camera"], "camera"),
-            DynamicsSettings.read(data["dynamics"], "dynamics"),
-            ActionSettings.read(data["actions"], "actions"),
-        )
-
-    def values(self) -> dict[str, dict[str, Any]]:
-        """Return the conditions as plain data."""
-        return {name: getattr(self, name).values() for name in _CONDITIONS}
+        return cls(**{name: getattr(settings, name) for name in cls.model_fields})
 
     def check_same(self, other: "FlightConditions", where: str) -> None:
         """Raise an `InputError` if `other`, those of a training, differ in a value with an effect.
@@ -105,9 +85,8 @@ class FlightConditions:
     @property
     def _effective(self) -> dict[str, Any]:
         """Values that have an effect, by their names on the command line."""
-        parts = self.values()
-        parts["task"] = {"name": self.task.name, **parts["task"]}
         names = self.dynamics.effective(self.actions.kind)
+        parts = self.model_dump()
         parts["dynamics"] = {name: parts["dynamics"][name] for name in names}
         if names == ("mode",):
             parts["actions"] = {"kind": self.actions.kind}
@@ -118,6 +97,14 @@ class FlightConditions:
         """Shape, type and bounds of one action."""
         default = as_task(self.task).make_dynamics
         return make_dynamics(default, self.dynamics, self.actions).actions.entry
+
+
+class _About(FlightConditions):
+    """The description in a file."""
+
+    format: Literal["drone_rl demonstration"] = "drone_rl demonstration"
+    format_version: Literal[1] = 1
+    pilot: Annotated[str, _PILOT]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -180,15 +167,10 @@ class Demonstration:
 
     def to_bytes(self) -> bytes:
         """Return the content of the file."""
-        about = {
-            "format": FORMAT,
-            "format_version": FORMAT_VERSION,
-            "pilot": self.pilot,
-            **self.conditions.values(),
-        }
+        about = _About(pilot=self.pilot, **self.conditions.model_dump())
         arrays: dict[str, Any] = {name: getattr(self, name) for name in _ARRAYS}
         file = io.BytesIO()
-        np.savez_compressed(file, about=json.dumps(about), **arrays)
+        np.savez_compressed(file, about=about.model_dump_json(), **arrays)
         return file.getvalue()
 
 
@@ -205,16 +187,9 @@ def read_demonstration(path: Path) -> Demonstration:
         about = arrays.pop("about")
         if about.shape or about.dtype.kind != "U":
             raise InputError("its description is no text")
-        data = as_mapping(parse_json(about.item(), "its description"), "about")
-        kind, version = data.get("format"), data.get("format_version")
-        if kind != FORMAT or type(version) is not int or version != FORMAT_VERSION:
-            raise InputError(
-                f"it has the format {shown(kind)}, version {shown(version)}, not {FORMAT}, "
-                f"version {FORMAT_VERSION}"
-            )
-        data = _ABOUT.read(data, "about")
-        pilot = _PILOT.read(data["pilot"], "pilot")
-        return Demonstration(FlightConditions.read(data), pilot=pilot, **arrays)
+        data = _About.read(parse_json(about.item(), "its description"), "about")
+        conditions = data.model_dump(include={*FlightConditions.model_fields})
+        return Demonstration(FlightConditions.read(conditions), pilot=data.pilot, **arrays)
     except InputError as error:
         raise InputError(
             f"{path} can't be used as a demonstration ({error}); remove the file or record again"

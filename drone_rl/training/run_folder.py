@@ -19,10 +19,10 @@ from drone_rl.config.configuration import (
 )
 from drone_rl.config.training import CloningSettings, TrainSettings
 from drone_rl.policies.policy import Policy, load_policy
-from drone_rl.policies.zoo import describe, read_checkpoint
+from drone_rl.policies.zoo import Checkpoint, describe, read_checkpoint
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.tasks import Task, as_settings, as_task
-from drone_rl.training.callbacks import CheckpointCallback
+from drone_rl.training.callbacks import CheckpointCallback, TrainingProgress
 from drone_rl.training.cloning import Cloning
 from drone_rl.training.confirmation import Confirmation
 from drone_rl.training.demonstrations import Demonstration, FlightConditions, read_demonstrations
@@ -112,8 +112,8 @@ class RunFolder:
         self.path = path
 
     @classmethod
-    def open(cls, path: str | Path | None, resume: bool) -> tuple[Self, dict[str, Any] | None]:
-        """Return the folder and, to resume, the state of its newest checkpoint.
+    def open(cls, path: str | Path | None, resume: bool) -> tuple[Self, Checkpoint | None]:
+        """Return the folder and, to resume, its newest checkpoint.
 
         Raises:
             InputError: The folder holds a run that would be lost, or has no checkpoint to resume
@@ -156,9 +156,7 @@ class RunFolder:
                 self.open(self.path, resume=False)
             yield
 
-    def prepare(
-        self, settings: TrainSettings, state: Mapping[str, Any] | None
-    ) -> list[Demonstration]:
+    def prepare(self, settings: TrainSettings, state: Checkpoint | None) -> list[Demonstration]:
         """Check the checkpoint's settings; return the demonstrations that a new run clones, if any.
 
         Raises:
@@ -167,9 +165,9 @@ class RunFolder:
         """
         folder, demonstrations = settings.demonstrations, []
         if state is not None:
-            saved = TrainSettings.read(_own(state["config"]))
+            saved = TrainSettings.read(_own(state.config))
             check_same_config(saved.config(), settings.config(), MAY_CHANGE)
-            if folder is not None and "cloning" not in state:
+            if folder is not None and "cloning" not in state.training:
                 raise InputError(
                     f"can't resume with demonstrations={folder}: the run was started without any, "
                     "and only a new run clones; leave them out or start a new run"
@@ -188,7 +186,7 @@ class RunFolder:
     def checkpoints(self, settings: TrainSettings) -> CheckpointCallback:
         """Return the callback that writes checkpoints, with the settings and their origin."""
         config, origin = settings.config(), provenance()
-        description = describe(settings).as_dict()
+        description = describe(settings).model_dump(mode="json")
         return CheckpointCallback(
             self.path / "checkpoints",
             interval_s=settings.trainer.checkpoint_interval_s,
@@ -196,15 +194,16 @@ class RunFolder:
         )
 
     def resume(
-        self, trainer: Trainer, checkpoints: CheckpointCallback, state: Mapping[str, Any] | None
+        self, trainer: Trainer, checkpoints: CheckpointCallback, state: Checkpoint | None
     ) -> None:
         """Load the state, if any, and write `run.yaml`; see `Trainer.load_state_dict`."""
         if state is not None:
-            trainer.load_state_dict(state)
-            check_fits(state.get("best"), checkpoints.best, "best")
-            checkpoints.best = state["best"]
-            if "cloning" in state:
-                cloning = Cloning.read(state["cloning"], "the checkpoint's cloning")
+            saved = state.training
+            trainer.load_state_dict(saved)
+            check_fits(saved.get("best"), checkpoints.best, "best")
+            checkpoints.best = saved["best"]
+            if "cloning" in saved:
+                cloning = Cloning.read(saved["cloning"], "the checkpoint's cloning")
                 checkpoints.extra["cloning"] = cloning.values()
         extra = checkpoints.extra
         noted = {"config": extra["config"], "description": extra["description"]}
@@ -218,7 +217,7 @@ class Judge:
 
     check: Callable[[Task[Any], Actions], None]
     """Raises an `InputError` if it can't judge policies in a task, with such actions."""
-    verdict: Callable[[Path, int, str, str], tuple[Model, dict[str, Any]]]
+    verdict: Callable[[Path, int, str, str], tuple[Model, TrainingProgress]]
     """Takes a checkpoint, number of episodes, device and renderer; returns the verdict and the
     checkpoint's progress."""
 
@@ -322,7 +321,7 @@ def _own(config: Mapping[str, Any]) -> dict[str, Any]:
 
 def settings_for(
     settings: TrainSettings | None,
-    state: Mapping[str, Any] | None,
+    state: Checkpoint | None,
     changes: Mapping[str, Any],
     function: Callable[..., Any],
 ) -> TrainSettings:
@@ -331,7 +330,7 @@ def settings_for(
     A `Task` among the changes is registered. See `from_arguments` for `function` and errors.
     """
     if settings is None and state is not None:
-        settings = settings_of(state["config"])
+        settings = settings_of(state.config)
     changes = {name: as_settings(value) for name, value in changes.items()}
     return from_arguments(TrainSettings, settings, changes, function)
 

@@ -23,7 +23,7 @@ from drone_rl.config.training import TrainSettings
 from drone_rl.objectives import ReinforceLoss
 from drone_rl.policies import ImageNetwork, make_actor
 from drone_rl.policies.actor import exploring
-from drone_rl.policies.zoo import describe
+from drone_rl.policies.zoo import Checkpoint, describe
 from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.tasks import FailureReplayTask, as_task
 from drone_rl.training import run_folder
@@ -85,7 +85,7 @@ def train(
 def learn(
     settings: TrainSettings,
     folder: Path,
-    state: Mapping[str, Any] | None,
+    state: Checkpoint | None,
     callbacks: Sequence[Callback],
     replay: FailureReplayTask | None = None,
 ) -> dict[str, Any]:

@@ -48,7 +48,7 @@ def find_domain(
                 "matched to its weights; leave shifts out"
             )
         return None
-    of = policy.description, policy.state["policy"]
+    of = policy.description, policy.state.weights
     if shifts is not None:
         path = as_path(shifts, "shifts")
         return read_shifts(path / "shifts.json" if path.is_dir() else path, *of)

@@ -1,5 +1,6 @@
 """`drone-rl evaluate`: evaluate a policy next to the baselines, and print the figures."""
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -16,7 +17,7 @@ from drone_rl.envs import base_env, worlds_of
 from drone_rl.policies.baselines import check_baselines
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
-from drone_rl.policies.policy import BasePolicy
+from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.sim.tasks import as_task
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.trust.baselines import run_baselines
@@ -149,13 +150,12 @@ def evaluate(
         num_envs, device = settings.batch_size, settings.device
         rollouts |= run_baselines(num_envs, policy.task, state, episodes, device, flown)
     progress("evaluated", steps, steps)
-    origin = policy.origin
     return Evaluation(
-        policy=origin["policy"],
+        policy=policy.source,
         **seed.as_dict(),
         terms=as_task(policy.task).vocabulary,
         unlike=policy.unlike,
-        trained=origin["trained"] and origin["trained"]["progress"],
+        trained=dataclasses.asdict(policy.state.progress) if isinstance(policy, Policy) else None,
         **{name: summarise(e) for name, e in rollouts.items()},
     )
 

@@ -1,5 +1,6 @@
 """`drone-rl export`: write a policy as safetensors with a model card."""
 
+import dataclasses
 import hashlib
 import shlex
 from collections.abc import Mapping
@@ -11,8 +12,8 @@ from safetensors import SafetensorError
 from drone_rl.config.commands import HeldOutSettings
 from drone_rl.policies.policy import Policy
 from drone_rl.policies.zoo import certificate_path, shifts_path
-from drone_rl.policies.zoo.files import exported_bytes
-from drone_rl.sim.vocabulary import some_cubes
+from drone_rl.policies.zoo.files import Choice, SavedPolicy
+from drone_rl.sim.tasks import as_task
 from drone_rl.trust.coverage import find_domain
 from drone_rl.trust.evaluate import held_out_environments
 from drone_rl.trust.findings import untested
@@ -22,10 +23,9 @@ from drone_rl.trust.verdict import FindClaim, judge_policy
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_bytes, write_all_atomically
 from drone_rl.utils.limits import CERTIFICATE_BYTES, SHIFTS_BYTES
-from drone_rl.utils.models import Stored
 from drone_rl.utils.overrides import COMMAND, read_overrides
 from drone_rl.utils.provenance import Provenance
-from drone_rl.utils.schema import Maybe
+from drone_rl.utils.schema import Instance
 from drone_rl.utils.seeding import with_seed
 from drone_rl.utils.text import render
 
@@ -36,7 +36,7 @@ def export(
     settings: HeldOutSettings,
     *,
     command: str | None = None,
-    chosen: Mapping[str, Any] | None = None,
+    chosen: Choice | Mapping[str, Any] | None = None,
     certificate: str | Path | None = None,
     shifts: str | Path | None = None,
     outputs: str | Path = "outputs",
@@ -49,8 +49,7 @@ def export(
         target: The file, ending in .safetensors.
         settings: Settings of the card's verdict.
         command: The training command; None takes it from the policy's file or folder.
-        chosen: How it was chosen in a sweep, see `export_policy`; None takes it from the policy's
-            file.
+        chosen: How it was chosen in a sweep; None takes it from the policy's file.
         certificate: See `find_claim`; it is quoted and copied, like the robustness evaluation.
         shifts: See `find_domain`.
         outputs: See `find_domain`.
@@ -63,8 +62,9 @@ def export(
         InputError: The policy can't be written, or a given file is unusable.
     """
     settings, seed = with_seed(settings)
-    noted, noted_choice = recorded_origin(policy.path, policy.state)
-    command, chosen = Maybe(COMMAND).read(command or noted, "command"), chosen or noted_choice
+    command = command or recorded_command(policy.path, policy.state)
+    command = None if command is None else COMMAND.read(command, "command")
+    chosen = Instance(Choice | None).read(chosen, "chosen") or policy.state.chosen
     claim = None if find_claim is None else find_claim(policy, certificate, seed=seed)
     claim = None if claim is None or claim.refused else claim  # cards quote no refused certificate
     measured = find_domain(policy, shifts, outputs)
@@ -83,59 +83,62 @@ def export(
     return judged
 
 
-def recorded_origin(path: Path, state: dict[str, Any]) -> tuple[str | None, dict[str, Any] | None]:
-    """Return the training command of a run or exported file, and the file's "chosen", if any.
+def recorded_command(path: Path, state: SavedPolicy) -> str | None:
+    """Return the training command of an exported file or a run; None if it is unknown.
 
-    The command is None if it is unknown, as of a run that was trained from Python.
+    That is so of a run that was trained from Python.
     """
-    metadata = state if path.suffix == ".safetensors" else {}  # nobody checked that of a checkpoint
-    noted, folder = metadata.get("command"), path.absolute().parent.parent
-    if noted is None and (folder / ".hydra" / "overrides.yaml").is_file():
-        typed = [o for o in read_overrides(folder) if not o.startswith(("resume=", "trial="))]
-        noted = shlex.join(["drone-rl", "train", *typed])
-    return noted, metadata.get("chosen")
+    folder = path.absolute().parent.parent
+    if path.suffix == ".safetensors" or not (folder / ".hydra" / "overrides.yaml").is_file():
+        return state.command
+    typed = [o for o in read_overrides(folder) if not o.startswith(("resume=", "trial="))]
+    return shlex.join(["drone-rl", "train", *typed])
 
 
 def export_policy(
     path: Path,
-    checkpoint: Mapping[str, Any],
+    policy: SavedPolicy,
     *,
     command: str | None,
     verdict: Verdict,
     seed: int,
-    chosen: Mapping[str, Any] | None,
+    chosen: Choice | None,
     shifts: SavedShifts | None = None,
     carried: Mapping[Path, bytes] | None = None,
 ) -> None:
-    """Write a checkpoint's policy and its model card, .safetensors and .md, both or neither.
+    """Write a policy and its model card, .safetensors and .md, both or neither.
 
-    `checkpoint` is from `read_policy`, `seed` is the root of the verdict's random streams. `chosen`
-    has the entries of `Choice`; None outside a sweep. `carried` are further files that the card
-    quotes, by their paths.
+    Args:
+        path: The file, ending in .safetensors.
+        policy: The policy, such as a checkpoint.
+        command: The training command.
+        verdict: The verdict.
+        seed: Root of the verdict's random streams.
+        chosen: How it was chosen; None outside a sweep.
+        shifts: Its robustness evaluation.
+        carried: Further files that the card quotes, by their paths.
 
     Raises:
         InputError: The files can't be written.
     """
-    origin = checkpoint["provenance"]
-    about = {
-        "progress": checkpoint["progress"],
-        "provenance": {k: origin[k] for k in ("versions", "git_revision")},
-        "command": Maybe(COMMAND).read(command, "command"),
-        "verdict": verdict.as_dict(),
-        "worlds": "report",
-        "seed": seed,
-        "chosen": chosen,
-    }
-    described = checkpoint["description"]
+    origin = policy.provenance
+    exported = SavedPolicy(
+        description=policy.description,
+        weights=policy.weights,
+        progress=policy.progress,
+        provenance=Provenance(versions=origin.versions, git_revision=origin.git_revision),
+        command=command,
+        verdict=verdict.as_dict(),
+        worlds="report",
+        seed=seed,
+        chosen=chosen,
+    )
     try:
-        content = exported_bytes(checkpoint["policy"], described, about)
+        content = exported.to_bytes()
     except SafetensorError as error:
         raise InputError(f"policy {path} can't be written ({error})") from error
-    of_policy = {name: described.get(name) for name in ("task", "appearance", "dynamics")}
     digest = hashlib.sha256(content).hexdigest()
-    card = Card.read(
-        {**about, **of_policy, "name": path.stem, "digest": digest, "shifts": shifts}
-    ).text()
+    card = Card(path.stem, digest, exported, verdict, shifts).text()
     try:
         write_all_atomically({path: content, path.with_suffix(".md"): card, **(carried or {})})
     except OSError as error:
@@ -145,43 +148,15 @@ def export_policy(
         ) from error
 
 
-class Choice(Stored):
-    """How a policy was chosen in a sweep."""
-
-    runs: int
-    """Number of runs in the sweep."""
-    episodes: int | None
-    """Number of episodes by which they were compared; None if it was not judged there."""
-
-
-class Progress(Stored):
-    """Progress of the training."""
-
-    frames: int
-
-
-class Card(Stored):
-    """What a model card shows; mostly the metadata of the policy's file."""
+@dataclasses.dataclass(frozen=True)
+class Card:
+    """What a model card shows."""
 
     name: str
     digest: str
-    """SHA-256 of the file."""
-    command: str | None = None
-    """The training command."""
-    progress: Progress
-    provenance: Provenance
+    """SHA-256 of the policy's file."""
+    policy: SavedPolicy
     verdict: Verdict
-    worlds: str | None = None
-    """Stream of the verdict's environments."""
-    seed: int | None = None
-    """Root of their streams."""
-    chosen: Choice | None = None
-    """None outside a sweep."""
-    task: dict[str, Any]
-    """Settings of the task."""
-    appearance: dict[str, Any] | None = None
-    dynamics: dict[str, Any] | None = None
-    """None in computer-vision mode."""
     shifts: SavedShifts | None = None
 
     def text(self) -> str:
@@ -206,5 +181,5 @@ class Card(Stored):
             columns={name: of for name, of in columns.items() if of is not None},
             findings=findings,
             unknown=untested(findings),
-            cubes=None if "name" in self.task else some_cubes(self.task),
+            scenes=as_task(self.policy.description.task.parameters).vocabulary.tested,
         )

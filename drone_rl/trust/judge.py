@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, cast, overload
+from typing import Any, Literal, cast, overload
 
 from torchrl.envs import EnvBase
 
@@ -16,7 +16,7 @@ from drone_rl.policies.baselines import make_baseline
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy, Policy
-from drone_rl.policies.zoo import fingerprint, parse
+from drone_rl.policies.zoo import fingerprint
 from drone_rl.trust.baselines import BASELINES
 from drone_rl.trust.coverage import check_required, find_domain
 from drone_rl.trust.evaluate import held_out_environments
@@ -30,7 +30,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import NOT_COVERED, PROOF_MISSING
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import Provenance, provenance
-from drone_rl.utils.schema import Maybe, OneOf
+from drone_rl.utils.schema import Instance
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator, with_seed
 from drone_rl.utils.text import rate
 
@@ -189,7 +189,7 @@ def judge_one(
     settings = from_arguments(JudgeSettings, settings, changes, judge_one)
     settings, seed = with_seed(settings, drawn_seed)
     progress = as_progress(progress)
-    require = Maybe(OneOf(("good", "proved"))).read(require, "require")
+    require = Instance(Literal["good", "proved"] | None).read(require, "require")
     changed = {"task": task, "dynamics": dynamics, "appearance": appearance}
     loaded = _loaded(policy, outputs, changed)
     progress("policy and baselines", 0, 1)
@@ -258,9 +258,9 @@ def identify(policy: BasePolicy | None) -> str | None:
     """Return the hash of a policy's weights, None if its conditions are not those of training."""
     if not isinstance(policy, Policy):
         return None
-    if policy.description.as_dict() != parse(policy.state["description"]).as_dict():
+    if policy.description != policy.state.description:
         return None
-    return fingerprint(policy.state["policy"])
+    return fingerprint(policy.state.weights)
 
 
 def _loaded(policy: Any, outputs: str | Path, changed: Mapping[str, Any]) -> BasePolicy | None:

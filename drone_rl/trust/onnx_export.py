@@ -14,7 +14,7 @@ from drone_rl.envs.rollout import ActorAgent, steps
 from drone_rl.policies.actor import Exploring
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import make_onnx, open_onnx
-from drone_rl.trust.export import recorded_origin
+from drone_rl.trust.export import recorded_command
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path, make_folder, write_atomically
 from drone_rl.utils.seeding import root_seed
@@ -94,7 +94,7 @@ def export_onnx(
         raise InputError(f"target={target} is a folder; give a file in it, such as policy.onnx")
     make_folder(target.parent)
     policy = policy if isinstance(policy, Policy) else load_policy(policy)
-    metadata = {"command": command or recorded_origin(policy.path, policy.state)[0] or "unknown"}
+    metadata = {"command": command or recorded_command(policy.path, policy.state) or "unknown"}
     content = make_onnx(policy.description, policy.make_network(), metadata)
     model = open_onnx(content)
     without_faults = dataclasses.replace(policy, description=policy.description.without_faults())

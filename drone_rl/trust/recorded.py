@@ -20,7 +20,7 @@ MAX_FILES = 200
 def record_verdict(folder: Path, policy: BasePolicy, verdict: Verdict) -> None:
     """Write a verdict to a command's folder, for `recorded_verdict`."""
     make_folder(folder)
-    origin = {"policy": policy.origin["policy"], "weights": identify(policy)}
+    origin = {"policy": policy.source, "weights": identify(policy)}
     Judgement(**dict(verdict), **origin).save(folder / NAME)
 
 
@@ -47,14 +47,14 @@ def describe(verdict: Verdict) -> tuple[str, str]:
 
 def _own(policy: Policy) -> Iterator[tuple[float, Verdict]]:
     """Yield the verdict of the policy's run or file, with its time."""
-    path, content = policy.path, policy.state
+    path, verdict = policy.path, policy.state.verdict
     if path.suffix == ".pt":
         path = path.absolute().parents[1] / "result.json"
-        content = read_result(path.parent) or {}
-        if content.get("frames") != policy.state["progress"]["frames"]:
-            return
+        result = read_result(path.parent) or {}
+        is_same = result.get("frames") == policy.state.progress.frames
+        verdict = result.get("verdict") if is_same else None
     with suppress(InputError):
-        if (verdict := content.get("verdict")) is not None:
+        if verdict is not None:
             yield path.stat().st_mtime, Verdict.read(verdict)
 
 

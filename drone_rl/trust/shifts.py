@@ -117,8 +117,8 @@ def shifts(
     progress("flown", total, total)
     network = None  # of a third-party policy
     if isinstance(loaded, Policy):
-        described = loaded.description.as_dict()
-        weights = fingerprint(loaded.state["policy"])
+        described = loaded.description.model_dump(mode="json")
+        weights = fingerprint(loaded.state.weights)
         network = NetworkIdentity(weights=weights, description=described)
     return Shifts(
         policy=loaded.name,

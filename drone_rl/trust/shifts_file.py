@@ -9,7 +9,7 @@ from pathlib import Path
 
 import torch
 
-from drone_rl.policies.zoo import PolicyDescription, fingerprint, parse
+from drone_rl.policies.zoo import PolicyDescription, fingerprint
 from drone_rl.sim.tasks import as_task
 from drone_rl.trust.shifts_results import Robustness, SavedShifts
 from drone_rl.utils.errors import InputError
@@ -30,7 +30,7 @@ def read_shifts(
         shifts = Robustness.read_json(path, SHIFTS_BYTES)
         _refuse_another(shifts, described, weights)
         size = (described.camera.height, described.camera.width)
-        terms = as_task(described.task).vocabulary  # the file's own could say anything
+        terms = as_task(described.task.parameters).vocabulary  # the file's own could say anything
         shifts = shifts.replace(terms=terms, image_size=size)
         for name in shifts.axes:
             shifts.frames(name)
@@ -50,7 +50,7 @@ def _refuse_another(
         raise InputError(
             f"it is for a network with hash {stated[:12]}..., but the policy's has {actual[:12]}..."
         )
-    of, description = parse(shifts.network.description).as_dict(), described.as_dict()
+    of = PolicyDescription.read(shifts.network.description)
     for part in _PARTS:
-        if of.get(part) != description.get(part):
+        if getattr(of, part) != getattr(described, part):
             raise InputError(f"it is of another {part} than the policy's")

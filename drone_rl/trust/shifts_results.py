@@ -227,7 +227,8 @@ class NetworkIdentity(Stored):
     def camera_faults(self) -> list[str]:
         """Camera faults that the policy's transforms simulate."""
         faults = {fault.name for fault in Fault.__subclasses__()}
-        names = [step["name"] for step in self.description.get("transforms", ())]
+        image = self.description["inputs"]["pixels"]
+        names = [step["name"] for step in image["transforms"]]
         return [name for name in names if name in faults]
 
 

@@ -15,6 +15,7 @@ from drone_rl.envs import base_env, worlds_of
 from drone_rl.envs.rollout import Agent
 from drone_rl.policies.baselines import check_baselines
 from drone_rl.policies.policy import BasePolicy, load_policy
+from drone_rl.policies.zoo import TrainingProgress
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.tasks import Task
 from drone_rl.trust.baselines import run_baselines
@@ -103,7 +104,7 @@ def judge_for_selection(
     renderer: str = "raytrace",
     *,
     seed: RootSeed | None = None,
-) -> tuple[Verdict, dict[str, Any]]:
+) -> tuple[Verdict, TrainingProgress]:
     """Judge a checkpoint in environments of `Stream.CHOICE`, for selection.
 
     Reported figures come from environments of `Stream.REPORT`, never from these.
@@ -116,7 +117,7 @@ def judge_for_selection(
     policy, seed = load_policy(path), seed or root_seed(None)
     how: dict[str, Any] = {"stream": Stream.CHOICE, "device": device, "renderer": renderer}
     with policy.flying(min(episodes, 250), seed=seed.value, **how) as (env, actor):
-        return judge_policy(env, actor, episodes, seed=seed), policy.state["progress"]
+        return judge_policy(env, actor, episodes, seed=seed), policy.state.progress
 
 
 def check_judged(task: Task[Any], actions: Actions) -> None:

@@ -17,7 +17,7 @@ from drone_rl.utils.limits import CHECKPOINT_BYTES
 from drone_rl.utils.schema import as_mapping, shown
 
 FORMAT = "drone_rl checkpoint"
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
 _ZIP = b"PK"
 """First bytes of a checkpoint, which is a ZIP archive."""
 _FORMATS = {
@@ -65,8 +65,8 @@ def load_checkpoint(path: str | Path) -> dict[str, Any]:
     if type(version) is not int or version != FORMAT_VERSION:
         raise InputError(
             f"checkpoint {path} has format version {shown(version)}, this program reads "
-            f"{FORMAT_VERSION}; start the training again, or convert the policy of an older "
-            f"version with drone-rl convert {path}"
+            f"{FORMAT_VERSION}; convert one of an older version, or the folder of its run, with "
+            f"drone-rl convert {path}"
         )
     return state
 

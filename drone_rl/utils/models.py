@@ -59,11 +59,14 @@ class Model(pydantic.BaseModel, metaclass=_Checked, frozen=True):
 
     @classmethod
     def read_json(cls, path: Path, most: int = RESULT_BYTES) -> Self:
-        """Return an instance from a JSON file of at most `most` bytes; see `read` for errors."""
+        """Return an instance from a JSON file of at most `most` bytes.
+
+        Errors are as of `read`, without the path; those of `read_bytes` name it.
+        """
         try:
             return cls.model_validate_json(read_bytes(path, most), strict=True)
         except pydantic.ValidationError as error:
-            raise input_error(error, cls, str(path)) from None
+            raise input_error(error, cls) from None
 
     def write_json(self, path: Path) -> None:
         """Write a JSON file that `read_json` reads."""
@@ -112,12 +115,13 @@ def input_error(error: pydantic.ValidationError, cls: Any = None, where: str = "
         valid = f"valid names: {', '.join(names)}{meant}" if names else "leave it out"
         return InputError(f"{place} is unknown; {valid}")
     if details["type"] == "json_invalid":
-        return InputError(f"{place} is damaged: {details['msg']}; write the file again")
+        return InputError(f"it is damaged: {details['msg']}; write the file again")
     if details["type"] == "missing":
         return InputError(f"{place} is missing; give it")
     if details["type"] == "value_error":  # raised by a validator of this project
         text = str(details.get("ctx", {}).get("error", details["msg"]))
-        return InputError(f"{place}.{text}" if place else text)
+        is_inside = re.match(r"(?!it\b)[\w.\[\]]+(=| (is|are|must) )", text)
+        return InputError(f"{place}{'.' if is_inside else ': '}{text}" if place else text)
     reason = details["msg"][:1].lower() + details["msg"][1:]
     if rest := details["msg"].partition(" should ")[2]:
         plain = rest.replace(" after validation", "").replace("a valid tuple", "a list")

@@ -5,22 +5,26 @@ import platform
 import subprocess
 from importlib import metadata
 from pathlib import Path
+from typing import Annotated
 
 from drone_rl.utils.models import Stored
+from drone_rl.utils.schema import Text
 
 PACKAGES = (
     *("drone-rl", "torch", "torchrl", "tensordict", "mujoco", "mujoco-warp", "warp-lang"),
     *("dm_control", "hydra-core", "numpy"),
 )
 
+Line = Annotated[str, Text(200)]
+
 
 class Provenance(Stored):
     """Base of results whose files record where they are from."""
 
-    versions: dict[str, str] = {}
+    versions: dict[Line, Line] = {}
     """Versions of Python and of packages."""
-    git_revision: str | None = None
-    machine: dict[str, str | int | None] = {}
+    git_revision: Line | None = None
+    machine: dict[Line, Line | int | None] = {}
 
 
 def versions() -> dict[str, str]:

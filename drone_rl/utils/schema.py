@@ -9,11 +9,12 @@ import functools
 import math
 import os
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Protocol
+from typing import Annotated, Any, Literal
 
 from annotated_types import MaxLen, MinLen, Predicate
 from pydantic import (
     AfterValidator,
+    AllowInfNan,
     BeforeValidator,
     ConfigDict,
     Discriminator,
@@ -25,6 +26,7 @@ from pydantic import (
     ValidationError,
 )
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+from typing_extensions import TypeAliasType
 
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.errors import shown as shown
@@ -32,14 +34,6 @@ from drone_rl.utils.models import input_error
 
 LONGEST_TEXT = 4000
 """Characters of one text in a file."""
-
-
-class Kind(Protocol):
-    """One kind of value."""
-
-    def read(self, value: Any, where: str) -> Any:
-        """Return a value of this kind; raise an `InputError` about `where` for any other."""
-        ...
 
 
 class Annotation:
@@ -60,7 +54,7 @@ class Annotation:
         return f"must be {self.words}" if self.words else ""
 
     def read(self, value: Any, where: str) -> Any:
-        """See `Kind`."""
+        """Return a value of this kind; raise an `InputError` about `where` for any other."""
         try:
             return self._adapter.validate_python(as_plain(value))
         except ValidationError as error:
@@ -169,7 +163,8 @@ class OneOf(Annotation):
 class Instance(Annotation):
     """An object of a class; settings are also read from mappings, and parts from names."""
 
-    of: type
+    of: Any
+    """The class, or another type, such as one that allows None."""
 
     @property
     def hint(self) -> Any:
@@ -219,23 +214,6 @@ class FileName(Annotation):
 
 
 @dataclasses.dataclass(frozen=True)
-class Maybe(Annotation):
-    """A value of some kind, or None."""
-
-    kind: Any
-
-    @property
-    def hint(self) -> Any:
-        """See `Annotation`."""
-        value: Any = Annotated[Any, self.kind]
-        return value | None
-
-    def read(self, value: Any, where: str) -> Any:
-        """See `Kind`."""
-        return None if value is None else self.kind.read(value, where)
-
-
-@dataclasses.dataclass(frozen=True)
 class Several(Annotation):
     """A list of values of one kind, as a tuple."""
 
@@ -248,13 +226,6 @@ class Several(Annotation):
         """See `Annotation`."""
         values = tuple[Annotated[Any, self.kind], ...]
         return Annotated[values, MinLen(self.least), MaxLen(self.most)]
-
-    def read(self, value: Any, where: str) -> tuple[Any, ...]:
-        """See `Kind`."""
-        if isinstance(self.kind, Annotation):
-            return super().read(value, where)
-        items = Several(Instance(object), self.least, self.most).read(value, where)
-        return tuple(self.kind.read(item, f"{where}[{i}]") for i, item in enumerate(items))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -312,43 +283,29 @@ class Listed(Annotation):
         return f"{'an' if self.what[0] in 'aeiou' else 'a'} {self.what} or a list of them"
 
 
-@dataclasses.dataclass(frozen=True)
-class Record:
-    """A mapping with exactly these keys."""
-
-    fields: Mapping[str, Kind]
-    optional: frozenset[str] = frozenset()
-    """Keys that may be missing."""
-
-    def read(self, value: Any, where: str) -> dict[str, Any]:
-        """See `Kind`."""
-        value = as_mapping(value, where)
-        for key in value:
-            if key not in self.fields:
-                raise InputError(
-                    f"{where}.{shown(key)} is unknown; valid names: {', '.join(self.fields) or '-'}"
-                )
-        for key in self.fields:
-            if key not in value and key not in self.optional:
-                raise InputError(f"{where}.{key} is missing; write the file again")
-        return {
-            key: kind.read(value[key], f"{where}.{key}")
-            for key, kind in self.fields.items()
-            if key in value
-        }
+PlainData = TypeAliasType(
+    "PlainData",
+    Annotated[bool, Strict()]
+    | Annotated[int, Strict()]
+    | Annotated[float, Strict(), AllowInfNan(False)]
+    | Annotated[str, Text()]
+    | Annotated[list["PlainData"], Strict()]
+    | Annotated[dict[Annotated[str, Text()], "PlainData"], Strict()]
+    | None,
+)
+"""Values of plain data."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Plain:
-    """Any plain data: texts, finite numbers, true, false, none, lists, mappings."""
+class Plain(Annotation):
+    """A mapping of plain data."""
 
-    def read(self, value: Any, where: str) -> Any:
-        """See `Kind`."""
-        try:
-            _check_plain(value, where)
-        except RecursionError:
-            raise InputError(f"{where} is nested too deeply") from None
-        return value
+    hint = dict[Annotated[str, Text()], PlainData]
+
+    @property
+    def words(self) -> str:
+        """The allowed values in words."""
+        return "plain data: short lines of text, finite numbers, true, false, null, lists, mappings"
 
 
 def as_mapping(value: Any, where: str) -> Mapping[str, Any]:
@@ -359,27 +316,11 @@ def as_mapping(value: Any, where: str) -> Mapping[str, Any]:
 
 
 def as_plain(value: Any) -> Any:
-    """Return a value with Python's numbers instead of NumPy's or PyTorch's, and texts of paths."""
+    """Return Python's numbers for NumPy's or PyTorch's, texts for paths, and tuples for lists."""
     if isinstance(value, list) or type(value) is tuple:
-        return type(value)(map(as_plain, value))
+        return tuple(map(as_plain, value))
     module = type(value).__module__
     if module in ("numpy", "torch") and getattr(value, "shape", None) == ():
         return value.item()
     is_device = module == "torch" and type(value).__name__ == "device"
     return str(value) if is_device or isinstance(value, os.PathLike) else value
-
-
-def _check_plain(value: Any, where: str) -> None:
-    if isinstance(value, Mapping):
-        for key, item in as_mapping(value, where).items():
-            Text().read(key, f"a name in {where}")
-            _check_plain(item, where)
-    elif isinstance(value, list | tuple):
-        for item in value:
-            _check_plain(item, where)
-    elif isinstance(value, str):
-        Text().read(value, f"a text in {where}")
-    elif isinstance(value, float) and not math.isfinite(value):
-        raise InputError(f"{where} holds {value}; every number must be finite")
-    elif value is not None and not isinstance(value, bool | int | float):
-        raise InputError(f"{where} holds a value of type {type(value).__name__}; give plain data")

@@ -73,6 +73,10 @@ class Settings(Model):
         """Return these settings as an instance of a base class, without the fields it lacks."""
         return cls(**{name: getattr(self, name) for name in cls.model_fields})
 
+    @pydantic.model_serializer
+    def _as_plain(self) -> dict[str, Any]:
+        return self.values()
+
     def values(self) -> dict[str, Any]:
         """Return the fields by name as plain data, which `read` reads."""
         return {name: plain(value) for name, value in self}

@@ -113,7 +113,7 @@ def check(
             f"{', '.join(policy_names())}; give policy= its file"
         )
     policy = load_policy(stated.policy.name if policy is None else policy, outputs=outputs)
-    weights = policy.state["policy"]
+    weights = policy.state.weights
     required = policy.in_task(**as_changes(task, "task")).task if task else None
     check_same_policy(stated, policy.description, weights, required)
     found = check_certificate(

@@ -67,7 +67,7 @@ def find_claim(
 def _read_and_check(
     policy: Policy, path: Path, flights: int, seed: RootSeed, how: CheckSettings
 ) -> Proof:
-    weights = policy.state["policy"]
+    weights = policy.state.weights
     stated = read_validated(path, policy.description, weights)
     claim = Proof(
         path=str(path),

@@ -20,7 +20,7 @@ from drone_rl.config.configuration import check_same_config, from_arguments
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs.rollout import Agent
 from drone_rl.policies.policy import Policy, load_policy
-from drone_rl.policies.zoo import describe, read_checkpoint
+from drone_rl.policies.zoo import Checkpoint, describe, read_checkpoint
 from drone_rl.sim.tasks import FailureReplayTask
 from drone_rl.sim.tasks.collect_cubes import inflated
 from drone_rl.training import Callback
@@ -40,7 +40,7 @@ from drone_rl.utils.archives import read_array
 from drone_rl.utils.files import last_of, read_json, write_atomically
 from drone_rl.utils.models import Model
 from drone_rl.utils.progress import Progress, as_progress
-from drone_rl.utils.schema import Instance, Maybe
+from drone_rl.utils.schema import Instance
 from drone_rl.utils.seeding import Stream
 from drone_rl.verification.prove import STATE_NAME, Proof, prove
 from drone_rl.verification.prover.boxes import volumes
@@ -87,7 +87,7 @@ class Journal(Callback):
         folder: Path,
         settings: TrainSettings | None,
         how: ProvableSettings | None,
-        state: Mapping[str, Any] | None,
+        state: Checkpoint | None,
         changes: Mapping[str, Any],
     ) -> Self:
         """Start a journal or, with a checkpoint, continue the one in the folder, if there is one.
@@ -101,7 +101,7 @@ class Journal(Callback):
         path, rounds = folder / "provable.json", []
         saved = _Saved.read(read_json(path), str(path)) if state and path.exists() else None
         if settings is None and state is not None:
-            settings = settings_of(saved.settings if saved else state["config"])
+            settings = settings_of(saved.settings if saved else state.config)
         settings = from_arguments(TrainSettings, settings, changes, train_until_proved)
         if saved is not None:
             how = how or saved.how
@@ -214,14 +214,14 @@ def train_until_proved(
         SystemExit: SIGTERM stopped it, see `train`.
     """
     progress = as_progress(progress)
-    how = Maybe(Instance(ProvableSettings)).read(how, "how")
+    how = Instance(ProvableSettings | None).read(how, "how")
     hooks = with_progress(callbacks, progress)
     run, state = RunFolder.open(folder, resume)
     folder = run.path
     with run.locked(is_new=state is None):
         journal = Journal.open(folder, settings, how, state, changes)
         if state is not None:
-            journal.forget_after(state["progress"]["frames"])
+            journal.forget_after(state.progress.frames)
         callbacks = [journal, *hooks]
         result = _learn(journal, state, callbacks)
         while not (journal.is_over or _is_stopped(journal, result)):
@@ -278,7 +278,7 @@ def _check_support(settings: TrainSettings) -> None:
 
 
 def _learn(
-    journal: Journal, state: Mapping[str, Any] | None, callbacks: Sequence[Callback]
+    journal: Journal, state: Checkpoint | None, callbacks: Sequence[Callback]
 ) -> dict[str, Any]:
     """Train to the target at first, then for a round's frames on its failures."""
     settings, how, practice = journal.settings, journal.how, None
@@ -312,8 +312,8 @@ def _search(journal: Journal, progress: Progress) -> None:
         boxes = _doubtful(proof)
         boxes = boxes[np.argsort(-volumes(boxes), kind="stable")[: how.most_boxes]]
     search = Round(
-        frames=policy.state["progress"]["frames"],
-        trained_s=policy.state["progress"]["seconds"],
+        frames=policy.state.progress.frames,
+        trained_s=policy.state.progress.seconds,
         flights=flights,
         failures=len(places),
         losing=None if proof is None else proof.lost,

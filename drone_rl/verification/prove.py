@@ -141,8 +141,13 @@ def _prove(
     progress: Progress,
 ) -> Proof:
     prover = Prover(spec, settings.most_combinations)
-    weights = fingerprint(policy.state["policy"])
-    subject = [weights, policy.description.as_dict(), settings.logit_gap, settings.renderer]
+    weights = fingerprint(policy.state.weights)
+    subject = [
+        weights,
+        policy.description.model_dump(mode="json"),
+        settings.logit_gap,
+        settings.renderer,
+    ]
     proof_id = json.dumps(subject)
     state = None if folder is None else folder / STATE_NAME
     if state is not None and state.exists():

@@ -19,7 +19,8 @@ def require_cubes(described: PolicyDescription, what: str) -> TaskSettings:
         InputError: The task is not cube collection by the three moves of computer-vision mode, or a
             position of the drone does not determine the observation.
     """
-    task, dynamics, actions = described.task, described.dynamics, described.actions
+    task, dynamics = described.task.parameters, described.dynamics
+    actions = described.actions.settings
     remedy = "give another policy"
     if type(task) is not TaskSettings:  # a task of a derived class may have other rules
         problem = f"task={TaskSettings.name}, got task={task.name}"

@@ -56,7 +56,7 @@ def test_gains_and_costs_by_hand(setup, monkeypatch):
     steps = (Gray(), Noise(), Shift(), Standardize())
     config = TrainSettings(appearance=appearance, transforms=steps).config()
     monkeypatch.setattr(robust, "train", lambda run, seed, *_: (1.0, {"frames": int(seed[5:])}))
-    monkeypatch.setattr(robust, "read_checkpoint", lambda path: {"config": config})
+    monkeypatch.setattr(robust, "read_checkpoint", lambda path: SimpleNamespace(config=config))
     monkeypatch.setattr(robust, "success_rates", success_rates)
     figures = bench_robust(setup)
     kinds = ["camera position", "field of view", "object size", "distractors", "dynamics"]

@@ -13,23 +13,26 @@ import torch
 import yaml
 from safetensors.torch import save
 
-from drone_rl.policies.zoo import parse
+from drone_rl.config import MOVES_SETTINGS
+from drone_rl.policies.zoo import PolicyDescription
+from drone_rl.policies.zoo.description import ActionSpace
 from drone_rl.sweeps.manifest import Sweep
 from drone_rl.utils.limits import ARRAYS_BYTES, CHECKPOINT_BYTES
 from tests.cli.running import error_line
 
 SECRET = "the canary's secret 4711"
+TASK = {"num_cubes": 1, "first_distance": 8.0, "step_limit": 60}
+IMAGE = {
+    "camera": {"horizontal_fov": 135.0},
+    "size": [8, 16],
+    "transforms": [{"name": "gray"}, {"name": "standardize", "mean": 0.5, "std": 0.2}],
+}
 DESCRIPTION = {
     "format": "drone_rl policy",
-    "format_version": 2,
-    "task": {
-        **{"num_cubes": 1, "first_distance": 8.0, "spacing": 9.0, "lateral_bound": 6.0},
-        **{"vertical_bound": 0.0, "cube_size": 2.5, "cube_color": [0.75, 0.12, 0.08]},
-        **{"drone_size": 0.8, "altitude": 2.5, "step_length": 1.0, "step_limit": 60},
-        **{"front_margin": 11.0, "side_margin": 20.0},
-    },
-    "camera": {"width": 16, "height": 8, "horizontal_fov": 135.0},
-    "transforms": [{"name": "gray"}, {"name": "standardize", "mean": 0.5, "std": 0.2}],
+    "format_version": 3,
+    "task": {"name": "collect_cubes", "parameters": TASK},
+    "inputs": {"pixels": IMAGE},
+    "actions": ActionSpace.of(MOVES_SETTINGS).model_dump(mode="json"),
     "network": {"name": "small_cnn", "patch": 4, "channels": [2], "hidden": []},
 }
 PROGRESS = {"frames": 1, "episodes": 1, "updates": 1, "seconds": 1.0, "running_reward": 0.5}
@@ -81,15 +84,18 @@ def refused(in_process, tmp_path, monkeypatch):
 
 
 def weights(value=0.1):
-    expected = parse(DESCRIPTION).expected_weights()
+    expected = PolicyDescription.read(DESCRIPTION).expected_weights()
     return {name: torch.full(tensor.shape, value) for name, tensor in expected.items()}
 
 
 def exported(description=DESCRIPTION, tensors=None, **about):
-    text = description if isinstance(description, str) else json.dumps(description)
     about = {"progress": PROGRESS, "provenance": ORIGIN, "command": "drone-rl train", **about}
-    texts = {"format": "drone_rl policy", "description": text, "about": json.dumps(about)}
-    return save(tensors or weights(), texts)
+    text = json.dumps({**about, "description": description})
+    return with_text(text, tensors)
+
+
+def with_text(text, tensors=None):
+    return save(tensors or weights(), {"format": "drone_rl policy", "policy": text})
 
 
 def with_part(**parts):
@@ -98,7 +104,7 @@ def with_part(**parts):
 
 def checkpoint(**changes):
     state = {
-        **{"format": "drone_rl checkpoint", "format_version": 3, "policy": weights()},
+        **{"format": "drone_rl checkpoint", "format_version": 4, "policy": weights()},
         **{"config": {}, "description": DESCRIPTION, "progress": PROGRESS, "best": 0.5},
         "provenance": ORIGIN,
     }
@@ -134,22 +140,23 @@ POLICIES = {
     ),
     "unknown_key.safetensors": lambda: with_part(hooks=["os.system"]),
     "interpolation.safetensors": lambda: with_part(
-        task={**DESCRIPTION["task"], "spacing": "${oc.env:HOSTILE_SECRET}"}
+        task={"name": "collect_cubes", "parameters": {"spacing": "${oc.env:HOSTILE_SECRET}"}}
     ),
     "not_finite.safetensors": lambda: with_part(
-        task={**DESCRIPTION["task"], "spacing": float("nan")}
+        task={"name": "collect_cubes", "parameters": {"spacing": float("nan")}}
     ),
-    "huge_image.safetensors": lambda: with_part(
-        camera={"width": 4096, "height": 4096, "horizontal_fov": 90.0}
-    ),
+    "huge_image.safetensors": lambda: with_part(inputs={"pixels": {**IMAGE, "size": [4096, 4096]}}),
     "huge_network.safetensors": lambda: with_part(
         network={**DESCRIPTION["network"], "hidden": [10**9]}
+    ),
+    "scene_of_a_path.safetensors": lambda: with_part(
+        task={**DESCRIPTION["task"], "scene": {"name": "/etc/passwd"}}
     ),
     "future_version.safetensors": lambda: with_part(format_version=99),
     "weights_not_finite.safetensors": lambda: exported(tensors=weights(float("nan"))),
     "weights_missing.safetensors": lambda: exported(tensors=dict([*weights().items()][:1])),
-    "deep_json.safetensors": lambda: exported('{"a":' * 50_000 + "1" + "}" * 50_000),
-    "name_twice.safetensors": lambda: exported('{"format": 1, "format": "drone_rl policy"}'),
+    "deep_json.safetensors": lambda: with_text('{"a":' * 50_000 + "1" + "}" * 50_000),
+    "name_twice.safetensors": lambda: with_text('{"seed": 1, "seed": 2}'),
     "escape_sequence.safetensors": lambda: exported(command="drone-rl train \x1b]0;owned\x07"),
     "truncated.safetensors": lambda: exported()[:500],
     "header_of_a_terabyte.safetensors": lambda: struct.pack("<Q", 2**40) + b"{}",

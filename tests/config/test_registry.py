@@ -21,7 +21,7 @@ from drone_rl.config.transforms import Frame
 from drone_rl.envs.transforms import PixelTransform
 from drone_rl.objectives import ReturnEstimator
 from drone_rl.policies import MLP
-from drone_rl.policies.zoo import describe, parse
+from drone_rl.policies.zoo import PolicyDescription, describe
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Whole
 
@@ -77,8 +77,9 @@ def test_a_network_is_selected_by_name_and_described_by_name_and_values(register
     assert training == TrainSettings.read(training.config())
     assert training.config()["network"]["_target_"] == "wide"
     described = describe(training)
-    assert described.as_dict()["network"]["name"] == "wide"
-    assert parse(described.as_dict()) == described
+    plain = described.model_dump(mode="json")
+    assert plain["network"]["name"] == "wide"
+    assert PolicyDescription.read(plain) == described
     assert described.build_network().told == (8, "fast", (1, 2), None)
 
 

@@ -1,88 +1,153 @@
+"""Files of former layouts are converted, and what they describe acts as before."""
+
 import json
-import struct
+import shutil
 
 import pytest
 import torch
-from safetensors.torch import load_file, save
+from safetensors.torch import save
 
 import drone_rl
 from drone_rl.config.learning import Standardized
-from drone_rl.policies.convert import convert_policy
-from drone_rl.policies.zoo import load_exported, policy_path
+from drone_rl.policies.convert import convert
+from drone_rl.policies.zoo import certificate_path, policy_path
 from drone_rl.training.run_folder import settings_of
 from drone_rl.utils.checkpoint import load_checkpoint
 from drone_rl.utils.errors import InputError
+from drone_rl.verification.checker.certificate import read_certificate
 
 
-def older_export(folder):
+def former_description(policy):
+    """Return a description as version 2 laid it out."""
+    described = policy.description
+    task = described.task.parameters.values()
+    parts = {"transforms": described.image.transforms, "network": [described.network]}
+    parts = {name: [part.model_dump(mode="json") for part in of] for name, of in parts.items()}
+    former = {
+        "format": "drone_rl policy",
+        "format_version": 2,
+        "task": task,
+        "camera": described.camera.values(),
+        "transforms": parts["transforms"],
+        "network": parts["network"][0],
+        "appearance": described.appearance.values(),
+        "dynamics": described.dynamics.values(),
+    }
+    if policy.actions.kind != "moves":
+        former["actions"] = policy.actions.values()
+    return former
+
+
+def former_export(folder, name="good"):
     """Return a shipped policy as version 0.1 wrote it."""
-    content = policy_path("good").read_bytes()
-    (size,) = struct.unpack("<Q", content[:8])
-    metadata = json.loads(content[8 : 8 + size])["__metadata__"]
-    about = json.loads(metadata["about"])
+    policy = drone_rl.load_policy(name)
+    about = policy.state.model_dump(mode="json", exclude={"description"})
     about["progress"]["running_cubes"] = about["progress"].pop("running_reward")
     about["evaluation"] = {"success": 1.0}
+    texts = {"about": json.dumps(about), "description": json.dumps(former_description(policy))}
     path = folder / "mine.safetensors"
-    weights = load_file(policy_path("good"))
-    path.write_bytes(save(weights, {**metadata, "about": json.dumps(about)}))
+    path.write_bytes(save(policy.state.weights, {"format": "drone_rl policy", **texts}))
     return path
 
 
-def older_checkpoint(folder, trained):
-    """Return a checkpoint as version 0.1 wrote it."""
-    state = load_checkpoint(trained.folder / "checkpoints" / "last.pt")
-    state["optimiser"] = state.pop("optimizer")
-    state["progress"]["running_cubes"] = state["progress"].pop("running_reward")
-    config = state["config"]
-    config["optimiser"] = config.pop("optimizer")
-    config["trainer"]["minibatch_frames"] = config["trainer"].pop("chunk_frames")
-    config["returns"]["_target_"] = "standardised"
-    path = folder / "older.pt"
-    torch.save({**state, "format_version": 2}, path)
-    return path
-
-
-def test_a_converted_policy_acts_alike(tmp_path):
-    path = older_export(tmp_path)
-    with pytest.raises(InputError, match=f"drone-rl convert {path}$"):
-        load_exported(path)
-    converted = convert_policy(path)
-    assert converted == tmp_path / "mine_converted.safetensors"
-    one, other = drone_rl.load_policy(converted), drone_rl.load_policy("good")
-    assert one.description == other.description
-    assert one.state["progress"] == other.state["progress"]
-    weights, expected = one.state["policy"], other.state["policy"]
-    assert all(torch.equal(weights[name], expected[name]) for name in expected)
-    images = torch.randint(0, 256, (50, 25, 64, 3), dtype=torch.uint8)
-    assert torch.equal(one.act_batch(images), other.act_batch(images))
-
-
-def test_checkpoints_are_converted_with_their_settings(tmp_path):
-    trained = drone_rl.train(
-        folder=tmp_path / "run",
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    """A run of one update."""
+    return drone_rl.train(
+        folder=tmp_path_factory.mktemp("run") / "run",
         returns=Standardized(),
         trainer=drone_rl.TrainerSettings(total_frames=1, chunk_frames=100),
         progress=lambda *_: None,
     )
-    present = load_checkpoint(trained.folder / "checkpoints" / "last.pt")
-    path = older_checkpoint(tmp_path, trained)
-    with pytest.raises(InputError, match="drone-rl convert"):
+
+
+def make_former(path, policy, version=3):
+    """Lay a checkpoint out as an earlier revision, or as version 0.1 (2), did."""
+    state = load_checkpoint(path)
+    state["description"] = former_description(policy)
+    if version == 2:
+        state["optimiser"] = state.pop("optimizer")
+        state["progress"]["running_cubes"] = state["progress"].pop("running_reward")
+        config = state["config"]
+        config["optimiser"] = config.pop("optimizer")
+        config["trainer"]["minibatch_frames"] = config["trainer"].pop("chunk_frames")
+        config["returns"]["_target_"] = "standardised"
+    torch.save({**state, "format_version": version}, path)
+
+
+@pytest.mark.parametrize("name", ["good", "flight_velocity", "pillars_good", "robust"])
+def test_a_converted_policy_acts_alike(tmp_path, name):
+    path = former_export(tmp_path, name)
+    with pytest.raises(InputError, match=f"drone-rl convert {path}$"):
         drone_rl.load_policy(path)
-    state = load_checkpoint(convert_policy(path, tmp_path / "new.pt"))
-    assert settings_of(state["config"]) == settings_of(present["config"])
-    assert {"optimizer", "policy"} <= state.keys()
-    assert drone_rl.load_policy(tmp_path / "new.pt").state["progress"]["updates"] > 0
+    assert convert(path) == [tmp_path / "mine_converted.safetensors"]
+    one = drone_rl.load_policy(tmp_path / "mine_converted.safetensors")
+    other = drone_rl.load_policy(name)
+    assert one.description == other.description
+    assert one.state.progress == other.state.progress
+    images = torch.randint(0, 256, (50, 25, 64, 3), dtype=torch.uint8)
+    assert torch.equal(one.act_batch(images), other.act_batch(images))
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_run_resumes_after_its_conversion(trained, tmp_path, version):
+    run = shutil.copytree(trained.folder, tmp_path / "run")
+    paths = sorted((run / "checkpoints").glob("*.pt"))
+    for path in paths:
+        make_former(path, trained.policy, version)
+    with pytest.raises(InputError, match="drone-rl convert"):
+        drone_rl.train(folder=run, resume=True, progress=lambda *_: None)
+    assert convert(run) == paths
+    assert {path.stem for path in paths} | {"last_former", "best_former"} == {
+        path.stem for path in (run / "checkpoints").iterdir()
+    }
+    state = load_checkpoint(run / "checkpoints" / "last.pt")
+    assert settings_of(state["config"]).returns == Standardized()
+    longer = drone_rl.TrainerSettings(total_frames=2000, chunk_frames=100)
+    whole, other = (
+        drone_rl.train(folder=folder, resume=True, trainer=longer, progress=lambda *_: None)
+        for folder in (run, shutil.copytree(trained.folder, tmp_path / "whole"))
+    )
+    for name, weight in whole.policy.state.weights.items():
+        assert torch.equal(weight, other.policy.state.weights[name])
+
+
+def test_a_certificate_is_converted(tmp_path):
+    policy = drone_rl.load_policy("proved")
+    content = json.loads(certificate_path(policy.path).read_text())
+    content["policy"]["description"] = former_description(policy)
+    path = tmp_path / "certificate.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(InputError, match="drone-rl convert FILE"):
+        read_certificate(path)
+    convert(tmp_path)
+    converted, shipped = read_certificate(path), read_certificate(certificate_path(policy.path))
+    assert converted.policy == shipped.policy and converted.success == shipped.success
 
 
 def test_files_are_not_replaced_and_present_ones_not_converted(tmp_path):
-    path = older_export(tmp_path)
-    convert_policy(path)
+    path = former_export(tmp_path)
+    convert(path)
     with pytest.raises(InputError, match="exists"):
-        convert_policy(path)
+        convert(path)
     with pytest.raises(InputError, match="does not end in"):
-        convert_policy(path, tmp_path / "a.pt")
+        convert(path, tmp_path / "a.pt")
     with pytest.raises(InputError, match="present layout"):
-        convert_policy(policy_path("good"), tmp_path / "a.safetensors")
-    (tmp_path / "b.safetensors").write_bytes(b"no policy")
-    with pytest.raises(InputError, match="can't be converted"):
-        convert_policy(tmp_path / "b.safetensors")
+        convert(policy_path("good"), tmp_path / "a.safetensors")
+    with pytest.raises(InputError, match="no files of a former layout"):
+        convert(tmp_path)
+    for name, content in {"b.safetensors": b"no policy", "b.json": b"[]", "c.json": b"{}"}.items():
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(InputError, match="can't be converted"):
+            convert(tmp_path / name)
+
+
+def test_damaged_descriptions_are_one_line(tmp_path):
+    policy = drone_rl.load_policy("good")
+    for change in ({"camera": 3}, {"task": None}, {"actions": {"kind": "eval"}}, {"network": "x"}):
+        description = {**former_description(policy), **change}
+        path = tmp_path / "a.certificate.json"
+        path.write_text(json.dumps({"policy": {"description": description}}))
+        with pytest.raises(InputError, match="can't be converted") as error:
+            convert(path)
+        assert "\n" not in str(error.value)

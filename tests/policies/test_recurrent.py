@@ -184,7 +184,7 @@ def test_resumed_training_equals_an_uninterrupted_one(trained, tmp_path):
     silent = {"progress": lambda *_: None}
     drone_rl.train(SETTINGS, trainer=half, folder=tmp_path, **silent)
     again = drone_rl.train(folder=tmp_path, resume=True, trainer=SETTINGS.trainer, **silent)
-    one, other = (load_policy(t.folder).state["policy"] for t in (trained, again))
+    one, other = (load_policy(t.folder).state.weights for t in (trained, again))
     assert one.keys() == other.keys()
     assert all(torch.equal(one[name], other[name]) for name in one)
 
@@ -193,7 +193,7 @@ def test_act_remembers_until_reset(trained):
     """`act` takes the actions of an episode, and others if it is reset before each."""
     policy = load_policy(trained.folder)
     with torch.no_grad():  # so that actions depend on the state
-        policy.state["policy"]["logits.weight"].mul_(300)
+        policy.state.weights["logits.weight"].mul_(300)
     with policy.flying(1) as (env, actor), exploring(greedy=True):
         state, images, logits = env.reset(), [], []
         while not state["done"].all() and len(images) < 6:
@@ -225,7 +225,7 @@ def test_file_holds_the_policy(trained, tmp_path):
     export(load_policy(trained.folder), tmp_path / "mine.safetensors", settings)
     one, other = load_policy(trained.folder), load_policy(tmp_path / "mine.safetensors")
     assert other.description == one.description
-    assert other.description.as_dict()["network"] == {
+    assert other.description.model_dump(mode="json")["network"] == {
         **{"name": "lstm", "patch": 4, "channels": [4], "hidden": [8], "memory": 6},
     }
     first, second = (policy.make_network() for policy in (one, other))

@@ -64,17 +64,6 @@ def test_opposition_is_the_smaller_change_of_left_and_right(probs, other, expect
     assert FIVE.opposition(np.array(probs), np.array(other)) == pytest.approx(expected)
 
 
-def test_as_dict_returns_plain_values():
-    assert MOVES.as_dict() == {
-        "names": ["forward", "left", "right"],
-        "order": [1, 0, 2],
-        "arrows": [[0.0, 1.0], [-1.0, 0.0], [1.0, 0.0]],
-        "mirrored": [0, 2, 1],
-        "left": 1,
-        "colors": [[204, 121, 167], [230, 159, 0], [0, 114, 178]],
-    }
-
-
 def test_moves_in_three_dimensions_extend_the_chapters():
     from drone_rl.sim.actions import DIRECTIONS_3D, MOVES, MOVES_3D
 

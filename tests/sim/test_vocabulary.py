@@ -3,7 +3,7 @@
 import pytest
 
 from drone_rl.sim import actions
-from drone_rl.sim.vocabulary import CUBES, MOST, SHOWN_MOVES, TaskVocabulary, shown_actions
+from drone_rl.sim.vocabulary import CUBES, MOST, SHOWN_MOVES, ShownActions, TaskVocabulary
 from drone_rl.utils.errors import InputError
 
 
@@ -39,8 +39,7 @@ def test_invalid_vocabulary_raises(change):
 
 
 def test_moves_are_the_default_display():
-    display = shown_actions({"actions": actions.MOVES.as_dict()})
-    assert display == SHOWN_MOVES == shown_actions({"name": "an older one"})
+    assert actions.MOVES.shown == SHOWN_MOVES
     assert [SHOWN_MOVES.css(i) for i in range(3)] == ["#cc79a7", "#e69f00", "#0072b2"]
 
 
@@ -48,7 +47,7 @@ def test_moves_are_the_default_display():
     ("change", "message"),
     [
         ({"names": ["a", "a", "b"]}, "give 3 different names, and the index of each once"),
-        ({"order": [0, 1, 1]}, "order=.*0, 1, 1.* or a name is invalid"),
+        ({"order": [0, 1, 1]}, r"order=\[0,1,1\] or a name is invalid"),
         ({"arrows": [[0, 1]]}, "an arrow and a color"),
         ({"colors": [[0, 0, 256]] * 3}, "must be"),
         ({"colors": "red"}, "must"),
@@ -58,4 +57,4 @@ def test_moves_are_the_default_display():
 )
 def test_invalid_displays_raise(change, message):
     with pytest.raises(InputError, match=message):
-        shown_actions({"actions": {**actions.MOVES.as_dict(), **change}})
+        ShownActions.read({**SHOWN_MOVES.model_dump(), **change})

@@ -36,7 +36,7 @@ def trained(tmp_path_factory):
 
 
 def weights(folder):
-    return drone_rl.load_policy(folder).state["policy"]
+    return drone_rl.load_policy(folder).state.weights
 
 
 def test_training_writes_the_same_files_as_the_command(trained):
@@ -228,9 +228,9 @@ def test_signal_ends_a_loop_of_trainings(tmp_path, number, statuses):
     assert done.returncode in statuses, done.stderr
     assert ("KeyboardInterrupt: training stopped" in done.stderr) == (number == signal.SIGINT)
     assert [path.name for path in tmp_path.iterdir()] == ["run0"]
-    state = drone_rl.load_policy(tmp_path / "run0").state["progress"]
+    state = drone_rl.load_policy(tmp_path / "run0").state.progress
     rows = (tmp_path / "run0" / "metrics.csv").read_text().splitlines()
-    assert state["updates"] == len(rows) - 1
+    assert state.updates == len(rows) - 1
 
 
 def test_a_finished_run_is_not_replaced(tmp_path):

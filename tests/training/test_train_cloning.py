@@ -45,7 +45,7 @@ def cloned(flights, tmp_path_factory):
 
 
 def weights(folder):
-    return drone_rl.load_policy(folder).state["policy"]
+    return drone_rl.load_policy(folder).state.weights
 
 
 def assert_same(one, other):

@@ -1,6 +1,7 @@
 """Episodes under other conditions as `shifts.json` has them, made up and not run."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -81,15 +82,22 @@ def owned(name, of):
     return axis if axis.own is None else dataclasses.replace(axis, neutral=axis.own(of))
 
 
+def subject_of(policy):
+    """What axes need of a policy."""
+    camera = policy.description.camera
+    return SimpleNamespace(task=policy.task, camera=camera, appearance=policy.appearance)
+
+
 def shifts_of(policy, *, axes=("blur", "dead_rows"), weights=None):
     """Of a policy that is good up to the third strength of each axis."""
-    of = policy.description
+    of = subject_of(policy)
     black = packed(np.zeros((of.camera.height, of.camera.width, 3), np.uint8))
     third = {name: (owned(name, of), of, AXES[name].strengths[2]) for name in axes}
     return Robustness(
         policy=policy.name,
         network=NetworkIdentity(
-            weights=weights or fingerprint(policy.state["policy"]), description=of.as_dict()
+            weights=weights or fingerprint(policy.state.weights),
+            description=policy.description.model_dump(mode="json"),
         ),
         settings=ShiftSettings(seed=0),
         seed=0,

@@ -8,6 +8,7 @@ from drone_rl.config import PillarsSettings
 from drone_rl.trust.axes import AXES, FACTORS, GROUPS, INVERSE, LINEAR, Axis, check_axes, find_axes
 from drone_rl.trust.perturbations import Condition
 from drone_rl.utils.errors import InputError
+from tests.trust.making import subject_of
 from tests.trust.subjects import subject
 
 
@@ -97,7 +98,7 @@ def test_strength_at_a_position():
 
 @pytest.mark.parametrize("name", list(AXES))
 def test_strength_of_a_value(name):
-    of, one = drone_rl.load_policy("good").description, AXES[name]
+    of, one = subject_of(drone_rl.load_policy("good")), AXES[name]
     for strength in one.strengths:
         assert one.strength(one.value(strength, of), of) == pytest.approx(strength)
     assert one.strength(math.inf, of) == math.inf

@@ -7,11 +7,13 @@ import pytest
 import drone_rl
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.commands import HeldOutSettings
-from drone_rl.policies.zoo import certificate_path
+from drone_rl.policies.zoo import TrainingProgress, certificate_path
 from drone_rl.sweeps.manifest import Run, Sweep
 from drone_rl.sweeps.rows import choice_in_sweep
 from drone_rl.trust.coverage import find_domain
-from drone_rl.trust.export import Card, export, recorded_origin
+from drone_rl.trust.export import Card, export, recorded_command
+from drone_rl.trust.results import Verdict
+from drone_rl.trust.shifts_results import SavedShifts
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.claim import find_claim
 from tests.evidence import SAVED_SHIFTS, VERDICT, changed
@@ -49,16 +51,13 @@ def test_origin_of_a_run_of_a_sweep(checkpoint):
     assert chosen == {"runs": 3, "episodes": 200}
 
 
-def test_origin_of_a_single_run(checkpoint):
+def test_command_of_a_single_run(checkpoint):
     (checkpoint.parents[2] / "sweep.json").unlink()
     assert choice_in_sweep(checkpoint) is None
-    assert recorded_origin(checkpoint, {}) == ("drone-rl train seed=1", None)
-
-
-def test_origin_of_an_exported_file_is_kept(checkpoint):
-    said = {"command": "drone-rl train seed=9", "chosen": {"runs": 7, "episodes": 20}}
-    found = recorded_origin(checkpoint.with_suffix(".safetensors"), said)
-    assert found == (said["command"], said["chosen"])
+    policy = drone_rl.load_policy("good").state.replace(command="drone-rl train seed=9")
+    assert recorded_command(checkpoint, policy) == "drone-rl train seed=1"
+    exported = checkpoint.with_suffix(".safetensors")
+    assert recorded_command(exported, policy) == "drone-rl train seed=9"
 
 
 FEW = HeldOutSettings(episodes=4)
@@ -100,17 +99,11 @@ def test_card_quotes_and_copies_a_robustness_evaluation(tmp_path, name, is_good)
         assert "see mine.shifts.json, dated" in card  # and no path of this machine
 
 
-def test_origin_in_a_checkpoint_is_ignored(checkpoint):
-    (checkpoint.parents[2] / "sweep.json").unlink()
-    lie = {"command": "drone-rl train seed=9", "chosen": {"runs": 1, "episodes": None}}
-    assert recorded_origin(checkpoint, lie) == ("drone-rl train seed=1", None)
-
-
 def test_command_of_a_resumed_run(checkpoint):
     (checkpoint.parents[2] / "sweep.json").unlink()
     noted = checkpoint.parents[1] / ".hydra" / "overrides.yaml"
     noted.write_text("[seed=1, resume=outputs/a, trainer.total_frames=9]")
-    command, _ = recorded_origin(checkpoint, {})
+    command = recorded_command(checkpoint, drone_rl.load_policy("good").state)
     assert command == "drone-rl train seed=1 trainer.total_frames=9"
 
 
@@ -123,22 +116,30 @@ def test_wrong_command_is_refused_before_any_episode(tmp_path, monkeypatch):
         )
 
 
-CARD = {
-    "name": "mine",
-    "digest": "0123",
-    "command": "drone-rl train seed=7",
-    "progress": {"frames": 12345},
-    "provenance": {"versions": {"torch": "1", "torchrl": "2"}, "git_revision": "abc"},
-    "verdict": changed(VERDICT, {"greedy.shares.left": {"mean": None, "lower95": 0.0,
-                                 "upper95": 1.0, "count": 0}}),
-    "worlds": "report",
-    "seed": 5,
-    "task": {"num_cubes": 3, "cube_size": 2.5, "lateral_bound": 6.0, "vertical_bound": 0.0},
-}  # fmt: skip
+VERDICT_OF_CARD = changed(
+    VERDICT,
+    {"greedy.shares.left": {"mean": None, "lower95": 0.0, "upper95": 1.0, "count": 0}},
+)
 
 
-def lines(**changes):
-    return Card.read(changed(CARD, changes)).text().splitlines()
+def lines(shifts=None, verdict=None, **changes):
+    """Return a card, with changes of the policy file and of the verdict."""
+    about = {
+        "command": "drone-rl train seed=7",
+        "progress": TrainingProgress(frames=12345),
+        "provenance": {"versions": {"torch": "1", "torchrl": "2"}, "git_revision": "abc"},
+        "seed": 5,
+        "chosen": None,
+    }
+    policy = drone_rl.load_policy("good").state.replace(**{**about, **changes})
+    judged = Verdict.read(changed(VERDICT_OF_CARD, verdict or {}))
+    saved = None if shifts is None else SavedShifts.read(shifts)
+    return Card("mine", "0123", policy, judged, saved).text().splitlines()
+
+
+def described(**dynamics):
+    settings = DynamicsSettings(mode="simple_flight", **dynamics)
+    return drone_rl.load_policy("good").description.replace(dynamics=settings)
 
 
 def test_card():
@@ -167,13 +168,13 @@ def test_card():
         ("All figures are from 400 episodes", {}, {"worlds": "choice"}),
         ("how, is not recorded", {}, {"chosen": {"runs": 1, "episodes": None}}),
         ("one of the 7 runs of a sweep, which were compared by 20 episodes",
-         {"chosen": {"runs": 7, "episodes": 20}}, {"chosen.episodes": None}),
+         {"chosen": {"runs": 7, "episodes": 20}}, {"chosen": {"runs": 7, "episodes": None}}),
         ("a quadrotor of 1 kg in still air",
-         {"dynamics": DynamicsSettings(mode="simple_flight").values()}, {"dynamics.gusts": 1.0}),
+         {"description": described()}, {"description": described(gusts=1.0)}),
         ("nothing is known of other colors, light or sizes", {},
-         {"shifts": SAVED_SHIFTS, "verdict.certain": False}),
-        ("No episodes with sampled actions", {"verdict.sampled": None, "verdict.drawing": None},
-         {"verdict.sampled": VERDICT["sampled"]}),
+         {"shifts": SAVED_SHIFTS, "verdict": {"certain": False}}),
+        ("No episodes with sampled actions", {"verdict": {"sampled": None, "drawing": None}},
+         {"verdict": {}}),
     ],
 )  # fmt: skip
 def test_a_contradicted_claim_of_a_card_is_not_made(part, needed, against):

@@ -7,7 +7,7 @@ import torch
 
 import drone_rl
 from drone_rl.envs import Pipeline
-from drone_rl.policies.zoo import open_onnx, parse
+from drone_rl.policies.zoo import PolicyDescription, open_onnx
 from drone_rl.trust import onnx_export as exporting
 from drone_rl.trust.onnx_export import agreement
 from drone_rl.utils.errors import InputError
@@ -61,10 +61,11 @@ def test_exported_model_agrees_and_has_its_command(tmp_path):
 def test_exported_model_has_no_camera_faults(tmp_path, monkeypatch):
     monkeypatch.setattr(exporting, "_STEPS", 3)
     policy = drone_rl.load_policy("good")
-    described = policy.description.as_dict()
-    described["transforms"].insert(1, {"name": "noise", "strength": 0.2, "correlation_time": 0.0})
-    described["transforms"].insert(2, {"name": "late_frames", "frames": 2})
-    trained = dataclasses.replace(policy, description=parse(described))
+    described = policy.description.model_dump(mode="json")
+    transforms = described["inputs"]["pixels"]["transforms"]
+    transforms.insert(1, {"name": "noise", "strength": 0.2, "correlation_time": 0.0})
+    transforms.insert(2, {"name": "late_frames", "frames": 2})
+    trained = dataclasses.replace(policy, description=PolicyDescription.read(described))
     assert drone_rl.export_onnx(trained, tmp_path / "mine.onnx").difference <= 1e-5
     drone_rl.export_onnx(policy, tmp_path / "clean.onnx")
     frames = torch.randint(0, 256, (2, 25, 64, 3), dtype=torch.uint8)

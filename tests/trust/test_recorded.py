@@ -27,8 +27,10 @@ def trained(tmp_path):
     state = drone_rl.load_policy("poor").state
     folder = tmp_path / "train" / "runs" / "one"
     (folder / "checkpoints").mkdir(parents=True)
-    save_checkpoint(folder / "checkpoints" / "last.pt", {**state, "config": {}})
-    frames = state["progress"]["frames"]
+    plain = state.model_dump(include={"description", "progress", "provenance"})
+    plain |= {"policy": state.weights, "config": {}}
+    save_checkpoint(folder / "checkpoints" / "last.pt", plain)
+    frames = state.progress.frames
     result = {"reason": "solved", "frames": frames, "verdict": verdict("poor").as_dict()}
     path = folder / "result.json"
     path.write_text(json.dumps(result))

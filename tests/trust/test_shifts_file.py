@@ -23,7 +23,7 @@ def read(good, tmp_path):
     def build(changes=None, policy=good, made=None):
         plain = (made or shifts_of(good)).model_dump(mode="json")
         path.write_text(json.dumps(changed(plain, changes or {})))
-        return read_shifts(path, policy.description, policy.state["policy"])
+        return read_shifts(path, policy.description, policy.state.weights)
 
     return build
 
@@ -68,7 +68,7 @@ def test_a_damaged_file_is_refused(good, tmp_path):
     for content in ("{", "[]", "{}"):
         path.write_text(content)
         with pytest.raises(InputError, match="can't be used"):
-            read_shifts(path, good.description, good.state["policy"])
+            read_shifts(path, good.description, good.state.weights)
 
 
 @pytest.mark.parametrize("name", list(AXES))

@@ -7,6 +7,7 @@ from drone_rl.trust.results import Verdict
 from drone_rl.trust.shifts_results import Robustness, SavedShifts, find, inward
 from tests.evidence import PROOF, SAVED_SHIFTS, SHIFTS, VERDICT, changed
 
+NOISY = {"inputs": {"pixels": {"transforms": [{"name": "noise"}]}}}
 KINDS = {
     "verdict": (lambda result: Verdict.read(result).sentence, VERDICT),
     "findings": (
@@ -96,7 +97,7 @@ CLAIMS = [
      {"together.refused": "too dark"}),
     ("shifts", "A range is tested by new episodes", {}, {"domain": None}),
     ("shifts", "Without the camera faults of its training (noise)",
-     {"network": {"weights": "", "description": {"transforms": [{"name": "noise"}]}}},
+     {"network": {"weights": "", "description": NOISY}},
      {"network": None}),
     ("shifts", "Fixed seed 0", {}, {"seed_is_fixed": False}),
     ("line", "With elevation of the sun at 0 degrees it succeeds in 10.0% of episodes, "

@@ -61,7 +61,7 @@ class Prover:
         proof = proof_of(policy, LOSING[int(folder.name)])
         folder.mkdir(parents=True, exist_ok=True)
         proof.certificate.write_json(folder / "certificate.json")
-        self.weights.append(policy.state["policy"])
+        self.weights.append(policy.state.weights)
         return proof
 
 
@@ -77,7 +77,7 @@ def train(folder, how=HOW, **kwargs):
 
 
 def weights(folder):
-    return drone_rl.load_policy(folder).state["policy"]
+    return drone_rl.load_policy(folder).state.weights
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,5 @@
 """Which policies verification refuses."""
 
-import dataclasses
-
 import pytest
 import torch
 
@@ -16,7 +14,8 @@ from drone_rl.config import (
 from drone_rl.config.registry import register_transform
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs.transforms import PixelTransform
-from drone_rl.policies.zoo import describe, parse
+from drone_rl.policies.zoo import PolicyDescription, describe
+from drone_rl.policies.zoo.description import TaskDescription
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.task import MAKERS
 from drone_rl.utils.errors import InputError
@@ -48,7 +47,7 @@ def test_a_task_derived_from_cube_collection_is_refused(monkeypatch):
         name = "other_rules"
 
     monkeypatch.setitem(MAKERS, OtherRules, CollectCubes)
-    described = dataclasses.replace(describe(TrainSettings()), task=OtherRules())
+    described = describe(TrainSettings()).replace(task=TaskDescription.of(OtherRules()))
     with pytest.raises(InputError, match="only task=collect_cubes, got task=other_rules"):
         require_cubes(described, "proofs")
 
@@ -62,10 +61,10 @@ def test_a_task_derived_from_cube_collection_is_refused(monkeypatch):
     ],
 )
 def test_memory_and_camera_faults_are_refused(transform, message):
-    described = drone_rl.load_policy("good").description.as_dict()
-    described["transforms"] = [{"name": "gray"}, transform]
+    described = drone_rl.load_policy("good").description.model_dump(mode="json")
+    described["inputs"]["pixels"]["transforms"] = [{"name": "gray"}, transform]
     with pytest.raises(InputError, match=message):
-        require_cubes(parse(described), "proofs")
+        require_cubes(PolicyDescription.read(described), "proofs")
 
 
 def test_a_random_custom_transform_is_refused(registered):
@@ -74,13 +73,13 @@ def test_a_random_custom_transform_is_refused(registered):
             return obs + 0.05 * torch.randn_like(obs)
 
     registered(register_transform("grain")(Grain))
-    described = drone_rl.load_policy("good").description.as_dict()
-    described["transforms"].append({"name": "grain"})
+    described = drone_rl.load_policy("good").description.model_dump(mode="json")
+    described["inputs"]["pixels"]["transforms"].append({"name": "grain"})
     with pytest.raises(InputError, match="exact probabilities support only transforms without ch"):
-        require_cubes(parse(described), "exact probabilities")
+        require_cubes(PolicyDescription.read(described), "exact probabilities")
 
 
 def test_shipped_policies_and_constant_appearances_are_supported():
     policy = drone_rl.load_policy("good")
     for description in (policy.description, policy.in_appearance("fog").description):
-        assert require_cubes(description, "proofs") is description.task
+        assert require_cubes(description, "proofs") is description.task.parameters

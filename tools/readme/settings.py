@@ -11,7 +11,7 @@ from drone_rl.cli.main import COMMANDS, find_command
 from drone_rl.config import TASKS, BaseTaskSettings
 from drone_rl.config.configuration import Changes
 from drone_rl.config.parts import Part
-from drone_rl.utils.schema import Maybe, OneOf, Several, Span
+from drone_rl.utils.schema import OneOf, Several, Span
 from drone_rl.utils.settings import (
     Settings,
     about,
@@ -117,8 +117,8 @@ def _part(group: str, part: type[Part]) -> str:
 def _may_be(hint: Any) -> str:
     """The allowed values of an annotation, or of a kind, in words."""
     (kind, *_) = inner_types(hint)
-    if isinstance(kind, Maybe) or type(None) in typing.get_args(hint):
-        return f"{_may_be(kind.kind if isinstance(kind, Maybe) else kind)}; or null"
+    if type(None) in typing.get_args(hint):
+        return f"{_may_be(kind)}; or null"
     of = getattr(kind, "of", kind)
     if isinstance(kind, Changes):
         return f"changes to the policy's {_link(kind.of or BaseTaskSettings)}"

@@ -40,7 +40,7 @@ from drone_rl.sim.tasks import State
 from drone_rl.sim.tasks.common import PropTask
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError, did_you_mean
-from drone_rl.utils.schema import Instance, Maybe, OneOf, Several, Whole
+from drone_rl.utils.schema import Instance, OneOf, Several, Whole
 
 COASTING = 0.06
 """Seconds for which the last goals hold after a command that leaves no position to hold."""
@@ -143,7 +143,7 @@ class Drone:
         self.home = self.body.position[0].clone()
         """Starting position, metres. Shape: (3,)."""
         self.worlds, self._obstacles = worlds, obstacles
-        sensors = Maybe(Instance(SensorSettings)).read(sensors, "sensors")
+        sensors = Instance(SensorSettings | None).read(sensors, "sensors")
         self._initial = copy.deepcopy((self.body, worlds.state if worlds else None, sensors))
         self.has_api_control = True
         """Whether commands are accepted; see `enable_api_control`."""

@@ -58,7 +58,7 @@ class Recorder:
         done[-1] = self._world.is_over
         try:
             demonstration = Demonstration(
-                FlightConditions(*self._world.conditions),
+                FlightConditions(**self._world.conditions),
                 images=np.concatenate([frame.numpy() for frame in frames]),
                 actions=np.concatenate([action.numpy() for action in actions]),
                 rewards=np.array(rewards, np.float32),

@@ -9,7 +9,7 @@ import torch
 from tensordict.utils import NestedKey
 from torch import Tensor
 
-from drone_rl.config import ActionSettings, DynamicsSettings
+from drone_rl.config import DynamicsSettings
 from drone_rl.envs import Observer, base_env
 from drone_rl.envs.rollout import ActorAgent, StepContext
 from drone_rl.explanations.scenes import Scenes
@@ -22,6 +22,7 @@ from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.trust.video import probabilities, render_chase
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.settings import Settings
 
 HEIGHT, WIDTH = 144, 256
 """Pixels of the large image; AirSim's default size."""
@@ -219,11 +220,12 @@ class World:
         return base.replace(wind=(*(round(along, 9) + 0.0 for along in level), upward))
 
     @property
-    def conditions(self) -> tuple[Any, Any, DynamicsSettings, ActionSettings]:
-        """Task, camera, dynamics and actions, as demonstrations note them."""
+    def conditions(self) -> dict[str, Settings]:
+        """The fields of `FlightConditions`, under which flights are recorded."""
         policy = self.policy
         dynamics = self.flight_dynamics if self.has_dynamics else policy.dynamics
-        return policy.task, policy.description.camera, dynamics, policy.actions
+        camera, actions = policy.description.camera, policy.actions
+        return {"task": policy.task, "camera": camera, "dynamics": dynamics, "actions": actions}
 
     # Images
 

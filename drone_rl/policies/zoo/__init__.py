@@ -2,11 +2,12 @@
 
 from drone_rl.policies.zoo.description import PolicyDescription as PolicyDescription
 from drone_rl.policies.zoo.description import describe as describe
-from drone_rl.policies.zoo.description import parse as parse
+from drone_rl.policies.zoo.files import Checkpoint as Checkpoint
+from drone_rl.policies.zoo.files import SavedPolicy as SavedPolicy
+from drone_rl.policies.zoo.files import TrainingProgress as TrainingProgress
 from drone_rl.policies.zoo.files import certificate_path as certificate_path
 from drone_rl.policies.zoo.files import find_policy as find_policy
 from drone_rl.policies.zoo.files import fingerprint as fingerprint
-from drone_rl.policies.zoo.files import load_exported as load_exported
 from drone_rl.policies.zoo.files import policy_names as policy_names
 from drone_rl.policies.zoo.files import policy_path as policy_path
 from drone_rl.policies.zoo.files import read_checkpoint as read_checkpoint

@@ -1,30 +1,30 @@
-"""Description of a policy: its task, camera, transforms and network, by names and values.
+"""Description of a policy: its task, inputs, actions and network, by names and values.
 
 Checkpoints, exported files and run folders contain the same description. It is all that is needed
 to build a policy, and all that a file can request.
 """
 
-import dataclasses
 import math
 from collections.abc import Mapping
-from typing import Any, Unpack
+from typing import Annotated, Any, Literal, Self, Unpack
 
+import pydantic
 import torch
+from annotated_types import MaxLen, MinLen
 from torchrl.envs import EnvBase, InitTracker
 from torchrl.envs import Transform as TorchrlTransform
 
 from drone_rl.config import (
     COMPUTER_VISION,
     MINIMAL,
-    MOVES_SETTINGS,
     ActionSettings,
     AppearanceSettings,
     BaseTaskSettings,
     CameraSettings,
     DynamicsSettings,
 )
+from drone_rl.config.dynamics import Axis
 from drone_rl.config.networks import Lstm, Network
-from drone_rl.config.parts import Part, Parts
 from drone_rl.config.registry import own_place
 from drone_rl.config.training import TrainSettings
 from drone_rl.config.transforms import MOST_TRANSFORMS, Fault, Frame, Stack, Transform
@@ -35,54 +35,173 @@ from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import Dynamics, make_dynamics
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.models import Model
 from drone_rl.utils.plugins import described, errors_of
-from drone_rl.utils.schema import Plain, Several, as_mapping, shown
+from drone_rl.utils.schema import Text, shown
 from drone_rl.utils.seeding import Stream, as_global_stream, plain_generator
 from drone_rl.utils.settings import Settings
 
 FORMAT = "drone_rl policy"
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 MAX_PARAMETERS = 2**24
 """Of a network: 64 MiB."""
 MAX_PIXELS = 2**18
 """Of a camera's frame."""
 MAX_NUMBERS = 2**20
 """Of one image after any transform."""
-_KEYS = ("format", "format_version", "task", "camera", "transforms", "network")
-_OPTIONAL: dict[str, tuple[type[Settings], Settings]] = {
-    "appearance": (AppearanceSettings, MINIMAL),
-    "dynamics": (DynamicsSettings, COMPUTER_VISION),
-    "actions": (ActionSettings, MOVES_SETTINGS),
-}
-"""The keys that may be missing, with what they then mean."""
+Name = Annotated[str, Text(200)]
+IMAGE = "pixels"
+"""Name of the image among the inputs, see `Observer.observe`."""
 
 
-@dataclasses.dataclass(frozen=True)
-class PolicyDescription:
-    """Task, camera, transforms and network of a policy; in bounds, and its parts fit together.
+def _by_name(part: Any) -> Any:
+    if isinstance(part, Mapping) and "_target_" in part:
+        target = shown(part["_target_"])
+        raise InputError(f"_target_={target} is refused; files name registered parts alone")
+    return part
+
+
+class Source(Model):
+    """A file from which a task is built, which policy files identify but do not contain."""
+
+    name: Name
+    hash: Annotated[str, pydantic.Field(pattern="^[0-9a-f]{64}$")] | None = None
+    """SHA-256 of its content."""
+
+
+class TaskDescription(Model):
+    """A task: its registered name, its settings, and what else it is built from."""
+
+    name: Name
+    parameters: BaseTaskSettings
+    """Its settings."""
+    rewards: dict[Name, float] = {}
+    """Weights of the reward's terms; empty for a task that computes its reward as a whole."""
+    scene: Source | None = None
+    """The scene's file; None for a scene that the task composes."""
+    code: Source | None = None
+    """The file that registers the task; None for a task of an imported module."""
+
+    @classmethod
+    def of(cls, settings: BaseTaskSettings) -> Self:
+        """Return the description of a task with some settings."""
+        return cls(name=settings.name, parameters=settings)
+
+    @pydantic.field_validator("parameters", mode="before")
+    @classmethod
+    def _of_named_task(cls, values: Any, info: pydantic.ValidationInfo) -> Any:
+        if isinstance(values, BaseTaskSettings):
+            return values
+        if not isinstance(values, Mapping):
+            raise InputError("it must be a mapping from names to values")
+        return {**values, "name": info.data.get("name")}
+
+    @pydantic.field_serializer("parameters")
+    def _without_name(self, parameters: BaseTaskSettings) -> dict[str, Any]:
+        return Settings.values(parameters)
+
+    @pydantic.model_validator(mode="after")
+    def _check(self) -> Self:
+        if unsupported := [n for n in ("rewards", "scene", "code") if getattr(self, n)]:
+            raise InputError(
+                f"{unsupported[0]} is not supported; use the version of drone_rl that wrote it"
+            )
+        return self
+
+
+class Camera(Model):
+    """A camera on the drone."""
+
+    name: Literal["front"] = "front"
+    horizontal_fov: float
+    """Horizontal field of view, degrees."""
+
+
+class ImageInput(Model):
+    """An input that is an image: who takes it, and what is done with it."""
+
+    kind: Literal["image"] = "image"
+    camera: Camera
+    size: tuple[int, int]
+    """Height and width of the camera's frame, pixels."""
+    transforms: Annotated[
+        tuple[Annotated[Transform, pydantic.BeforeValidator(_by_name)], ...],
+        MaxLen(MOST_TRANSFORMS),
+    ]
+    """In the order in which they are applied."""
+
+    @classmethod
+    def of(cls, camera: CameraSettings, transforms: tuple[Transform, ...]) -> Self:
+        """Return the input of a policy with such a camera."""
+        return cls(
+            camera=Camera(horizontal_fov=camera.horizontal_fov),
+            size=(camera.height, camera.width),
+            transforms=transforms,
+        )
+
+    @property
+    def settings(self) -> CameraSettings:
+        """Settings of the camera and its frame."""
+        height, width = self.size
+        fov = self.camera.horizontal_fov
+        return CameraSettings(height=height, width=width, horizontal_fov=fov)
+
+    @pydantic.model_validator(mode="after")
+    def _check(self) -> Self:
+        pixels = self.settings.width * self.settings.height
+        if pixels > MAX_PIXELS:
+            raise InputError(f"camera has {pixels} pixels; give at most {MAX_PIXELS}")
+        return self
+
+
+class ActionSpace(Model):
+    """The actions: what builds them, and their axes for other programs."""
+
+    settings: ActionSettings
+    axes: tuple[Axis, ...]
+
+    @classmethod
+    def of(cls, settings: ActionSettings) -> Self:
+        """Return the action space of some settings."""
+        return cls(settings=settings, axes=settings.axes)
+
+    @pydantic.model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.axes != self.settings.axes:
+            raise InputError("axes are not those of the settings; write the file again")
+        return self
+
+
+class PolicyDescription(Model):
+    """Task, inputs, actions and network of a policy; in bounds, and its parts fit together.
 
     Raises:
         InputError: They don't fit, or together exceed a bound.
     """
 
-    task: BaseTaskSettings
-    camera: CameraSettings
-    transforms: tuple[Transform, ...]
-    """In the order in which they are applied."""
-    network: Network
+    format: Literal["drone_rl policy"] = FORMAT
+    format_version: Literal[3] = FORMAT_VERSION
+    task: TaskDescription
+    inputs: Annotated[dict[Literal["pixels"], ImageInput], MinLen(1)]
+    """By name, as the `Observer` returns them."""
+    actions: ActionSpace
+    network: Annotated[Network, pydantic.BeforeValidator(_by_name)]
     appearance: AppearanceSettings = MINIMAL
-    """Appearance of the scenes; files without it mean the minimal one."""
+    """Appearance of the scenes in training."""
     dynamics: DynamicsSettings = COMPUTER_VISION
-    """The vehicle dynamics; files without it mean computer-vision mode."""
-    actions: ActionSettings = MOVES_SETTINGS
-    """The action space; files without it mean moves."""
+    """The vehicle dynamics in training."""
 
-    def __post_init__(self) -> None:
+    @pydantic.field_validator("format_version", mode="before")
+    @classmethod
+    def _refuse_former(cls, version: Any) -> Any:
+        if version == FORMAT_VERSION - 1:
+            raise InputError("it is a former layout; convert the file: drone-rl convert FILE")
+        return version
+
+    @pydantic.model_validator(mode="after")
+    def _check(self) -> Self:
         """Check that it can be built with bounded memory."""
         self.dynamics.check_air()
-        pixels = self.camera.width * self.camera.height
-        if pixels > MAX_PIXELS:
-            raise InputError(f"camera has {pixels} pixels; give at most {MAX_PIXELS}")
         if not self.input.is_float:
             raise InputError("the network needs floats; add a transform such as gray")
         expected = self.expected_weights()
@@ -91,6 +210,22 @@ class PolicyDescription:
             raise InputError(
                 f"the network has {count} parameters; give sizes that make at most {MAX_PARAMETERS}"
             )
+        return self
+
+    @property
+    def image(self) -> ImageInput:
+        """The image among the inputs."""
+        return self.inputs[IMAGE]
+
+    @property
+    def camera(self) -> CameraSettings:
+        """The camera of the image."""
+        return self.image.settings
+
+    @property
+    def transforms(self) -> tuple[Transform, ...]:
+        """The transforms of the image."""
+        return self.image.transforms
 
     @property
     def input(self) -> Frame:
@@ -120,24 +255,10 @@ class PolicyDescription:
         """Names of the transforms that simulate camera faults."""
         return tuple(t.name for t in self.transforms if isinstance(t, Fault))
 
-    def without_faults(self) -> "PolicyDescription":
+    def without_faults(self) -> Self:
         """Return the same description without camera faults."""
         sound = tuple(t for t in self.transforms if not isinstance(t, Fault))
-        return dataclasses.replace(self, transforms=sound)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain data as in files; `parse` is the inverse."""
-        chosen = {name: getattr(self, name) for name in _OPTIONAL}
-        special = {n: s.values() for n, s in chosen.items() if s != _OPTIONAL[n][1]}
-        return {
-            "format": FORMAT,
-            "format_version": FORMAT_VERSION,
-            "task": self.task.values(),
-            "camera": self.camera.values(),
-            "transforms": [_as_dict(transform) for transform in self.transforms],
-            "network": _as_dict(self.network),
-            **special,
-        }
+        return self.replace(inputs={IMAGE: self.image.replace(transforms=sound)})
 
     def build_env(
         self,
@@ -156,11 +277,11 @@ class PolicyDescription:
         parts: Any = {"appearance": self.appearance, **options}
         parts["dynamics"] = options.get("dynamics") or self.dynamics
         if isinstance(parts["dynamics"], DynamicsSettings):  # others have actions of their own
-            parts.setdefault("actions", self.actions)
+            parts.setdefault("actions", self.actions.settings)
         transforms = self.make_transforms() if options.get("pixels", True) else ()
         env = DroneEnv(
             num_envs,
-            task or self.task,
+            task or self.task.parameters,
             self.camera,
             transforms=transforms,
             seed=seed,
@@ -172,7 +293,8 @@ class PolicyDescription:
 
     def make_dynamics(self) -> Dynamics:
         """Return the vehicle dynamics."""
-        return make_dynamics(as_task(self.task).make_dynamics, self.dynamics, self.actions)
+        default = as_task(self.task.parameters).make_dynamics
+        return make_dynamics(default, self.dynamics, self.actions.settings)
 
     def make_transforms(self) -> list[TorchrlTransform]:
         """Build the transforms in order, then those that carry the state of a recurrent network."""
@@ -246,11 +368,12 @@ def describe(settings: TrainSettings) -> PolicyDescription:
                 f"register it with drone_rl.register_{kind} and give plugins=[MODULE]"
             )
     return PolicyDescription(
-        settings.task,
-        settings.camera,
-        settings.transforms,
-        settings.network,
-        **{name: getattr(settings, name) for name in _OPTIONAL},
+        task=TaskDescription.of(settings.task),
+        inputs={IMAGE: ImageInput.of(settings.camera, settings.transforms)},
+        actions=ActionSpace.of(settings.actions),
+        network=settings.network,
+        appearance=settings.appearance,
+        dynamics=settings.dynamics,
     )
 
 
@@ -282,45 +405,3 @@ def _check_returned(output: Any, who: str, images: torch.Tensor, wanted: Any) ->
             f"{who} returns {described(output)} for input of shape {tuple(images.shape)}; return a "
             f"tensor of shape {wanted}"
         )
-
-
-def parse(data: Any) -> PolicyDescription:
-    """Read a description from plain data, strictly.
-
-    Raises:
-        InputError: A key is missing or unknown, a value has another type or is out of bounds.
-    """
-    data = as_mapping(data, "the policy's description")
-    if data.get("format") != FORMAT:
-        raise InputError(f"format={shown(data.get('format'))} is not that of a policy: {FORMAT}")
-    version = data.get("format_version")
-    if type(version) is not int or version != FORMAT_VERSION:
-        raise InputError(
-            f"format_version={shown(version)}: this program reads "
-            f"{FORMAT_VERSION}; use the version of drone_rl that wrote it"
-        )
-    if (keys := set(data) - set(_OPTIONAL)) != set(_KEYS):
-        names = ", ".join(shown(key) for key in sorted(keys ^ set(_KEYS)))
-        raise InputError(
-            f"the policy's description needs {', '.join(_KEYS)}; missing or unknown: {names}"
-        )
-    special: dict[str, Any] = {
-        name: of.read(data[name], name) for name, (of, _) in _OPTIONAL.items() if name in data
-    }
-    parts = (
-        data["network"],
-        *Several(Plain(), 0, MOST_TRANSFORMS).read(data["transforms"], "transforms"),
-    )
-    if any("_target_" in as_mapping(part, "a part") for part in parts):
-        raise InputError("the policy's description has _target_; files name registered parts alone")
-    return PolicyDescription(
-        BaseTaskSettings.read(data["task"], "task"),
-        CameraSettings.read(data["camera"], "camera"),
-        Parts(Transform, MOST_TRANSFORMS).read(data["transforms"], "transforms"),
-        Network.read(data["network"], "network"),
-        **special,
-    )
-
-
-def _as_dict(part: Part) -> dict[str, Any]:
-    return {"name": part.name, **part.values()}

@@ -1,52 +1,105 @@
 """Policies in files: descriptions, weights and provenance."""
 
+import dataclasses
 import hashlib
-import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar, Self
 
 import torch
+from pydantic import ConfigDict, Field, model_validator
 from safetensors import SafetensorError
 from safetensors.torch import load, save
 
-from drone_rl.policies.zoo.description import FORMAT, MAX_PARAMETERS, parse
+from drone_rl.policies.zoo.description import FORMAT, MAX_PARAMETERS, Name, PolicyDescription
 from drone_rl.utils.checkpoint import check_weights, load_checkpoint, other_format
 from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.files import last_of, parse_json, read_bytes, trained_policies
+from drone_rl.utils.models import Model
 from drone_rl.utils.overrides import COMMAND
-from drone_rl.utils.schema import Maybe, Plain, Real, Record, Text, Whole, as_mapping
+from drone_rl.utils.provenance import Provenance
+from drone_rl.utils.schema import Plain, Real, Whole, as_mapping
 
 MAX_HEADER = 2**20
 """Bytes of the header of an exported file."""
 _FOLDER = Path(__file__).resolve().parent
-_COUNT = Whole(0, 2**62)
-_PROGRESS = Record(
-    {
-        "frames": _COUNT,
-        "episodes": _COUNT,
-        "updates": _COUNT,
-        "seconds": Real(0.0, 1e12),
-        "running_reward": Real(-1e15, 1e15),
-    }
-)
-_PROVENANCE = Record(
-    {"versions": Plain(), "git_revision": Maybe(Text(200)), "machine": Plain()},
-    optional=frozenset({"machine"}),
-)
-ABOUT = Record(
-    {
-        "progress": _PROGRESS,
-        "provenance": _PROVENANCE,
-        "command": Maybe(COMMAND),
-        "verdict": Plain(),
-        "worlds": Text(20),
-        "seed": Whole(0),
-        "chosen": Maybe(Record({"runs": _COUNT, "episodes": Maybe(_COUNT)})),
-    },
-    optional=frozenset({"verdict", "worlds", "seed", "chosen"}),
-)
-"""What an exported file contains about the training and the verdict of its policy."""
+_Count = Annotated[int, Whole(0, 2**62)]
+
+
+@dataclasses.dataclass
+class TrainingProgress:
+    """Progress of a training run."""
+
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
+    frames: _Count = 0
+    episodes: _Count = 0
+    updates: _Count = 0
+    seconds: Annotated[float, Real(0.0, 1e12)] = 0.0
+    """Time spent, over all resumptions."""
+    running_reward: Annotated[float, Real(-1e15, 1e15)] = 0.0
+    """Running mean of the episodes' rewards, from 0, as in the original study."""
+
+
+class Choice(Model):
+    """How a policy was chosen in a sweep."""
+
+    runs: _Count
+    """Number of runs in the sweep."""
+    episodes: _Count | None
+    """Number of episodes by which they were compared; None if it was not judged there."""
+
+
+class SavedPolicy(Model):
+    """A policy in a file: its description, its weights and where it is from.
+
+    Raises:
+        InputError: The weights are not finite, or not those of the described network.
+    """
+
+    description: PolicyDescription
+    weights: Annotated[dict[str, Any], Field(exclude=True, repr=False)]
+    """Tensors by name."""
+    progress: TrainingProgress
+    """Progress of its training."""
+    provenance: Provenance
+    command: Annotated[str, COMMAND] | None = None
+    """The training command."""
+    verdict: Annotated[dict[str, Any], Plain()] | None = None
+    """The verdict of its model card."""
+    worlds: Name | None = None
+    """Stream of the verdict's environments."""
+    seed: _Count | None = None
+    """Root of their streams."""
+    chosen: Choice | None = None
+    """None outside a sweep."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        check_weights(self.weights, self.description.expected_weights())
+        return self
+
+    def to_bytes(self) -> bytes:
+        """Return the content of an exported file; `parse_exported` is the inverse.
+
+        Raises:
+            SafetensorError: The weights can't be written.
+        """
+        layout = torch.contiguous_format
+        contiguous = {n: value.clone(memory_format=layout) for n, value in self.weights.items()}
+        return save(contiguous, {"format": FORMAT, "policy": self.model_dump_json()})
+
+
+class Checkpoint(SavedPolicy, extra="allow"):
+    """A policy in a checkpoint, with what its training needs to resume."""
+
+    config: Annotated[dict[str, Any], Plain()]
+    """Settings of the training, as of `TrainSettings.config`."""
+
+    @property
+    def training(self) -> dict[str, Any]:
+        """The state of the training: see `Trainer.state_dict`, and entries of the callbacks."""
+        progress = dataclasses.asdict(self.progress)
+        return {**(self.model_extra or {}), "policy": self.weights, "progress": progress}
 
 
 def policy_names() -> list[str]:
@@ -100,57 +153,14 @@ def _companion(policy: Path, name: str) -> Path:
     return policy.absolute().parent.parent / name
 
 
-def read_policy(path: Path) -> dict[str, Any]:
+def read_policy(path: Path) -> SavedPolicy:
     """Read a policy from a checkpoint or an exported file (.safetensors).
-
-    Returns:
-        "description" (see `drone_rl.policies.zoo.parse`), "policy" (the weights), "progress" and
-        "provenance"; of an exported file also "command" and what `export_policy` was given
-        (not in files of old versions); of a checkpoint all of its state.
 
     Raises:
         InputError: The file is missing, damaged or something else.
     """
-    return load_exported(path) if path.suffix == ".safetensors" else read_checkpoint(path)
-
-
-def read_checkpoint(path: Path) -> dict[str, Any]:
-    """Read a checkpoint, see `read_policy`; its "config" has plain data only."""
-    state = load_checkpoint(path)
-    try:
-        return checked_state(state)
-    except InputError as error:
-        raise InputError(f"checkpoint {path} can't be used: {error}") from None
-
-
-def checked_state(state: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the state of a checkpoint; raise an `InputError` if its policy is unusable."""
-    for key in ("policy", "progress", "provenance", "config"):
-        if key not in state:
-            raise InputError(f"it has no {key}")
-    description = parse(state.get("description"))
-    return {
-        **state,
-        "config": Plain().read(as_mapping(state["config"], "config"), "config"),
-        "description": description.as_dict(),
-        "policy": check_weights(state["policy"], description.expected_weights()),
-        "progress": _PROGRESS.read(state["progress"], "progress"),
-        "provenance": _PROVENANCE.read(state["provenance"], "provenance"),
-    }
-
-
-def exported_bytes(
-    weights: Mapping[str, torch.Tensor], description: Mapping[str, Any], about: Mapping[str, Any]
-) -> bytes:
-    """Return the content of a file with weights, description and provenance."""
-    layout = torch.contiguous_format
-    contiguous = {name: value.clone(memory_format=layout) for name, value in weights.items()}
-    metadata = {"description": json.dumps(description), "about": json.dumps(about)}
-    return save(contiguous, {"format": FORMAT, **metadata})
-
-
-def load_exported(path: Path) -> dict[str, Any]:
-    """Read an exported policy, see `read_policy`."""
+    if path.suffix != ".safetensors":
+        return read_checkpoint(path)
     content = read_exported_bytes(path)
     try:
         return parse_exported(content)
@@ -161,28 +171,46 @@ def load_exported(path: Path) -> dict[str, Any]:
         ) from None
 
 
+def read_checkpoint(path: Path) -> Checkpoint:
+    """Read a checkpoint, see `read_policy`."""
+    state = load_checkpoint(path)
+    try:
+        return parse_checkpoint(state)
+    except InputError as error:
+        raise InputError(f"checkpoint {path} can't be used: {error}") from None
+
+
+def parse_checkpoint(state: Mapping[str, Any]) -> Checkpoint:
+    """Return the checkpoint with such content; raise an `InputError` if it is unusable."""
+    names = {"policy": "weights"}
+    own = {names.get(k, k): v for k, v in state.items() if k not in ("format", "format_version")}
+    return Checkpoint.read(own)
+
+
 def read_exported_bytes(path: Path) -> bytes:
     """Return the content of a file that is not larger than the largest exported policy."""
     return read_bytes(path, 8 + MAX_HEADER + 4 * MAX_PARAMETERS)
 
 
-def parse_exported(content: bytes) -> dict[str, Any]:
-    """Return an exported policy, see `read_policy`, from the content of its file."""
-    data, about = metadata_of(content)
-    description = parse(data)
+def parse_exported(content: bytes) -> SavedPolicy:
+    """Return an exported policy from the content of its file."""
+    text = metadata_of(content).get("policy")
+    if not isinstance(text, str):
+        raise InputError("it has a former layout")
+    about = as_mapping(parse_json(text, "its description"), "its description")
+    return SavedPolicy.read({**about, "weights": weights_of(content)})
+
+
+def weights_of(content: bytes) -> dict[str, torch.Tensor]:
+    """Return the tensors in the content of an exported file."""
     try:
-        weights = load(content)
+        return load(content)
     except (SafetensorError, ValueError, KeyError, TypeError, RuntimeError) as error:
         raise InputError(f"its weights are damaged ({str(error)[:100]})") from None
-    return {
-        "description": description.as_dict(),
-        "policy": check_weights(weights, description.expected_weights()),
-        **ABOUT.read(about, "about"),
-    }
 
 
-def metadata_of(content: bytes) -> tuple[Any, Any]:
-    """Return the plain data of an exported file, unchecked: its description, and `ABOUT`."""
+def metadata_of(content: bytes) -> Mapping[str, Any]:
+    """Return the metadata of an exported file, unchecked texts by name."""
     size = int.from_bytes(content[:8], "little")
     if not 2 <= size <= min(MAX_HEADER, len(content) - 8):
         other = None if content[8:9] == b"{" else other_format(content)
@@ -191,12 +219,7 @@ def metadata_of(content: bytes) -> tuple[Any, Any]:
     metadata = as_mapping(header.get("__metadata__", {}), "metadata")
     if metadata.get("format") != FORMAT:
         raise InputError("it is not a drone_rl policy")
-    texts = {key: metadata.get(key) for key in ("description", "about")}
-    for key, text in texts.items():
-        if not isinstance(text, str):
-            raise InputError(f"its {key} is missing")
-    description, about = (parse_json(str(text), f"its {key}") for key, text in texts.items())
-    return description, about
+    return metadata
 
 
 def fingerprint(weights: Mapping[str, torch.Tensor]) -> str:

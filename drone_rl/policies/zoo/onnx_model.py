@@ -59,8 +59,8 @@ def make_onnx(
     parts, see `Actions.probabilities`, and a second output is "action", float32 (N, 3). A recurrent
     model has further inputs, "hidden" and "cell", float32 (N, 1, size), zero when an episode
     starts, and further outputs, "next_hidden" and "next_cell", to pass with the next frame. The
-    metadata are JSON: the description by its keys, but with its settings of actions, if any, as
-    "action_settings"; "actions", names in the order of the first output; and `about`.
+    metadata are JSON: "description", as in policy files; "actions", names in the order of the first
+    output; and `about`.
 
     Raises:
         InputError: The policy needs several frames, a package is missing, or ONNX lacks a part.
@@ -93,11 +93,10 @@ def make_onnx(
         ) from error
     assert program is not None  # torch returns None only with dynamo=False
     passes.ClearMetadataAndDocStringPass()(program.model)  # the exporter's own notes
-    described = description.as_dict()
-    if "actions" in described:  # that key has the names
-        described["action_settings"] = described.pop("actions")
-    metadata = {**described, "actions": list(network.actions.names), **about}
-    program.model.metadata_props.update({key: json.dumps(v) for key, v in metadata.items()})
+    metadata = {"actions": list(network.actions.names), **about}
+    texts = {key: json.dumps(value) for key, value in metadata.items()}
+    texts["description"] = description.model_dump_json()
+    program.model.metadata_props.update(texts)
     return program.model_proto.SerializeToString()
 
 

@@ -14,7 +14,7 @@ from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.dynamics.quadrotor import Quadrotor
 from drone_rl.sim.dynamics.state import BodyState, Obstacles, heading_of
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Instance, Maybe, shown
+from drone_rl.utils.schema import Instance, shown
 
 
 class Dynamics(Protocol):
@@ -106,7 +106,7 @@ def make_dynamics(
     without settings. Raises an `InputError` if both dynamics and settings of actions are given, or
     they don't fit each other.
     """
-    actions = Maybe(Instance(ActionSettings)).read(actions, "actions")
+    actions = Instance(ActionSettings | None).read(actions, "actions")
     if dynamics is not None and not isinstance(dynamics, DynamicsSettings):
         if isinstance(dynamics, type) or not hasattr(dynamics, "step"):
             raise InputError(

@@ -29,7 +29,7 @@ from drone_rl.sim.tasks.common import (
     side_of,
 )
 from drone_rl.sim.tasks.task import Goals, Grid, OracleRule, State, register_task
-from drone_rl.sim.vocabulary import CUBES, some_cubes
+from drone_rl.sim.vocabulary import CUBES
 from drone_rl.utils.errors import InputError
 
 
@@ -92,7 +92,7 @@ class CollectCubes(PropTask[WorldState]):
         self.largest_reward = float(settings.num_cubes)
         self.drone_size = settings.drone_size
         self.origin = (0.0, 0.0, settings.altitude)
-        self.vocabulary = CUBES.replace(tested=some_cubes(settings.values()))
+        self.vocabulary = CUBES.replace(tested=_some_cubes(settings))
         actions = MOVES_3D if settings.must_climb else MOVES
         self.oracle = OracleRule(("drone", "cube_positions", "next_cube"), self.line_up, actions)
 
@@ -364,3 +364,12 @@ def turn_towards(lateral: Tensor, tolerance: float) -> Tensor:
 def inflated(boxes: NDArray[np.float64], metres: float, bound: float) -> NDArray[np.float64]:
     """Return boxes, (N, num_cubes, 2), extended by metres at both ends, clipped to the bound."""
     return np.clip(boxes + np.array([-metres, metres]), -bound, bound)
+
+
+def _some_cubes(task: TaskSettings) -> str:
+    names = {1: "one cube", 2: "two cubes", 3: "three cubes", 4: "four cubes", 5: "five cubes"}
+    cubes = names.get(task.num_cubes, f"{task.num_cubes} cubes")
+    return (
+        f"{cubes} of {task.cube_size:g} m, up to {task.lateral_bound:g} m to either side "
+        f"and {task.vertical_bound:g} m up or down"
+    )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field, PlainSerializer, PlainValidator, model_validator
 
 from drone_rl.config import BaseTaskSettings, TaskSettings
-from drone_rl.policies.zoo import PolicyDescription, fingerprint, parse
+from drone_rl.policies.zoo import PolicyDescription, fingerprint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path
 from drone_rl.utils.limits import CERTIFICATE_BYTES
@@ -31,10 +31,6 @@ def _as_array(value: Any) -> NDArray[np.float64]:
         return np.array(value)
     except ValueError:  # of lists of different lengths
         return np.array("")
-
-
-def _as_description(value: Any) -> PolicyDescription:
-    return value if isinstance(value, PolicyDescription) else parse(value)
 
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -98,11 +94,7 @@ class Subject(Model):
     """Its name, for display."""
     weights: Annotated[str, Field(max_length=64)]
     """Hash of its weights, see `fingerprint`."""
-    description: Annotated[
-        PolicyDescription,
-        PlainValidator(_as_description),
-        PlainSerializer(PolicyDescription.as_dict, return_type=dict),
-    ]
+    description: PolicyDescription
     """Its description, with the task of the certificate."""
 
 
@@ -225,7 +217,10 @@ def read_certificate(path: Path) -> Certificate:
     Raises:
         InputError: The file is missing, too large, damaged or not a certificate.
     """
-    return Certificate.read_json(path, CERTIFICATE_BYTES)
+    try:
+        return Certificate.read_json(path, CERTIFICATE_BYTES)
+    except InputError as error:
+        raise InputError(f"certificate {path} can't be used: {error}") from None
 
 
 def check_same_policy(
@@ -247,9 +242,9 @@ def check_same_policy(
             f"the certificate is for a network with hash {certificate.policy.weights[:12]}..., but "
             f"the policy's has {policy_hash[:12]}...; set policy to the file that was proved"
         )
-    stated, own_parts = certificate.policy.description.as_dict(), described.as_dict()
+    stated = certificate.policy.description
     for part in ("appearance", "dynamics", "actions", "camera", "transforms", "network"):
-        if stated.get(part) != own_parts.get(part):
+        if getattr(stated, part) != getattr(described, part):
             raise InputError(
                 f"the certificate and the policy differ in {part}; set policy to the file that was "
                 "proved"

@@ -237,7 +237,7 @@ def read_validated(
         InputError: It can't be read, is of another policy or task, or is inconsistent.
     """
     certificate = read_certificate(path)
-    check_same_policy(certificate, described, weights, described.task)
+    check_same_policy(certificate, described, weights, described.task.parameters)
     if inconsistency := next(find_inconsistencies(certificate), None):
         raise InputError(f"certificate {path} is inconsistent: {inconsistency}; prove again")
     return certificate

@@ -162,7 +162,7 @@ def test_a_training_with_flight_dynamics_describes_a_policy(settings):
     made = settings("train", "dynamics=quadrotor", "dynamics.wind=[5,0,0]", "actions.move_speed=2")
     assert made.dynamics == DynamicsSettings(mode="simple_flight", wind=(5.0, 0.0, 0.0))
     described = describe(made.as_base(TrainSettings))
-    assert (described.dynamics, described.actions.move_speed) == (made.dynamics, 2.0)
+    assert (described.dynamics, described.actions.settings.move_speed) == (made.dynamics, 2.0)
     assert settings("train", "dynamics=quadrotor", "dynamics.mode=computer_vision") == settings(
         "train"
     )

@@ -38,7 +38,7 @@ def test_steps_of_a_person_become_a_demonstration(make_flight, written, tmp_path
     assert np.array_equal(one.images[0], frame.numpy())
     assert one.rewards.tolist() == [0.0, 0.0, 0.0] and one.rewards.dtype == np.float32
     assert one.done.tolist() == [False, False, False]
-    assert one.conditions == demonstrations.FlightConditions(*flight.world.conditions)
+    assert one.conditions == demonstrations.FlightConditions(**flight.world.conditions)
 
 
 def test_recording_switches_to_the_policys_actions(make_flight, written):
@@ -97,6 +97,6 @@ def test_files_are_demonstrations_that_a_training_reads(make_flight, tmp_path):
     flight.handle({"type": "record", "on": True})
     press(flight, "forward", "right")
     flight.handle({"type": "record", "on": False})
-    conditions = demonstrations.FlightConditions(*flight.world.conditions)
+    conditions = demonstrations.FlightConditions(**flight.world.conditions)
     (read,) = demonstrations.read_demonstrations(tmp_path / "demonstrations", conditions)
     assert read.actions.tolist() == [0, 2] and read.pilot == "person"

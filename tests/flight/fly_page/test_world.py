@@ -161,7 +161,7 @@ def test_wind_blows_from_its_direction(make_world):
     assert world.flight_dynamics.wind == pytest.approx((-5.0, 0.0, 0.0))
     world.set_wind(4.0, 90.0)  # from the right, to the left
     assert world.worlds.dynamics.settings.wind == pytest.approx((0.0, 4.0, 0.0), abs=1e-12)
-    assert world.conditions[2].wind == pytest.approx((0.0, 4.0, 0.0), abs=1e-12)
+    assert world.conditions["dynamics"].wind == pytest.approx((0.0, 4.0, 0.0), abs=1e-12)
 
 
 def test_the_policys_own_wind_is_the_first_one(make_world):
@@ -201,4 +201,4 @@ def test_an_action_lasts_as_long_as_its_move_takes(make_world, policy, speed, se
 @pytest.mark.parametrize("wind", [(0.0, 5.0, 0.0), (3.0, 1.0, 0.5), (0.1, -0.7, 0.0)])
 def test_demonstrations_note_the_exact_wind_of_the_policy(make_world, wind):
     policy = drone_rl.load_policy("flight").in_dynamics(wind=wind)
-    assert make_world(policy).conditions[2] == policy.dynamics
+    assert make_world(policy).conditions["dynamics"] == policy.dynamics

@@ -5,11 +5,12 @@ import copy
 import pytest
 import torch
 
-from drone_rl.config import COMPUTER_VISION, MOVES_SETTINGS, ActionSettings, AppearanceSettings
+from drone_rl.config import COMPUTER_VISION, ActionSettings, AppearanceSettings
 from drone_rl.config.registry import register_network, register_transform
 from drone_rl.envs.transforms import PixelTransform
 from drone_rl.policies import SmallCNN
-from drone_rl.policies.zoo import parse
+from drone_rl.policies.zoo import PolicyDescription
+from drone_rl.policies.zoo.description import ActionSpace
 from drone_rl.sim.dynamics import ComputerVision
 from drone_rl.utils.errors import InputError
 from tests.fake_flight import FLIGHT, floating
@@ -18,26 +19,56 @@ from tests.second_dynamics import Turning
 
 DEFAULT = {
     "format": "drone_rl policy",
-    "format_version": 2,
+    "format_version": 3,
     "task": {
-        "num_cubes": 3,
-        "first_distance": 15.0,
-        "spacing": 9.0,
-        "lateral_bound": 6.0,
-        "vertical_bound": 0.0,
-        "cube_size": 2.5,
-        "cube_color": [0.75, 0.12, 0.08],
-        "drone_size": 0.8,
-        "altitude": 2.5,
-        "step_length": 1.0,
-        "step_limit": 300,
-        "front_margin": 11.0,
-        "side_margin": 20.0,
+        "name": "collect_cubes",
+        "parameters": {
+            "num_cubes": 3,
+            "first_distance": 15.0,
+            "spacing": 9.0,
+            "lateral_bound": 6.0,
+            "vertical_bound": 0.0,
+            "cube_size": 2.5,
+            "cube_color": [0.75, 0.12, 0.08],
+            "drone_size": 0.8,
+            "altitude": 2.5,
+            "step_length": 1.0,
+            "step_limit": 300,
+            "front_margin": 11.0,
+            "side_margin": 20.0,
+        },
+        "rewards": {},
+        "scene": None,
+        "code": None,
     },
-    "camera": {"width": 64, "height": 25, "horizontal_fov": 135.0},
-    "transforms": [{"name": "gray"}, {"name": "standardize", "mean": 0.53, "std": 0.21}],
+    "inputs": {
+        "pixels": {
+            "kind": "image",
+            "camera": {"name": "front", "horizontal_fov": 135.0},
+            "size": [25, 64],
+            "transforms": [{"name": "gray"}, {"name": "standardize", "mean": 0.53, "std": 0.21}],
+        }
+    },
+    "actions": {
+        "settings": {
+            "kind": "moves",
+            "move_speed": 4.0,
+            "move_lead": 0.5,
+            "forward_speed": 4.0,
+            "sideways_speed": 3.0,
+            "yaw_rate": 45.0,
+        },
+        "axes": [
+            {"name": "forward", "unit": "moves", "low": 0.0, "high": 1.0, "step": 1.0},
+            {"name": "left", "unit": "moves", "low": -1.0, "high": 1.0, "step": 1.0},
+        ],
+    },
     "network": {"name": "small_cnn", "patch": 4, "channels": [16, 32], "hidden": [128]},
+    "appearance": AppearanceSettings().values(),
+    "dynamics": COMPUTER_VISION.values(),
 }
+parse = PolicyDescription.read
+IMAGE = "inputs.pixels"
 GRAY, STACK = {"name": "gray"}, {"name": "stack", "N": 2}
 DEAD = {"name": "dead_rows", "count": 0, "rows": [], "level": 0.0}
 
@@ -53,6 +84,12 @@ def changed(where, value):
     else:
         part[int(keys[-1]) if keys[-1].isdigit() else keys[-1]] = value
     return data
+
+
+def with_image(**changes):
+    """Return the default description with another image."""
+    image = {**DEFAULT["inputs"]["pixels"], **changes}
+    return {**DEFAULT, "inputs": {"pixels": image}}
 
 
 def test_critic_is_the_network_with_one_output():
@@ -112,13 +149,15 @@ def test_wrong_outputs_of_a_registered_transform_are_named(registered, result, f
 
     registered(register_transform("own")(Filter))
     with pytest.raises(InputError, match=fault) as error:
-        parse({**DEFAULT, "transforms": [GRAY, {"name": "own"}]})
+        parse(with_image(transforms=[GRAY, {"name": "own"}]))
     assert __file__ in str(error.value)
 
 
 def test_description_round_trip():
-    assert parse(DEFAULT).as_dict() == DEFAULT
-    assert parse(parse(DEFAULT).as_dict()) == parse(DEFAULT)
+    described = parse(DEFAULT)
+    assert described.model_dump(mode="json") == DEFAULT
+    assert parse(DEFAULT) == described
+    assert PolicyDescription.model_validate_json(described.model_dump_json()) == described
 
 
 def test_expected_weights_are_known_without_building():
@@ -144,9 +183,7 @@ def test_expected_weights_are_known_without_building():
     ],
 )
 def test_image_shape_is_predicted(camera, transforms, shape):
-    data = {**DEFAULT, "transforms": transforms}
-    data["camera"] = {"height": camera[0], "width": camera[1], "horizontal_fov": 90.0}
-    described = parse(data)
+    described = parse(with_image(size=camera, transforms=transforms))
     assert described.input.shape == shape
     env = described.build_env(1, seed=0, device="cpu")
     assert tuple(env.reset()["pixels"].shape[1:]) == shape
@@ -157,31 +194,50 @@ def test_image_shape_is_predicted(camera, transforms, shape):
     ("where", "value", "message"),
     [
         ("format", "drone_rl checkpoint", "format='drone_rl checkpoint'"),
-        ("format_version", 3, "format_version=3"),
-        ("more", 1, "missing or unknown: 'more'"),
-        ("task", ..., "missing or unknown: 'task'"),
-        ("task.num_cubes", 10**9, r"task\.num_cubes=1000000000"),
-        ("task.num_cubes", True, "num_cubes=True"),
-        ("task.spacing", float("nan"), "spacing=nan"),
-        ("task.wind", 1.0, "task.wind is unknown"),
-        ("task.vertical_bound", 3.0, "fly into the floor"),
-        ("camera.width", 4096, "width=4096"),
-        ("camera.width", 1024, None),
-        ("transforms", [], "needs floats"),
-        ("transforms", [GRAY] * 17, "at most 16 items"),
-        ("transforms", [GRAY, GRAY], "put it first"),
-        ("transforms", [GRAY, {"name": "crop", "top": 9, "bottom": 9}], "9 to 9 of 25"),
-        ("transforms", [GRAY, {**DEAD, "count": 26}], "the image has 25 rows"),
-        ("transforms", [GRAY, {**DEAD, "rows": [25]}], "the image has 25 rows"),
-        ("transforms", [GRAY, {**DEAD, "rows": [3, 3]}], "twice"),
-        ("transforms", [GRAY, {**STACK, "N": 16}, {**STACK, "N": 16}, {**STACK, "N": 16}], "shape"),
-        ("transforms.1.std", 0.0, r"transforms\[1\]\.std=0\.0"),
-        ("transforms.0.name", "exec", r"transforms\[0\]\.name='exec': it must be one of gray"),
+        ("format_version", 2, "former layout; convert the file: drone-rl convert FILE"),
+        ("format_version", 4, "format_version=4"),
+        ("more", 1, "more is unknown"),
+        ("task", ..., "task is missing"),
+        ("task.name", "exec", r"task\.parameters\.name='exec': it must be one of collect_cubes"),
+        ("task.parameters", "pillars", "task.parameters: it must be a mapping"),
+        ("task.parameters.num_cubes", 10**9, r"task\.parameters\.num_cubes=1000000000"),
+        ("task.parameters.num_cubes", True, "num_cubes=True"),
+        ("task.parameters.spacing", float("nan"), "spacing=nan"),
+        ("task.parameters.wind", 1.0, "task.parameters.wind is unknown"),
+        ("task.parameters.vertical_bound", 3.0, "fly into the floor"),
+        ("task.scene", {"name": "house.xml"}, "task.scene is not supported"),
+        ("task.code", {"name": "a", "hash": "0" * 63}, "task.code.hash"),
+        ("inputs", {}, "inputs=.* at least 1 item"),
+        ("inputs", {"depth": DEFAULT["inputs"]["pixels"]}, "inputs.depth='depth'"),
+        (f"{IMAGE}.kind", "vector", "kind='vector'"),
+        (f"{IMAGE}.camera.name", "down", "camera.name='down'"),
+        (f"{IMAGE}.size", [25, 4096], "width=4096"),
+        (f"{IMAGE}.size", [25, 1024], None),
+        (f"{IMAGE}.transforms", [], "needs floats"),
+        (f"{IMAGE}.transforms", [GRAY] * 17, "at most 16 items"),
+        (f"{IMAGE}.transforms", [GRAY, GRAY], "put it first"),
+        (f"{IMAGE}.transforms", [GRAY, {"name": "crop", "top": 9, "bottom": 9}], "9 to 9 of 25"),
+        (f"{IMAGE}.transforms", [GRAY, {**DEAD, "count": 26}], "the image has 25 rows"),
+        (f"{IMAGE}.transforms", [GRAY, {**DEAD, "rows": [25]}], "the image has 25 rows"),
+        (f"{IMAGE}.transforms", [GRAY, {**DEAD, "rows": [3, 3]}], "twice"),
+        (f"{IMAGE}.transforms", [GRAY, *[{**STACK, "N": 16}] * 3], "shape"),
+        (f"{IMAGE}.transforms.1.std", 0.0, r"transforms\[1\]\.std=0\.0"),
+        (f"{IMAGE}.transforms.0.name", "exec", r"transforms\[0\]\.name='exec': it must be one of"),
+        (f"{IMAGE}.transforms.0._target_", "os.system", "_target_='os.system' is refused"),
+        ("actions.settings.kind", "eval", r"actions\.settings\.kind='eval'"),
+        ("actions.axes.0.high", 2.0, "axes are not those of the settings"),
         ("network.name", "os.system", "network.name='os.system': it must be one of small_cnn"),
+        ("network._target_", "os.system", "_target_='os.system' is refused"),
         ("network.hidden", [128] * 9, "at most 8 items"),
         ("network.hidden", [4096] * 3, "parameters"),
         ("network.patch", 26, "too small"),
         ("network.bias", True, "network.bias is unknown"),
+        ("appearance.fog_visibility", 0.0, r"appearance\.fog_visibility=0\.0"),
+        ("appearance.fog", 5.0, "appearance.fog is unknown"),
+        ("appearance", 3, "appearance=3"),
+        ("dynamics.mass", -1.0, r"dynamics\.mass=-1\.0"),
+        ("dynamics.gusts", 1.0, r"dynamics\.gusts=1\.0 moves nothing"),
+        ("dynamics._target_", "os.system", "dynamics._target_ is unknown"),
     ],
 )
 def test_out_of_bounds_values_are_named(where, value, message):
@@ -194,11 +250,10 @@ def test_out_of_bounds_values_are_named(where, value, message):
 
 
 def test_number_of_pixels_is_bounded():
-    camera = {"width": 1024, "height": 256, "horizontal_fov": 90.0}
     network = {"name": "small_cnn", "patch": 64, "channels": [4], "hidden": []}
-    parse({**DEFAULT, "camera": camera, "network": network})
+    parse({**with_image(size=[256, 1024]), "network": network})
     with pytest.raises(InputError, match="263168 pixels"):
-        parse({**DEFAULT, "camera": {**camera, "height": 257}, "network": network})
+        parse({**with_image(size=[257, 1024]), "network": network})
 
 
 def test_parsing_and_loading_compute_nothing(tmp_path):
@@ -228,57 +283,37 @@ def test_loaded_weights_keep_their_memory_layout():
 
 def test_without_faults_removes_camera_faults():
     blur, late = {"name": "blur", "width": 1.0}, {"name": "late_frames", "frames": 2}
-    described = parse({**DEFAULT, "transforms": [GRAY, blur, DEAD, late]})
+    described = parse(with_image(transforms=[GRAY, blur, DEAD, late]))
     assert described.faults == ("dead_rows", "late_frames")
-    assert described.without_faults() == parse({**DEFAULT, "transforms": [GRAY, blur]})
+    assert described.without_faults() == parse(with_image(transforms=[GRAY, blur]))
     assert parse(DEFAULT).without_faults() == parse(DEFAULT)
 
 
-def test_appearance_is_written_unless_minimal():
-    assert "appearance" not in parse(DEFAULT).as_dict() and parse(DEFAULT).appearance.is_minimal
+def test_appearance_is_that_of_the_environment():
     look = AppearanceSettings(fog_visibility=(20.0, 50.0), ground_texture="grid").values()
     described = parse({**DEFAULT, "appearance": look})
-    assert described.as_dict()["appearance"] == look
-    assert parse(described.as_dict()) == described
+    assert parse(described.model_dump(mode="json")) == described
     env = described.build_env(1, seed=0, device="cpu")
     assert 20.0 <= env.base_env.appearances.values[0, 14] <= 50.0
     env.close()
-    for wrong in ({**look, "fog_visibility": 0.0}, {"fog": 5.0}, 3):
-        with pytest.raises(InputError, match="appearance"):
-            parse({**DEFAULT, "appearance": wrong})
 
 
-def test_dynamics_and_actions_are_written_unless_default():
-    plain = parse(DEFAULT)
-    assert plain.dynamics.is_computer_vision and plain.actions == MOVES_SETTINGS
-    windy, fast = FLIGHT.replace(wind=(2.0, 0.0, 0.0)).values(), ActionSettings(move_speed=5.0)
-    described = parse({**DEFAULT, "dynamics": windy, "actions": fast.values()})
-    assert described.as_dict() == {**DEFAULT, "dynamics": windy, "actions": fast.values()}
-    assert parse(described.as_dict()) == described
-    assert [*described.expected_weights()] == [*plain.expected_weights()]
-    still = {"dynamics": plain.dynamics.values(), "actions": plain.actions.values()}
-    assert parse({**DEFAULT, **still}).as_dict() == DEFAULT
-
-
-@pytest.mark.parametrize(
-    ("part", "value", "message"),
-    [
-        ("dynamics", {**FLIGHT.values(), "mass": -1.0}, r"dynamics\.mass=-1\.0"),
-        ("dynamics", {**COMPUTER_VISION.values(), "gusts": 1.0}, r"dynamics\.gusts=1\.0 moves"),
-        ("dynamics", {**FLIGHT.values(), "_target_": "os.system"}, "dynamics._target_ is unknown"),
-        ("actions", {**MOVES_SETTINGS.values(), "kind": "eval"}, r"actions\.kind='eval'"),
-    ],
-)
-def test_out_of_bounds_dynamics_and_actions_are_named(part, value, message):
-    with pytest.raises(InputError, match=message) as error:
-        parse({**DEFAULT, part: value})
-    assert "\n" not in str(error.value)
+def test_axes_of_actions_have_units_and_bounds():
+    settings = ActionSettings(kind="velocity", forward_speed=5.0, yaw_rate=30.0)
+    axes = [tuple(axis.model_dump().values()) for axis in settings.axes]
+    assert axes == [
+        ("forward", "m/s", 0.0, 5.0, None),
+        ("left", "m/s", -3.0, 3.0, None),
+        ("turn left", "degrees/s", -30.0, 30.0, None),
+    ]
+    assert [axis.name for axis in ActionSettings(kind="moves_3d").axes] == ["forward", "left", "up"]
 
 
 def test_environment_uses_described_or_given_dynamics(monkeypatch):
     floating(monkeypatch)
     fast = ActionSettings(move_speed=5.0)
-    flight = {"dynamics": FLIGHT.values(), "actions": fast.values()}
+    actions = ActionSpace.of(fast).model_dump(mode="json")
+    flight = {"dynamics": FLIGHT.values(), "actions": actions}
     described = parse({**DEFAULT, **flight})
 
     def flown(**options):

@@ -9,15 +9,16 @@ import torch
 from safetensors.torch import save
 
 from drone_rl.policies.zoo import (
+    PolicyDescription,
+    TrainingProgress,
     certificate_path,
     find_policy,
-    load_exported,
-    parse,
     policy_names,
     policy_path,
     read_policy,
     shifts_path,
 )
+from drone_rl.policies.zoo.files import parse_checkpoint
 from drone_rl.trust.export import export_policy
 from drone_rl.trust.results import Verdict
 from drone_rl.utils.checkpoint import save_checkpoint
@@ -31,7 +32,7 @@ DESCRIPTION = {
 }
 WEIGHTS = {
     name: torch.arange(float(value.numel())).reshape(value.shape)
-    for name, value in parse(DESCRIPTION).expected_weights().items()
+    for name, value in PolicyDescription.read(DESCRIPTION).expected_weights().items()
 }
 PROGRESS = {"frames": 1234, "episodes": 9, "updates": 3, "seconds": 0.5, "running_reward": 1.0}
 CHECKPOINT = {
@@ -56,32 +57,23 @@ ABOUT = {
 }
 
 
-def exported(weights=None, about=None, description=DESCRIPTION, **metadata):
+def exported(weights=None, about=None, **metadata):
     """Return the content of an exported file."""
-    texts = {
-        "format": "drone_rl policy",
-        "about": json.dumps({**ABOUT, **(about or {})}),
-        "description": json.dumps(description),
-        **metadata,
-    }
+    policy = json.dumps({**ABOUT, **(about or {}), "description": DESCRIPTION})
+    texts = {"format": "drone_rl policy", "policy": policy, **metadata}
     return save(WEIGHTS if weights is None else weights, texts)
-
-
-DAMAGED_DESCRIPTION = save(
-    WEIGHTS, {"format": "drone_rl policy", "about": "{}", "description": "{"}
-)
 
 
 def test_export_round_trip_has_no_machine_details(tmp_path):
     path = tmp_path / "mine.safetensors"
     origin = {"command": "drone-rl train", "seed": 5, "chosen": None}
-    export_policy(path, CHECKPOINT, verdict=Verdict.read(VERDICT), **origin)
-    found = load_exported(path)
-    torch.testing.assert_close(found["policy"], WEIGHTS)
-    assert found["description"] == DESCRIPTION
-    assert found["progress"] == PROGRESS
-    assert {key: found[key] for key in origin} == origin
-    assert (found["verdict"]["kind"], found["worlds"]) == ("none of these", "report")
+    export_policy(path, parse_checkpoint(CHECKPOINT), verdict=Verdict.read(VERDICT), **origin)
+    found = read_policy(path)
+    torch.testing.assert_close(found.weights, WEIGHTS)
+    assert found.description == PolicyDescription.read(DESCRIPTION)
+    assert found.progress == TrainingProgress(**PROGRESS)
+    assert {key: getattr(found, key) for key in origin} == origin
+    assert (found.verdict["kind"], found.worlds) == ("none of these", "report")
     assert b"somebody" not in path.read_bytes()
     card = path.with_suffix(".md").read_text()
     assert hashlib.sha256(path.read_bytes()).hexdigest() in card
@@ -92,9 +84,9 @@ def test_export_round_trip_has_no_machine_details(tmp_path):
 def test_checkpoint_is_read_by_its_description(tmp_path):
     save_checkpoint(tmp_path / "a.pt", {**CHECKPOINT, "best": 0.5})
     found = read_policy(tmp_path / "a.pt")
-    assert found["description"] == DESCRIPTION
-    assert found["best"] == 0.5
-    torch.testing.assert_close(found["policy"], WEIGHTS)
+    assert found.description == PolicyDescription.read(DESCRIPTION)
+    assert found.training["best"] == 0.5
+    torch.testing.assert_close(found.weights, WEIGHTS)
 
 
 @pytest.mark.parametrize(
@@ -106,21 +98,22 @@ def test_checkpoint_is_read_by_its_description(tmp_path):
         (exported()[:-1], "weights are damaged"),
         (exported() + b"1", "weights are damaged"),
         (exported(format="drone_rl checkpoint"), "not a drone_rl policy"),
-        (exported(about={"extra": 1}), "'extra' is unknown"),
+        (exported(about={"extra": 1}), "extra is unknown"),
         (exported(about={"command": "drone-rl train; rm -rf /"}), "must be a training command"),
         (exported(about={"progress": {**PROGRESS, "frames": -1}}), "frames=-1"),
-        (exported(about={"verdict": {"a": "b\nc"}}), "a text in"),
+        (exported(about={"verdict": {"a": "b\nc"}}), "verdict=.* must be plain data"),
         (exported(about={"seed": 0.5}), r"seed=0\.5"),
         (exported({**WEIGHTS, "x": torch.zeros(1)}), "x' is .* absent by"),
         (exported({k: v.double() for k, v in WEIGHTS.items()}), "of float64"),
         (exported({k: v * float("nan") for k, v in WEIGHTS.items()}), "NaN"),
-        (DAMAGED_DESCRIPTION, "its description is damaged"),
+        (exported(policy="{"), "its description is damaged"),
+        (save(WEIGHTS, {"format": "drone_rl policy", "about": "{}"}), "drone-rl convert"),
     ],
 )
 def test_damaged_or_malicious_file_raises_one_line(tmp_path, content, message):
     (tmp_path / "x.safetensors").write_bytes(content)
     with pytest.raises(InputError, match=message) as error:
-        load_exported(tmp_path / "x.safetensors")
+        read_policy(tmp_path / "x.safetensors")
     assert "\n" not in str(error.value)
 
 
@@ -128,11 +121,13 @@ def test_damaged_or_malicious_file_raises_one_line(tmp_path, content, message):
     ("change", "message"),
     [
         ({"description": None}, "description=None"),
+        ({"description": {**DESCRIPTION, "format_version": 2}}, "drone-rl convert FILE"),
         ({"policy": 5}, "weights=5"),
         ({"policy": {**WEIGHTS, "layers.conv1.bias": torch.tensor([0.0, float("inf")])}}, "NaN"),
-        ({"progress": {}}, r"progress\.frames is missing"),
-        ({"provenance": {"versions": {}}}, "git_revision is missing"),
-        ({"config": {"a": torch.zeros(3)}}, "type Tensor"),
+        ({"progress": {"frames": -1}}, r"progress\.frames=-1"),
+        ({"progress": {"running_cubes": 1.0}}, r"progress\.running_cubes"),
+        ({"provenance": {"versions": {"torch": "a\nb"}}}, "provenance"),
+        ({"config": {"a": torch.zeros(3)}}, "config=.* must be plain data"),
     ],
 )
 def test_inconsistent_checkpoint_raises(tmp_path, change, message):
@@ -148,7 +143,7 @@ def test_bundled_policies_have_cards():
         card = path.with_suffix(".md").read_text()
         assert path.stat().st_size < 1_000_000
         assert hashlib.sha256(path.read_bytes()).hexdigest() in card
-        assert load_exported(path)["command"] in card
+        assert read_policy(path).command in card
         assert b"_target_" not in path.read_bytes()
 
 
@@ -170,9 +165,9 @@ def test_bundled_policies_have_cards():
     ],
 )
 def test_bundled_policies_match_their_names(name, kind):
-    found = load_exported(policy_path(name))
-    assert (found["verdict"]["kind"], found["verdict"]["certain"]) == (kind, True)
-    assert (found["worlds"], found["verdict"]["greedy"]["episodes"]) == ("report", 1000)
+    found = read_policy(policy_path(name))
+    assert (found.verdict["kind"], found.verdict["certain"]) == (kind, True)
+    assert (found.worlds, found.verdict["greedy"]["episodes"]) == ("report", 1000)
 
 
 def test_certificate_paths(tmp_path, monkeypatch):
@@ -192,7 +187,8 @@ def test_failed_export_writes_nothing(tmp_path, where):
     path, carried = tmp_path / "mine.safetensors", {tmp_path / "mine.shifts.json": b"{}"}
     origin = {"command": "drone-rl train", "seed": 5, "chosen": None, "carried": carried}
     with pytest.raises(InputError, match=rf"{where}.*free some space"):
-        export_policy(path, CHECKPOINT, verdict=Verdict.read(VERDICT), **origin)
+        policy = parse_checkpoint(CHECKPOINT)
+        export_policy(path, policy, verdict=Verdict.read(VERDICT), **origin)
     assert [found.name for found in tmp_path.iterdir()] == [where]
 
 

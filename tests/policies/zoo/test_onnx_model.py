@@ -9,12 +9,13 @@ import torch
 from drone_rl.config.registry import register_network
 from drone_rl.envs import Pipeline
 from drone_rl.policies import MLP, make_actor
-from drone_rl.policies.zoo import make_onnx, open_onnx, parse
+from drone_rl.policies.zoo import PolicyDescription, make_onnx, open_onnx
+from drone_rl.policies.zoo.description import ActionSpace
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.trust.onnx_export import agreement
 from drone_rl.utils.errors import InputError
 from tests.continuous import SETTINGS
-from tests.policies.zoo.test_description import DEFAULT
+from tests.policies.zoo.test_description import DEFAULT, with_image
 
 GRAY, STANDARD = {"name": "gray"}, {"name": "standardize", "mean": 0.53, "std": 0.21}
 BLIND = [{"name": "episode_reward"}, {"name": "step_count"}]
@@ -23,9 +24,8 @@ LINEAR = {"name": "mlp", "hidden": []}
 
 
 def describe(height, width, transforms, network):
-    camera = {**DEFAULT["camera"], "height": height, "width": width}
-    parts = {"camera": camera, "transforms": transforms, "network": network}
-    return parse({**DEFAULT, **parts})
+    image = with_image(size=[height, width], transforms=transforms)
+    return PolicyDescription.read({**image, "network": network})
 
 
 def build(description, scale=1.0):
@@ -66,18 +66,19 @@ def test_model_documents_inputs_and_outputs(linear):
     metadata = {key: json.loads(text) for key, text in metadata.items()}
     assert metadata.pop("actions") == ["forward", "left", "right"]
     assert metadata.pop("command") == "drone-rl train seed=7"
-    assert parse(metadata) == describe(1, 2, [GRAY], LINEAR)
+    assert PolicyDescription.read(metadata["description"]) == describe(1, 2, [GRAY], LINEAR)
 
 
 def test_continuous_actions_are_outputs():
-    slow = SETTINGS.replace(forward_speed=2.0).values()
-    description = parse({**describe(1, 2, [GRAY], LINEAR).as_dict(), "actions": slow})
+    slow = ActionSpace.of(SETTINGS.replace(forward_speed=2.0))
+    description = describe(1, 2, [GRAY], LINEAR).replace(actions=slow)
     network = MLP((1, 1, 2), 6, hidden=(), generator=torch.Generator().manual_seed(0))
     network.actions = ContinuousActions.of(SETTINGS)
     content = make_onnx(description, network, {})
     session = onnxruntime.InferenceSession(content)
     metadata = session.get_modelmeta().custom_metadata_map
-    assert slow.items() <= json.loads(metadata["action_settings"]).items()
+    description = PolicyDescription.read(json.loads(metadata["description"]))
+    assert description.actions == slow
     assert json.loads(metadata["actions"]) == [
         "forward",
         "left",

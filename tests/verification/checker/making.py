@@ -25,7 +25,7 @@ def of_one_cube(name):
 def _by_bisection(name):
     """Bisect between neighbours on a grid whose episodes end differently; return JSON."""
     policy = drone_rl.load_policy(name).in_task(num_cubes=1)
-    simulator = Simulator(policy.description, policy.state["policy"])
+    simulator = Simulator(policy.description, policy.state.weights)
     bound = policy.task.lateral_bound
 
     def ends(y):
@@ -86,7 +86,7 @@ _known_steps = {}
 
 def _steps(policy, total, high):
     """See `steps_of`; episodes of the same policy and task are run once."""
-    key = fingerprint(policy.state["policy"]), str(policy.description), total, high
+    key = fingerprint(policy.state.weights), str(policy.description), total, high
     if key not in _known_steps:
         _known_steps[key] = steps_of(policy, total, high)
     return _known_steps[key]
@@ -94,7 +94,7 @@ def _steps(policy, total, high):
 
 def of_every_place(policy, end="all_cubes", undecided=False):
     """State the same end everywhere, or only where the first cube's y is below 3."""
-    task = policy.description.task
+    task = policy.task
     bound, cubes = task.lateral_bound, task.num_cubes
     stated, left = [[[-bound, bound]] * cubes], []
     if undecided:

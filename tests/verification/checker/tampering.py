@@ -27,11 +27,11 @@ def _mirrored(data):
 
 
 def _of_another_policy(data):
-    data["policy"]["weights"] = fingerprint(drone_rl.load_policy("good").state["policy"])
+    data["policy"]["weights"] = fingerprint(drone_rl.load_policy("good").state.weights)
 
 
 def _farther(data):
-    data["policy"]["description"]["task"]["first_distance"] += 5.0
+    data["policy"]["description"]["task"]["parameters"]["first_distance"] += 5.0
 
 
 def _other_steps(data):

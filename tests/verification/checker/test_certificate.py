@@ -17,6 +17,7 @@ from drone_rl.verification.checker.certificate import (
     read_certificate,
 )
 from drone_rl.verification.checker.checker import read_validated
+from tests.policies.zoo.test_description import GRAY, STACK, with_image
 from tests.verification.checker.making import of_every_place
 
 
@@ -49,11 +50,14 @@ def policy():
 
 
 def test_check_same_policy_and_task(parsed, policy):
-    weights = policy.state["policy"]
+    weights = policy.state.weights
     check_same_policy(parsed, policy.description, weights)
     check_same_policy(parsed, policy.description, weights, policy.in_task(num_cubes=1).task)
     with pytest.raises(InputError, match=r"another task: num_cubes=1, not 3; prove"):
         check_same_policy(parsed, policy.description, weights, policy.task)
+
+
+PARAMETERS = ["policy", "description", "task", "parameters"]
 
 
 @pytest.mark.parametrize(
@@ -62,9 +66,21 @@ def test_check_same_policy_and_task(parsed, policy):
         (["format"], "drone_rl policy", "format='drone_rl policy'"),
         (["format_version"], 2, "format_version=2"),
         (["certain"], True, "certain is unknown"),
-        (["policy", "description", "task", "vertical_bound"], 1.0, r"vertical_bound=1\.0"),
-        (["policy", "description", "task", "lateral_bound"], 0.0, r"lateral_bound=0\.0"),
-        (["policy", "description", "task", "num_cubes"], 9, "num_cubes=9 is out of range"),
+        (
+            [*PARAMETERS, "vertical_bound"],
+            1.0,
+            r"vertical_bound=1\.0",
+        ),
+        (
+            [*PARAMETERS, "lateral_bound"],
+            0.0,
+            r"lateral_bound=0\.0",
+        ),
+        (
+            [*PARAMETERS, "num_cubes"],
+            9,
+            "num_cubes=9 is out of range",
+        ),
         (["outcomes", 0, "end"], "running", "end='running'"),
         (["outcomes", 0, "collected"], [True, True], "must have 1 cubes"),
         (["outcomes", 0, "share"], 1.5, r"outcomes\[0\]\.share=1\.5"),
@@ -103,25 +119,25 @@ def test_sizes_are_limited(one_sided, write, monkeypatch, limit, value):
 @pytest.mark.parametrize(
     ("part", "value", "message"),
     [
-        ("camera", {"width": 64, "height": 25, "horizontal_fov": 134.0}, "differ in camera"),
-        ("transforms", [{"name": "gray"}], "differ in transforms"),
+        ("inputs", with_image(size=[24, 64])["inputs"], "differ in camera"),
+        ("inputs", with_image(transforms=[GRAY])["inputs"], "differ in transforms"),
         ("network", {"name": "mlp", "hidden": [3]}, "differ in network"),
-        ("transforms", [{"name": "gray"}, {"name": "stack", "N": 2}], "stacks frames"),
+        ("inputs", with_image(transforms=[GRAY, STACK])["inputs"], "stacks frames"),
         ("appearance", AppearanceSettings(exposure=(0.01, 1.99)).values(), "without ranges"),
     ],
 )
 def test_another_description_is_refused(one_sided, policy, part, value, message):
     one_sided["policy"]["description"][part] = value
     with pytest.raises(InputError, match=message):
-        check_same_policy(Certificate.read(one_sided), policy.description, policy.state["policy"])
+        check_same_policy(Certificate.read(one_sided), policy.description, policy.state.weights)
 
 
 def test_read_validated_requires_consistency(write):
     policy = drone_rl.load_policy("good").in_task(num_cubes=2)
     data = of_every_place(policy, undecided=True)
-    read = read_validated(write(data), policy.description, policy.state["policy"])
+    read = read_validated(write(data), policy.description, policy.state.weights)
     assert (read.success, read.undecided.share) == (0.75, 0.25)
     assert read.task == policy.task
     data["outcomes"][0]["share"] = 0.9
     with pytest.raises(InputError, match=r"is inconsistent: .*share of 0\.9"):
-        read_validated(write(data), policy.description, policy.state["policy"])
+        read_validated(write(data), policy.description, policy.state.weights)

@@ -23,7 +23,7 @@ from tests.verification.checker.tampering import BYTES, CHANGES, tampered
 
 
 def findings(data, **settings):
-    weights = drone_rl.load_policy(data["policy"]["name"]).state["policy"]
+    weights = drone_rl.load_policy(data["policy"]["name"]).state.weights
     return check_certificate(Certificate.read(data), weights, **{"flights": 120, **settings})
 
 
@@ -113,7 +113,7 @@ def make():
 
     def simulator(name="good", **task):
         policy = drone_rl.load_policy(name).in_task(**task)
-        made.append(Simulator(policy.description, policy.state["policy"]))
+        made.append(Simulator(policy.description, policy.state.weights))
         return made[-1]
 
     yield simulator

@@ -1,6 +1,5 @@
 """Probabilities by hand, by a second program and by sampled episodes; bounds on them."""
 
-import dataclasses
 import math
 from collections import defaultdict
 
@@ -13,7 +12,8 @@ import drone_rl
 from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import TaskSettings
 from drone_rl.policies import make_actor
-from drone_rl.policies.zoo import parse, policy_path, read_policy
+from drone_rl.policies.zoo import policy_path, read_policy
+from drone_rl.policies.zoo.description import TaskDescription
 from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.trust.metrics import summarise
 from drone_rl.utils.progress import silent
@@ -111,11 +111,10 @@ class Hotter(nn.Module):
 def flying(name, num_envs, factor, num_cubes=3):
     """Return an environment and a shipped policy with scaled logits."""
     state = read_policy(policy_path(name))
-    described = parse(state["description"])
-    task = described.task.replace(num_cubes=num_cubes)
-    described = dataclasses.replace(described, task=task)
+    task = TaskDescription.of(state.description.task.parameters.replace(num_cubes=num_cubes))
+    described = state.description.replace(task=task)
     network = described.build_network()
-    network.load_state_dict(state["policy"])
+    network.load_state_dict(state.weights)
     return described.build_env(num_envs, seed=0, device="cpu"), Hotter(network, factor)
 
 

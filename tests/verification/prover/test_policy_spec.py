@@ -9,7 +9,7 @@ import torch
 
 import drone_rl
 from drone_rl.config import AppearanceSettings, TaskSettings
-from drone_rl.policies.zoo import parse
+from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.boxes import volumes
 from drone_rl.verification.prover.lattice import Lattice
@@ -30,9 +30,10 @@ def spec():
 
 def with_transforms(*names):
     """Policy good's description with other transforms; they decide only what is seen."""
-    described = drone_rl.load_policy("good").description.as_dict()
-    described["transforms"] = [n if isinstance(n, dict) else {"name": n} for n in names]
-    return parse(described)
+    described = drone_rl.load_policy("good").description.model_dump(mode="json")
+    image = described["inputs"]["pixels"]
+    image["transforms"] = [n if isinstance(n, dict) else {"name": n} for n in names]
+    return PolicyDescription.read(described)
 
 
 def test_composed_images_equal_observations(spec):

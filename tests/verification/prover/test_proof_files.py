@@ -124,7 +124,7 @@ def test_the_checker_accepts_an_unfinished_certificate(tmp_path):
         while not prover.ended:
             prover.advance()
         assert prover.part.size and prover.waiting and prover.done.endings
-        weights = fingerprint(policy.state["policy"])
+        weights = fingerprint(policy.state.weights)
         found = certify(policy.name, policy.description, weights, prover, 1.0, "limit_s")
     found.write_json(path)
     assert not found.finished and found.found.stopped_by == "limit_s"
