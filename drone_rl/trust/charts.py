@@ -19,7 +19,7 @@ _COLUMNS = 4
 _POLICY, _ORACLE, _GOOD = css(INK), css(MUTED), css(GOOD)
 _OTHERS = {
     "drifting": (css(FAINT), "--", "... if the perturbation drifts"),
-    "onset": (css(FAINT), ":", "... if it begins at step 20"),
+    "onset": (css(FAINT), ":", "... if perturbed from step 20 on"),
 }
 _SCALE = 3
 _TILES, _GAP, _HEADING = 3, 8, 28

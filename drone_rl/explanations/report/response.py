@@ -32,7 +32,7 @@ def response_charts(result: Response, explanation: Explanation) -> dict[str, Fig
             title = f"P({names[action]}){suffix}"
             charts[title] = _map(grid, probabilities[..., action], title)
         title = f"most probable action{suffix}"
-        title += "; inside the white line: no reaction" if blind.any() else ""
+        title += "; white line: no reaction" if blind.any() else ""
         charts[title] = chart = _map(grid, probabilities.argmax(-1), title, colors)
         if blind.any():
             lines = {"levels": [0.5], "colors": "white", "linewidths": 2.5}
