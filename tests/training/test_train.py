@@ -241,7 +241,7 @@ def test_a_finished_run_is_not_replaced(tmp_path):
 
 
 def test_names_of_other_projects():
-    for name, meant in (("learning_rate", r"Adam\(lr"), ("n_envs", r"Episodes\(num_envs")):
+    for name, meant in (("learning_rate", r"Adam\(lr"), ("num_workers", r"Episodes\(num_threads")):
         with pytest.raises(InputError, match=rf"^{name} is unknown; .*did you mean .*{meant}="):
             drone_rl.train(**{name: 1})
 
