@@ -1,4 +1,4 @@
-"""Honest policies that become "not certain" because their decisions depend on rounding."""
+"""Honest policies that become "not certain" because their episodes end otherwise when repeated."""
 
 from typing import Any
 
@@ -15,9 +15,9 @@ def bench_fragile_honest(setup: Setup) -> dict[str, Any]:
     """Judge the shipped policies and default trainings.
 
     Returns:
-        "fragile_honest": number of policies that are not certain because of rounding, out of
-        "fragile_honest_total"; "fragile_frames_most" and "fragile_episodes_most": the largest
-        rates of fragile frames, and of episodes with fragile frames.
+        "fragile_honest": number of policies that are not certain because repeated episodes end
+        otherwise, out of "fragile_honest_total"; "fragile_episodes_most": the most such episodes of
+        a policy, out of 50; "blind_honest": policies said not to use their camera, by name.
     """
     folder = setup.runs / "fragile_honest"
     names = ["good", "poor"] if setup.quick else policy_names()
@@ -27,13 +27,13 @@ def bench_fragile_honest(setup: Setup) -> dict[str, Any]:
         train(run, f"seed={seed}")
         policies.append(load_policy(run))
     settings = JudgeSettings(sampled=False, episodes=50 if setup.quick else 400)
-    checks = (judge(policy, settings, progress=silent).rounding for policy in policies)
-    roundings = [check for check in checks if check is not None]
+    verdicts = {policy.name: judge(policy, settings, progress=silent) for policy in policies}
+    repeated = [verdict.repetition for verdict in verdicts.values() if verdict.repetition]
     return {
-        "fragile_honest": sum(rounding.decides for rounding in roundings),
-        "fragile_honest_total": len(roundings),
-        "fragile_frames_most": max(rounding.fragile_rate for rounding in roundings),
-        "fragile_episodes_most": max(
-            rounding.fragile_episodes / rounding.episodes for rounding in roundings
-        ),
+        "fragile_honest": sum(not repetition.is_same for repetition in repeated),
+        "fragile_honest_total": len(repeated),
+        "fragile_episodes_most": max(repetition.worst.different for repetition in repeated),
+        "blind_honest": [
+            name for name, of in verdicts.items() if of.camera and of.camera.is_used is False
+        ],
     }

@@ -1,4 +1,4 @@
-"""Forged certificates, forged operating domains and trivial tasks."""
+"""Forged certificates and trivial tasks."""
 
 import functools
 import itertools
@@ -11,22 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from drone_rl.config.commands import ShiftSettings
 from drone_rl.policies.policy import Policy, load_policy
-from drone_rl.policies.zoo import certificate_path, fingerprint, shifts_path
-from drone_rl.trust.axes import find_axes
-from drone_rl.trust.domain import Prober
+from drone_rl.policies.zoo import certificate_path, fingerprint
 from drone_rl.trust.judge import judge
-from drone_rl.trust.paired_evaluation import PairedEvaluator
-from drone_rl.trust.shifts import make_evaluated_policy, shifts
-from drone_rl.trust.shifts_results import Domain, Probe
-from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.verification.checker.checker import Simulator
 from drone_rl.verification.claim import find_claim
 
-_AXIS, _VALUE = "dead_rows", 12.0
-"""A perturbation under which the policy fails although the forged file says that it is good."""
 _TRIVIAL = {"lateral_bound": 0.5}
 _EPISODES = 300
 Forge = Callable[[Policy], dict[str, Any]]
@@ -60,10 +51,6 @@ def cases(folder: Path) -> dict[str, Callable[[], bool]]:
         ),
         "a certificate that one rollout re-checks": proved(
             "few", one_sided, plausible, certificate_flights=1
-        ),
-        "an invented operating domain": lambda: _is_covered(folder / "domain", "good"),
-        "an invented operating domain of a one-sided policy": lambda: _is_covered(
-            folder / "one_sided", one_sided
         ),
         "flying straight in a trivial task": lambda: _is_good("forward"),
         "a good policy in a trivial task": lambda: _is_good("good"),
@@ -163,39 +150,6 @@ def steps_of(
     return {str(number): total * count / episodes for number, count in pairs}
 
 
-def forged_shifts(policy: Policy, folder: Path) -> dict[str, Any]:
-    """Return a `shifts.json` whose domain states that the policy is good under every strength.
-
-    Args:
-        policy: The policy that the file names.
-        folder: Folder of the honest measurement that is changed.
-    """
-    honest = shifts(
-        policy, axes=[_AXIS], modes=["constant"], domain=False, episodes=20, progress=silent
-    )
-    honest.save(folder)
-    data = json.loads((folder / "shifts.json").read_text())
-    subject = make_evaluated_policy(policy, ShiftSettings())
-    (axis,) = find_axes([_AXIS], subject)
-    with closing(PairedEvaluator(subject, 1, data["settings"]["seed"])) as evaluator:
-        prober = _ForgedProber(evaluator)
-        domain = Domain(plain=prober.plain, ranges={_AXIS: prober.search(axis)})
-        data["domain"] = domain.model_dump(mode="json")
-    return data
-
-
-class _ForgedProber(Prober):
-    """A prober that finds the policy good under every condition."""
-
-    def __init__(self, evaluator: PairedEvaluator) -> None:
-        self._evaluator = evaluator
-        self.plain = self.probe(None, 0.0)
-
-    def probe(self, condition: Any, part: float) -> Probe:
-        """See `Prober`."""
-        return Probe(good=True, success=1.0)
-
-
 def _copy_shipped(name: str, folder: Path) -> Policy:
     """Copy a shipped policy to a folder and load the copy."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -230,18 +184,6 @@ def _counts_as_proved(policy: Policy, **options: Any) -> bool:
     how = {"episodes": 20, "sampled": False, "require": "proved", "progress": silent}
     judged = judge(policy, **how, find_claim=find_claim, **options)
     return judged.is_proved or judged.status("proved") == 0
-
-
-def _is_covered(folder: Path, name: str) -> bool:
-    policy = _copy_shipped(name, folder)
-    shifts_path(policy.path).write_text(json.dumps(forged_shifts(policy, folder)))
-    required = folder / "required_domain.json"
-    required.write_text(json.dumps({_AXIS: {"high": _VALUE, "unit": "rows"}}))
-    try:
-        judged = judge(policy, require_domain=required, progress=silent)
-    except InputError:
-        return False
-    return judged.status() == 0
 
 
 def _is_good(name: str) -> bool:

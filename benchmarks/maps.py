@@ -14,8 +14,9 @@ from benchmarks.adversarial_maps import adversarial_maps
 from benchmarks.benchmark import Setup
 from benchmarks.known_map_policies import make_policies, path_weights
 from drone_rl.explanations.hooks import probabilities
+from drone_rl.explanations.patches import has_effect, make_grid, patch_effects, placebo_maps
 from drone_rl.explanations.scenes import Scenes, alternatives, empty_scene
-from drone_rl.explanations.trust import Trial, check_maps, measure
+from drone_rl.explanations.trust import Trial, check_maps
 from drone_rl.policies import ImageNetwork, SmallCNN
 from drone_rl.policies.environment import make_env
 from drone_rl.policies.zoo import policy_names, policy_path, read_policy
@@ -41,9 +42,21 @@ def bench_maps(setup: Setup) -> dict[str, Any]:
     seen, absent = scenes.observe(state), scenes.observe(empty_scene(scenes))[0]
     others = list(alternatives(scenes, state).values())
 
+    grid = make_grid(*seen.shape[-2:])
+
     def trial(network: ImageNetwork) -> Trial:
-        greedy = probabilities(network, seen).argmax(-1)
-        return measure(network, greedy, seen, others, absent, episode)
+        """The trial on the frames in which some patch affects a policy."""
+        effects = patch_effects(network, seen, others, grid)
+        whole = Trial(
+            network=network,
+            observations=seen,
+            actions=probabilities(network, seen).argmax(-1),
+            effects=effects,
+            placebos=placebo_maps(seen, absent, others, 0),
+            episode=episode,
+            grid=grid,
+        )
+        return whole[has_effect(effects)]
 
     planted = make_policies(absent, seen, expert(scenes, state))
     planted = planted[::7] if setup.quick else planted

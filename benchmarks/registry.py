@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any
 
+from benchmarks.adversaries import bench_adversaries
 from benchmarks.airsim import bench_airsim
 from benchmarks.airsim_chapter import bench_airsim_chapter
 from benchmarks.airsim_scripts import bench_scripts
@@ -100,6 +101,7 @@ BENCHMARKS: dict[str, Benchmark] = {
         "verification",
         *_parts("gamed_memory", "gamed_rounding", "gamed_certificates"),
     ),
+    "adversaries": _benchmark(bench_adversaries, "adversarial", *_JUDGING),
     "maps": _benchmark(
         bench_maps,
         "adversarial",

@@ -21,7 +21,6 @@ from drone_rl.policies.zoo import read_checkpoint
 from drone_rl.training.run_folder import settings_of
 from drone_rl.trust.axes import AXES, GROUPS, find_axes
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
-from drone_rl.trust.shifts import make_evaluated_policy
 from drone_rl.utils.files import last_of
 
 DEFAULT, ALL = "default", "all"
@@ -106,9 +105,10 @@ def success_rates(
 
 def _plain_spec(run: Path, settings: ShiftSettings) -> EvaluatedPolicy:
     """Return a policy with minimal appearance and without the camera faults of its training."""
-    return dataclasses.replace(
-        make_evaluated_policy(load_policy(run), settings), appearance=MINIMAL
+    subject = EvaluatedPolicy.of(
+        load_policy(run), device=settings.device, renderer=settings.renderer
     )
+    return dataclasses.replace(subject, appearance=MINIMAL)
 
 
 def _row(shares: Mapping[str, float], untouched: Sequence[str]) -> dict[str, float]:

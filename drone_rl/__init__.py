@@ -70,6 +70,11 @@ if TYPE_CHECKING:
     from drone_rl.policies.sb3 import Sb3Trunk as Sb3Trunk
     from drone_rl.sim.sensors import Sensors as Sensors
     from drone_rl.sim.tasks import register_task as register_task
+    from drone_rl.sim.terms.step_kernel import Step as Step
+    from drone_rl.sim.terms.term_task import define_task as define_task
+    from drone_rl.sim.terms.terms import end as end
+    from drone_rl.sim.terms.terms import reward as reward
+    from drone_rl.sim.terms.terms import success as success
     from drone_rl.training.demonstrations import Demonstration as Demonstration
     from drone_rl.training.demonstrations import FlightConditions as FlightConditions
     from drone_rl.training.demonstrations import add_demonstration as add_demonstration

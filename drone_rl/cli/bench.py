@@ -19,8 +19,8 @@ class BenchCommand(CommandSettings, BenchSettings):
 
     Benchmarks by group:
       main: render, collector, dm_control, scaling, memory, solve, seeds, large
-      adversarial: coverage, gamed, maps, explain, verdicts, fragile_honest, shifts, domain_axes,
-        robust, render_truth
+      adversarial: coverage, gamed, adversaries, maps, explain, verdicts, fragile_honest, shifts,
+        domain_axes, robust, render_truth
       parallel: sweeps, kills
       verification: prove, exact_coverage, provable
       long: imitation, original, chapter

@@ -115,8 +115,9 @@ class PlayCommand(AppearanceCommandSettings, DeviceSettings):
 class VerdictCommand(AppearanceCommandSettings, JudgeSettings):
     """Judge a policy as good, one-sided or poor in held-out episodes.
 
-    Exit status: 0 good, 10 poor, 11 one-sided, 12 none of these, 13 too few episodes to be certain,
-    18 good but trivial (a baseline that ignores observations succeeds, too), 16 not proved
+    Exit status: 0 good, 10 poor, 11 one-sided, 12 none of these, 13 not certain (too few episodes,
+    or repeated ones end otherwise), 18 good but trivial (a baseline that ignores observations
+    succeeds, too, or the policy does not use its camera), 16 not proved
     (require=proved), 17 outside the required operating domain (require_domain=FILE).
     policy=random, oracle, forward, left or right judges a baseline.
     """

@@ -48,8 +48,8 @@ class JudgeSettings(HeldOutSettings):
     certificate_flights: Annotated[int, Whole(0, 10_000_000, "rollouts")] = 3000
     """Episodes that check a certificate like drone-rl check; they can refute it, not prove it."""
     domain_flights: Annotated[int, Whole(0, 100_000, "episodes")] = 200
-    """New episodes at each re-checked strength of the required domain: both ends of each range and
-    two random strengths within it; with 0 it is not covered."""
+    """New episodes at strengths drawn from all required ranges together, one each; with 0 the
+    required domain is not covered."""
 
 
 BODIES = (

@@ -47,6 +47,18 @@ class StepContext:
         """The inputs of policies, by name."""
         return self.observer.observe(self.state, self.rows, self.starts, self.appearance)
 
+    def part(self, which: Tensor, inputs: Mapping[str, Tensor] | None = None) -> "StepContext":
+        """Return the context of some of these environments, by their position, (j,).
+
+        `inputs`, shapes (j, *), replace what their policies observe.
+        """
+        part = StepContext(self.observer, self.state[which], self.rows[which], self.starts[which])
+        part.pending = [action[which] for action in self.pending]
+        if inputs is None:
+            inputs = {name: values[which] for name, values in self.inputs.items()}
+        part.inputs = dict(inputs)
+        return part
+
     def observe(self, name: str = "pixels") -> Tensor:
         """Return an input of policies. Shape: (k, *)."""
         if name not in self.inputs:

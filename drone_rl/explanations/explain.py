@@ -19,7 +19,7 @@ from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.trust.coverage import find_domain
 from drone_rl.trust.recorded import record_verdict
-from drone_rl.trust.rounding_sensitivity import require_function
+from drone_rl.trust.repetition import require_repeatable
 from drone_rl.trust.verdict import FindClaim
 from drone_rl.utils.display import Result, page
 from drone_rl.utils.errors import InputError
@@ -115,7 +115,7 @@ def explain(
     folders = {n: folder / f"{i}_{to_file_name(n)}" for i, n in enumerate(by_name)}
 
     def explain_one(policy: BasePolicy, folder: Path) -> Explanation:
-        require_function(policy, seed=seed.value, renderer=settings.renderer)
+        require_repeatable(policy, seed=seed.value, renderer=settings.renderer)
         env = policy.make_env(num_envs, seed=seed.value, renderer=settings.renderer)
         with closing(env):
             claim = None if find_claim is None else find_claim(policy, seed=seed)

@@ -16,7 +16,7 @@ distribution and any dependence within episodes.
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import torch
@@ -101,22 +101,46 @@ class Trial:
 
 def make_trial(context: Context) -> Trial:
     """Return a trial on some frames of each rollout, those in which a patch affects the policy."""
-    data, scenes, network = context.dataset, context.scenes, context.network
+    data, scenes = context.dataset, context.scenes
     rows, seed = spread_frames(data.episode, FRAMES_AN_EPISODE), context.seed.value
     index = torch.from_numpy(rows)
     state = data.state(scenes.task, scenes.worlds.dynamics)[index].to(scenes.worlds.device)
     others = list(alternatives(scenes, state, seed).values())
-    observations = scenes.observe(state)
+    actions, seen = data.tensor("actions")[index], scenes.observe(state)
+    episode = data.episode[rows]
+    return measure(context.network, actions, seen, others, context.absent, episode, seed)
+
+
+def measure(
+    network: ImageNetwork,
+    actions: Tensor,
+    observations: Tensor,
+    others: Sequence[Tensor],
+    absent: Tensor,
+    episode: NDArray,
+    seed: int = 0,
+) -> Trial:
+    """Return a trial on the frames in which some patch affects a policy.
+
+    Args:
+        network: The policy's network.
+        actions: Actions to explain. Shape: (T,).
+        observations: Shape: (T, C, h, w).
+        others: Observations with other contents, see `alternatives`. Shapes as above.
+        absent: Observation of the scene without targets. Shape: (C, h, w).
+        episode: Number of each frame's episode. Shape: (T,).
+        seed: Of noise and shuffled weights.
+    """
     grid = make_grid(*observations.shape[-2:])
     effects = patches.patch_effects(network, observations, others, grid)
     moved = patches.has_effect(effects)
     trial = Trial(
         network=network,
         observations=observations,
-        actions=data.tensor("actions")[index],
+        actions=actions,
         effects=effects,
-        placebos=placebo_maps(observations, context.absent, others, seed),
-        episode=data.episode[rows],
+        placebos=placebo_maps(observations, absent, others, seed),
+        episode=episode,
         grid=grid,
         frames_without_effect=int((~moved).sum()),
         seed=seed,

@@ -9,11 +9,15 @@ from torch import Tensor
 
 from drone_rl.envs import base_env
 from drone_rl.envs.rollout import ActorAgent, steps
+from drone_rl.policies.networks import ImageNetwork
 from drone_rl.policies.policy import BasePolicy
-from drone_rl.policies.rounding import TOLERANCE, require_same_in_any_batch
 from drone_rl.utils.errors import InputError
 
 _ENVIRONMENTS, _RESETS, _STEPS = 2, 2, 6
+_BATCH_SIZES = (*range(1, 65), 100, 128, 200, 250, 256, 400, 500, 512, 1000)
+"""Sizes of the batches in which the same frames are evaluated."""
+TOLERANCE = 1e-4
+"""Largest difference by rounding between logits of one frame, relative to 1 + the largest logit."""
 _PROBABILITY = 1e-3
 """Difference of probabilities that counts as another policy."""
 Predict = Callable[[Tensor], tuple[Tensor, Tensor]]
@@ -39,7 +43,7 @@ def check_on_episodes(
     network = policy.make_network()
     network.owner = f"policy={policy.name}"
     pixels = torch.cat([seen for _, seen in episodes])
-    require_same_in_any_batch(network, pixels, [len(pixels)])
+    require_same_in_any_batch(network, pixels, _BATCH_SIZES)
     if predict is None:
         return
     theirs = [predict(frames) for frames, _ in episodes]
@@ -74,3 +78,21 @@ def _fly(env: Any, actor: TensorDictModuleBase) -> list[tuple[Tensor, Tensor]]:
         seen.append(step.context.observe())
     pairs = zip(torch.stack(frames, 1), torch.stack(seen, 1), strict=True)
     return [*pairs]
+
+
+@torch.no_grad()
+def require_same_in_any_batch(network: ImageNetwork, frames: Tensor, sizes: Iterable[int]) -> None:
+    """Raise an `InputError` if outputs for frames (N, C, H, W) depend on the size of the batch."""
+    rows = torch.linspace(0, len(frames) - 1, min(len(frames), 64)).long().to(frames.device)
+    frames = frames[rows]
+    alone = torch.cat([network(frame) for frame in frames.split(1)])
+    allowed = TOLERANCE * (1 + alone.abs().amax(-1))
+    for size in sizes:
+        which = (torch.arange(size, device=frames.device) + size) % len(frames)
+        difference = (network(frames[which]) - alone[which]).abs().amax(-1)
+        if bool((difference > allowed[which]).any()):
+            raise InputError(
+                f"{network.owner} gives other logits for the same frame in a batch of {size}: they "
+                f"differ by {float(difference.max()):.3g}; give a callable without state, whose "
+                "logits for a frame depend on no other frame of its batch"
+            )

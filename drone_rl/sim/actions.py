@@ -153,6 +153,15 @@ class Actions(abc.ABC):
     def always(self, name: str) -> Tensor:
         """Return the full-speed action of a part, by name. Shape: the entry's."""
 
+    def speeds_of(self, action: Tensor) -> Tensor:
+        """Return the commanded speeds: forward, left, up and turning left, 1 is the greatest.
+
+        By default those of the action's part by name, see `SPEEDS`; zero for other names.
+        Shapes: (*), then the entry's, to (*, 4), float32.
+        """
+        table = [SPEEDS.get(name, (0.0, 0.0, 0.0, 0.0)) for name in self.names]
+        return torch.tensor(table, device=action.device)[self.part(action)]
+
     @abc.abstractmethod
     def sample(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
         """Sample uniformly, on the generator's device. Shape: `shape`, then the entry's."""
@@ -228,6 +237,16 @@ class DiscreteActions(Actions):
 def listed(names: tuple[str, ...]) -> str:
     """Return names with their numbers, for descriptions."""
     return ", ".join(f"{number} {name}" for number, name in enumerate(names))
+
+
+SPEEDS = {
+    "forward": (1.0, 0.0, 0.0, 0.0),
+    "left": (0.0, 1.0, 0.0, 0.0),
+    "right": (0.0, -1.0, 0.0, 0.0),
+    "up": (0.0, 0.0, 1.0, 0.0),
+    "down": (0.0, 0.0, -1.0, 0.0),
+}
+"""Speeds of parts by name, see `Actions.speeds_of`."""
 
 
 class Move(enum.IntEnum):

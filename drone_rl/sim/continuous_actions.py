@@ -135,6 +135,11 @@ class ContinuousActions(Actions):
         actions = ((1, 0, 0), (-1, 1, 0), (-1, -1, 0), (-1, 0, 1), (-1, 0, -1))
         return torch.tensor(actions[self.names.index(name)], dtype=torch.float32)
 
+    def speeds_of(self, action: Tensor) -> Tensor:
+        """See `Actions`."""
+        forward, left, turn = action.float().clamp(-1, 1).unbind(-1)
+        return torch.stack([(forward + 1) / 2, left, torch.zeros_like(left), turn], -1)
+
     def sample(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
         """See `Actions.sample`."""
         actions = torch.rand(*shape, 3, generator=generator, device=generator.device)

@@ -192,7 +192,8 @@ class Worlds:
     def advance(self, state: State, action: Tensor) -> tuple[State, Tensor]:
         """Return states a step later, and rewards; the environments stay as they are."""
         around = [self.task.obstacles(state)] if self.dynamics.needs_obstacles else []
-        outcome: Any = self.task.step(state, self.dynamics.step(state.body, action, *around))
+        body = self.dynamics.step(state.body, action, *around)
+        outcome: Any = self.task.advance(state, body, self.dynamics.actions.speeds_of(action))
         reward: Any = outcome[1] if isinstance(outcome, tuple) and len(outcome) == 2 else None
         if getattr(reward, "shape", None) != action.shape[:1]:
             raise InputError(

@@ -12,6 +12,8 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from drone_rl.envs.fault_models import dead_rows, late_frames, noise, out_of_focus
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.trust.axes_table import TABLE
@@ -104,7 +106,14 @@ class Axis:
 
     def at(self, position: float) -> float:
         """Return the strength at a position, the inverse of `position`."""
-        return self.scale.inverse(position + self.scale.forward(self.neutral))
+        strength = self.scale.inverse(position + self.scale.forward(self.neutral))
+        return float(round(strength)) if self.whole else strength
+
+    def sample(self, low: float, high: float, rng: np.random.Generator) -> float:
+        """Return the strength at a random position, uniform on the axis's scale."""
+        if self.whole:
+            return float(rng.integers(round(self.at(low)), round(self.at(high)) + 1))
+        return self.at(rng.uniform(low, high))
 
 
 CORRELATION_TIME = -1.0 / math.log(0.95)

@@ -22,8 +22,8 @@ from drone_rl.sim.tasks import as_task
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.trust.baselines import run_baselines
 from drone_rl.trust.metrics import summarise
+from drone_rl.trust.repetition import require_repeatable
 from drone_rl.trust.results import Difference, Figures
-from drone_rl.trust.rounding_sensitivity import require_function
 from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import Mean, Share
@@ -134,7 +134,7 @@ def evaluate(
     policy = as_policy(policy, outputs, task=task, dynamics=dynamics, appearance=appearance)
     if settings.baselines and (judged := as_task(policy.task)).oracle is None:
         raise InputError(f"task={judged.name} has no oracle to compare with; give baselines=false")
-    require_function(policy, seed=seed.value, device=settings.device, renderer=settings.renderer)
+    require_repeatable(policy, seed=seed.value, device=settings.device, renderer=settings.renderer)
     episodes, steps = settings.episodes, 3 if settings.baselines else 2
     with held_out_environments(policy, settings, seed) as (env, actor):
         state, flown = base_env(env).state_dict(), worlds_of(env).dynamics

@@ -18,7 +18,7 @@ from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.zoo import fingerprint
 from drone_rl.trust.baselines import BASELINES
-from drone_rl.trust.coverage import compare_with_required, find_domain, recheck_domain
+from drone_rl.trust.coverage import check_required, find_domain
 from drone_rl.trust.evaluate import held_out_environments
 from drone_rl.trust.findings import Finding
 from drone_rl.trust.results import Proof, Verdict
@@ -49,7 +49,7 @@ class Judgement(Result, Verdict, Provenance):
     findings: tuple[Finding, ...] = ()
     """What its success depends on, the largest effect first."""
     required_domain: Coverage | None = None
-    """The required operating domain compared with its own, if one is required."""
+    """The test of the required operating domain, if one is required."""
 
     @property
     def verdict(self) -> Verdict:
@@ -184,7 +184,7 @@ def judge_one(
         changes: Settings to change, as in `judge("good", episodes=1000)`.
 
     Raises:
-        InputError: A policy, setting or file is unusable, or a required domain was not measured.
+        InputError: A policy, setting or file is unusable.
     """
     settings = from_arguments(JudgeSettings, settings, changes, judge_one)
     settings, seed = with_seed(settings, drawn_seed)
@@ -216,7 +216,8 @@ def judge_one(
         worlds = _baseline(name, TaskSettings.read(changed_task, "task"), drone, settings, seed)
     else:
         measured = find_domain(loaded, shifts, outputs)
-        coverage = _compared(loaded, require_domain, measured, settings, seed)
+        if require_domain is not None:
+            coverage = check_required(loaded, require_domain, settings, seed)
         where = {"device": settings.device, "renderer": settings.renderer}
         flights = settings.certificate_flights
         if find_claim is not None:
@@ -242,8 +243,6 @@ def judge_one(
             seed=seed,
         )
     progress("judged", 1, 1)
-    if coverage is not None and measured is not None:
-        coverage = coverage.replace(against=measured.why_not(verdict))
     return Judgement(
         **dict(verdict),
         policy=name,
@@ -253,23 +252,6 @@ def judge_one(
         findings=find(verdict, measured),
         required_domain=coverage,
     )
-
-
-def _compared(
-    loaded: BasePolicy,
-    needed: str | Path | None,
-    measured: SavedShifts | None,
-    settings: JudgeSettings,
-    seed: RootSeed,
-) -> Coverage | None:
-    """Compare a required domain, if any; run new episodes if the file states that it is covered."""
-    if needed is None:
-        return None
-    coverage = compare_with_required(loaded, needed, measured)
-    shifts = measured and measured.shifts
-    if shifts is None or not coverage.is_stated or not settings.domain_flights:
-        return coverage
-    return coverage.replace(reflown=recheck_domain(loaded, coverage.needs, shifts, settings, seed))
 
 
 def identify(policy: BasePolicy | None) -> str | None:

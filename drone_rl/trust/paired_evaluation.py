@@ -19,10 +19,11 @@ from drone_rl.config import (
     CameraSettings,
     DynamicsSettings,
 )
-from drone_rl.envs import Observer
+from drone_rl.envs import Observer, base_env, worlds_of
 from drone_rl.envs.rollout import Agent, DelayedAgent, steps
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.baselines import make_baseline
+from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.dynamics import draw_seeds, make_dynamics
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import as_task
@@ -40,6 +41,7 @@ from drone_rl.trust.perturbations import (
     task_region,
     variations,
 )
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream, torch_generator, world_random_state
 from drone_rl.utils.settings import prefixed_errors
 
@@ -60,6 +62,36 @@ class EvaluatedPolicy:
     renderer: str = "raytrace"
     dynamics: DynamicsSettings = COMPUTER_VISION
     actions: ActionSettings = MOVES_SETTINGS
+
+    @classmethod
+    def of(
+        cls, policy: BasePolicy, *, device: str = "cpu", renderer: str = "raytrace"
+    ) -> "EvaluatedPolicy":
+        """Return the policy with its task, camera and transforms.
+
+        Raises:
+            InputError: The task has no settings to perturb, or its settings make another task.
+        """
+        task: Any = policy.task
+        if not isinstance(task, BaseTaskSettings):
+            settings_of_task = getattr(task, "settings", None)
+            is_rebuilt = isinstance(settings_of_task, BaseTaskSettings)
+            is_rebuilt = is_rebuilt and type(as_task(settings_of_task)) is type(task)
+            task = settings_of_task if is_rebuilt else None
+        if task is None:
+            raise InputError(
+                f"the task of policy={policy.name} has no settings to perturb; give another policy"
+            )
+        env: Any = policy.make_env(1, device=device, renderer=renderer)
+        try:
+            camera, transforms = worlds_of(env).camera, base_env(env).observer.transforms
+        finally:
+            env.close()
+        network = policy.make_network(device).eval()
+        described = getattr(policy, "description", None)  # only policies from files have one
+        look = MINIMAL if described is None else described.appearance
+        where, moved = (device, renderer), (policy.dynamics, policy.actions)
+        return cls(network, task, camera, transforms, look, *where, *moved)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -13,14 +13,13 @@ from drone_rl.utils.text import render
 
 FREQUENT = 0.02
 """Fraction of episodes above which the text mentions an end."""
-MAX_FRAGILE = 0.02
-"""Largest fraction of fragile frames for a certain verdict; honest policies have at most 0.003."""
-MAX_FRAGILE_EPISODES = 0.25
-"""Largest fraction of episodes with a fragile frame. Honest policies have at most 0.15."""
-MAX_UNEXPLAINED = 0.04
-"""Largest fraction of episodes that may end differently in another implementation if there is no
-bound on rounding, actions are continuous, or drones have flight dynamics. Otherwise an episode may
-take other actions only in or after a fragile frame."""
+NEEDED_EPISODES = 50
+"""Episodes that have to be repeated for a certain verdict."""
+MAX_DIFFERENT = 1
+"""Repeated episodes that may end otherwise."""
+SUCCEEDS, SAME = 0.3, 0.1
+"""A policy that succeeds in at least the first fraction of episodes does not use its camera if this
+changes by less than the second one with the images of other episodes."""
 
 
 class GoalShare(Mean):
@@ -91,47 +90,71 @@ class Failures(Stored):
         return [row for row in ends if row.value != self.expected_end and row != self.largest]
 
 
-class Rounding(Stored):
-    """How far some episodes depend on rounding."""
+class Repeated(Stored):
+    """Episodes that were run again in one way."""
 
-    arithmetic: str
-    """Arithmetic that computed the episodes, such as "float32 on cpu, fused kernel"."""
-    bound: bool = True
-    """Whether the rounding error is bounded, not estimated."""
-    frames: int
-    fragile: int
-    """Frames in which rounding can change the action."""
+    how: str
+    """How the policy was called, such as "one environment at a time"."""
+    different: int
+    """Episodes that ended otherwise, or in which other goals were reached."""
+    successes: int
+
+
+class Repetition(Stored):
+    """The same episodes, run again with the policy called in other ways."""
+
+    implementation: str
+    """What ran them first, such as "fused kernel"; PyTorch ran them again."""
     episodes: int
-    fragile_episodes: int
-    """Episodes with such a frame."""
-    compared: str
-    """Implementation that ran the episodes again."""
-    compared_episodes: int
-    differing: int = 0
-    """Episodes in which it took other actions; with continuous actions or flight dynamics, episodes
-    that ended differently."""
-    unexplained: int
-    """Differing episodes without a fragile frame up to the first other action, or at all if
-    outcomes were compared."""
-    decides: bool = False
-    """Whether the verdict would be certain but for this."""
+    successes: int
+    """Of the first run."""
+    runs: tuple[Repeated, ...]
+
+    @property
+    def worst(self) -> Repeated:
+        """The run with most differences."""
+        return max(self.runs, key=lambda run: run.different)
 
     @pydantic.computed_field
     @property
-    def fragile_rate(self) -> float:
-        """Fraction of fragile frames."""
-        return self.fragile / max(1, self.frames)
+    def is_same(self) -> bool:
+        """Whether no run differs in more than `MAX_DIFFERENT` episodes."""
+        return self.worst.different <= MAX_DIFFERENT
+
+    @property
+    def is_enough(self) -> bool:
+        """Whether enough episodes were repeated, and end as before."""
+        return self.is_same and self.episodes >= NEEDED_EPISODES
+
+
+class CameraUse(Stored):
+    """What changes if a policy gets the images of other episodes."""
+
+    own: float
+    """Success rate with its own images."""
+    exchanged: float
+    """Success rate with the images of other episodes, from the same initial states."""
+    success: Mean
+    """Difference of the success rates, paired."""
+    strata: dict[str, Mean]
+    """By stratum, difference of the fractions of goals reached; all intervals hold at once."""
 
     @pydantic.computed_field
     @property
-    def excessive(self) -> bool:
-        """Whether too much is fragile or unexplained for any verdict to be certain."""
-        allowed = 0.0 if self.bound else MAX_UNEXPLAINED
-        return self.frames > 0 and (
-            self.fragile > MAX_FRAGILE * self.frames
-            or self.fragile_episodes > MAX_FRAGILE_EPISODES * self.episodes
-            or self.unexplained > allowed * self.compared_episodes
-        )
+    def is_used(self) -> bool | None:
+        """Whether the policy uses its camera; None if that is not determined.
+
+        Of a policy that hardly ever succeeds, only the goals that it reaches can show it.
+        """
+        if self.own >= SUCCEEDS:
+            if max(-self.success.lower95, self.success.upper95) <= SAME:
+                return False
+            return _is_outside(self.success) or None
+        return any(map(_is_outside, self.strata.values())) or None
+
+
+def _is_outside(difference: Mean) -> bool:
+    return difference.lower95 > SAME or difference.upper95 < -SAME
 
 
 class Proof(Seeded):
@@ -187,8 +210,10 @@ class Verdict(Seeded):
     terms: TaskVocabulary = CUBES
     num_cubes: int = 0
     """Goals of an episode."""
-    rounding: Rounding | None = None
-    """None if it was not checked."""
+    repetition: Repetition | None = None
+    """None for baselines, which see no images."""
+    camera: CameraUse | None = None
+    """Likewise."""
     proof: Proof | None = None
     """None if the policy has no certificate."""
     greedy: Figures
@@ -235,11 +260,6 @@ class Verdict(Seeded):
     def is_proved(self) -> bool:
         """Whether success from every placement was proved here, not only read from a file."""
         return self.quoted is not None and self.quoted.computed
-
-    @property
-    def is_open_by_rounding(self) -> bool:
-        """Whether the episodes are enough, but too many decisions depend on rounding."""
-        return self.rounding is not None and self.rounding.decides
 
     @property
     def failing_side(self) -> str | None:

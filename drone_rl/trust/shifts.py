@@ -10,10 +10,8 @@ from typing import Any
 import yaml
 from matplotlib.figure import Figure
 
-from drone_rl.config import MINIMAL, BaseTaskSettings
 from drone_rl.config.commands import ShiftSettings
 from drone_rl.config.configuration import from_arguments
-from drone_rl.envs import base_env, worlds_of
 from drone_rl.policies.baselines import OracleAgent, check_baselines
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
@@ -22,10 +20,10 @@ from drone_rl.policies.zoo import fingerprint
 from drone_rl.sim.tasks import as_task
 from drone_rl.trust.axes import Axis, check_axes, find_axes
 from drone_rl.trust.charts import chart, strips
-from drone_rl.trust.domain import Prober
+from drone_rl.trust.domain import Prober, required_success, run_across
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
 from drone_rl.trust.perturbations import Condition, PerturbationMode
-from drone_rl.trust.rounding_sensitivity import require_function
+from drone_rl.trust.repetition import require_repeatable
 from drone_rl.trust.shifts_results import Domain, NetworkIdentity, Range, Robustness, packed
 from drone_rl.trust.suite import Suite, make_strip
 from drone_rl.utils.display import TableResult
@@ -33,6 +31,9 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
+
+CONFIRMING = 150
+"""New episodes over each range that was found."""
 
 
 class Shifts(TableResult, Robustness):
@@ -92,8 +93,8 @@ def shifts(
     check_axes(settings.axes or ())
     loaded = as_policy(policy, outputs, task=task, dynamics=dynamics)
     begin = time.perf_counter()
-    require_function(loaded, seed=seed.value, device=settings.device, renderer=settings.renderer)
-    subject = make_evaluated_policy(loaded, settings)
+    require_repeatable(loaded, seed=seed.value, device=settings.device, renderer=settings.renderer)
+    subject = EvaluatedPolicy.of(loaded, device=settings.device, renderer=settings.renderer)
     if settings.domain:
         if (judged := as_task(subject.task)).oracle is None:
             raise InputError(f"task={judged.name} has no oracle to compare with; give domain=false")
@@ -145,39 +146,15 @@ def _domain(
     report: Callable[[str], None],
 ) -> Domain:
     """Search the operating domain."""
-    ranges: dict[str, Range] = {}
-    with closing(PairedEvaluator(subject, settings.domain_episodes, seed.value)) as evaluator:
+    episodes, ranges = settings.domain_episodes, dict[str, Range]()
+    with closing(PairedEvaluator(subject, episodes, seed.value)) as evaluator:
         oracle = evaluator.run(Condition(), agent=OracleAgent()).episodes
         prober = Prober(evaluator, oracle, settings.good_share, settings.possible_share)
+        required = required_success(oracle, settings.good_share)
         for axis in axes:
             report(f"range of {axis.name}")
-            ranges[axis.name] = prober.search(axis)
+            ranges[axis.name] = prober.search(
+                axis,
+                lambda spans: run_across(subject, spans, CONFIRMING, seed.value, required),
+            )
     return Domain(plain=prober.plain, ranges=ranges)
-
-
-def make_evaluated_policy(policy: BasePolicy, settings: ShiftSettings) -> EvaluatedPolicy:
-    """Return the policy with its task, camera and transforms.
-
-    Raises:
-        InputError: The task has no settings to perturb, or its settings make another task.
-    """
-    task: Any = policy.task
-    if not isinstance(task, BaseTaskSettings):
-        settings_of_task = getattr(task, "settings", None)
-        is_rebuilt = isinstance(settings_of_task, BaseTaskSettings)
-        is_rebuilt = is_rebuilt and type(as_task(settings_of_task)) is type(task)
-        task = settings_of_task if is_rebuilt else None
-    if task is None:
-        raise InputError(
-            f"the task of policy={policy.name} has no settings to perturb; give another policy"
-        )
-    env: Any = policy.make_env(1, device=settings.device, renderer=settings.renderer)
-    try:
-        camera, transforms = worlds_of(env).camera, base_env(env).observer.transforms
-    finally:
-        env.close()
-    network = policy.make_network(settings.device).eval()
-    described = getattr(policy, "description", None)  # only policies from files have one
-    look = MINIMAL if described is None else described.appearance
-    where, moved = (settings.device, settings.renderer), (policy.dynamics, policy.actions)
-    return EvaluatedPolicy(network, task, camera, transforms, look, *where, *moved)

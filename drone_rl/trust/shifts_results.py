@@ -123,13 +123,11 @@ class Probe(Stored):
     good: bool
     """Certainly."""
     bad: bool = False
-    """Certainly not good; neither if there are too few episodes, or too many depend on rounding."""
+    """Certainly not good; neither if there are too few episodes."""
     refused: str | None = None
     """Why the task does not allow the condition; then the others are empty."""
     success: float | None = None
     """Success rate."""
-    fragile: int = 0
-    """Episodes that depend on rounding."""
     worst: Side | None = None
 
 
@@ -152,6 +150,29 @@ class TestedStrength(Stored):
     good: bool
 
 
+class RangeTest(Stored):
+    """Episodes at strengths drawn uniformly and jointly from ranges, one each."""
+
+    success: Share
+    """Success rate over the ranges."""
+    required: float
+    """The success rate that a good policy exceeds: `good_share` of the oracle's."""
+    failed: tuple[dict[AxisName, float | None], ...] = ()
+    """Values of the axes in the first episodes that failed; None if infinite."""
+    refused: str | None = None
+    """Why the task does not allow some of the strengths."""
+
+    @property
+    def is_passed(self) -> bool:
+        """Whether the policy is certainly good over the ranges as a whole."""
+        return self.refused is None and self.success.lower95 > self.required
+
+    @property
+    def fails_at_most(self) -> float:
+        """Largest fraction of the ranges on which it fails, with 95% confidence."""
+        return 1.0 - self.success.lower95
+
+
 class Range(Stored):
     """The widest range of an axis in which the policy is certainly good."""
 
@@ -162,6 +183,12 @@ class Range(Stored):
     high_open: bool | None = None
     """Whether it is still good at the strongest perturbation of that side; None if the side has no
     strengths."""
+    low_bad: float | None = None
+    high_bad: float | None = None
+    """The nearest tested values beyond the ends at which it is certainly not good; None without
+    any. The limit of another seed lies before them."""
+    test: RangeTest | None = None
+    """New episodes over the whole range; None if it is a single strength."""
     positions: tuple[float, float] | None = None
     """The ends on the axis's scale, lower first; None if it is not certainly good even without
     perturbation."""
@@ -177,9 +204,8 @@ class Range(Stored):
 
     @property
     def is_wide(self) -> bool:
-        """Whether it is more than a single strength."""
-        low, high = self.positions or (0.0, 0.0)
-        return low < high
+        """Whether it is more than a single strength, and new episodes confirmed it."""
+        return self.test is not None and self.test.is_passed
 
 
 class Domain(Stored):
@@ -277,6 +303,12 @@ class Robustness(Seeded, Provenance):
         }
 
     @property
+    def refuted(self) -> dict[str, RangeTest]:
+        """Axes with a range that new episodes did not confirm, with these episodes."""
+        tests = {name: found.test for name, found in self.ranges.items()}
+        return {name: of for name, of in tests.items() if of is not None and not of.is_passed}
+
+    @property
     def uncertain(self) -> list[tuple[str, FailedEnd]]:
         """Axes and the ends of sides at which it is neither certainly good nor certainly not."""
         ends = ((name, end) for name, of in self.ranges.items() for end in of.possible_failures)
@@ -307,6 +339,10 @@ class Robustness(Seeded, Provenance):
         names = [NAMES[name] for name in self.axes]
         return listed(names) if len(names) <= MAX_NAMED else f"{len(names)} axes"
 
+    def label(self, name: str) -> str:
+        """Return the name of an axis in reports."""
+        return NAMES[name]
+
     def at(self, name: str, value: float | None) -> str:
         """Return a value of an axis as text."""
         return f"{NAMES[name]} at {number(value)} {self.axes[name].unit}"
@@ -326,15 +362,18 @@ class Robustness(Seeded, Provenance):
             **({} if high is None else {"high": inward(high, up=False)}),
         }
         text = text.format(objects=self.terms.targets, **limits)
-        opens, lost = (
-            (found.low_open, found.high_open),
-            {f.end for f in found.failed if f.impossible},
-        )
-        tried = [
-            most for most, is_open in zip(("no less", "no more"), opens, strict=True) if is_open
-        ]
-        aside = [f"{listed(tried)} was tried"] if tried else []
-        aside += [f"no {'less' if end == 'low' else 'more'} is possible" for end in sorted(lost)]
+        lost = {failed.end for failed in found.failed if failed.impossible}
+        aside = []
+        for end, most in (("low", "no less"), ("high", "no more")):
+            bad = getattr(found, f"{end}_bad")
+            if getattr(found, f"{end}_open"):
+                aside.append(f"{most} was tried")
+            elif end in lost:
+                aside.append(f"{most} is possible")
+            elif bad is not None:
+                aside.append(f"certainly not at {number(bad)}")
+        if found.test is not None:
+            aside.append(f"fails on at most {percent(found.test.fails_at_most)} of it")
         return f"{text} ({listed(aside)})" if aside else text
 
     def frames(self, name: str) -> list[NDArray[np.uint8] | None]:
@@ -359,7 +398,7 @@ class Robustness(Seeded, Provenance):
             name: {end: value for end in ("low", "high") if (value := getattr(of, end)) is not None}
             | {"unit": self.axes[name].unit}
             for name, of in self.ranges.items()
-            if of.positions is not None and self.axes[name].is_tested
+            if of.positions is not None and self.axes[name].is_tested and name not in self.refuted
         }
 
     def table(self) -> list[list[str]]:
@@ -436,59 +475,22 @@ class Need(Model):
     unit: str
 
 
-class DomainRecheck(Result, Seeded):
-    """New episodes under required conditions, compared with a file."""
-
-    episodes: int
-    """At each strength."""
-    strengths: dict[str, tuple[float, ...]]
-    """Values that were run, by axis."""
-    contradictions: tuple[str, ...]
-    """What contradicts the file, one line each."""
-
-    def __str__(self) -> str:
-        """Return the numbers of episodes and strengths, and the seed."""
-        fitted = ", to which a policy could have been fitted" if self.seed_is_fixed else ""
-        kind = "fixed" if self.seed_is_fixed else "fresh"
-        return (
-            f"re-checked by {self.episodes:,} episodes at each of "
-            f"{sum(map(len, self.strengths.values()))} strengths, ends of the ranges and random "
-            f"ones ({kind} seed {self.seed}{fitted})"
-        )
-
-
-class Coverage(Result, Stored):
-    """A required operating domain compared with a measured one."""
+class Coverage(Result, Seeded):
+    """A required operating domain, tested as a whole."""
 
     needs: dict[str, Need]
-    """By axis."""
-    lacking: dict[str, str]
-    """By axis that is not covered, what the operating domain lacks."""
-    against: str | None = None
-    """The reason why the operating domain is refused, if it is."""
-    reflown: DomainRecheck | None = None
-    """New episodes at a sample of the requirements, if any were run."""
-
-    @property
-    def is_stated(self) -> bool:
-        """Whether the file states that the policy is good under all requirements."""
-        return not self.lacking and self.against is None
+    """Required ranges by axis."""
+    test: RangeTest | None = None
+    """None if no episodes were run."""
 
     @property
     def is_covered(self) -> bool:
-        """Whether it states so, and new episodes do not contradict it."""
-        return self.is_stated and self.reflown is not None and not self.reflown.contradictions
+        """Whether the policy is certainly good over the required ranges together."""
+        return self.test is not None and self.test.is_passed
 
     def __str__(self) -> str:
-        """Return a line for each axis that is not covered, or one for all."""
-        if self.is_covered:
-            return f"covered: {', '.join(self.needs)}, each alone, {self.reflown}"
-        lines = [*self.lacking.values(), *filter(None, [self.against])]
-        if self.reflown is not None:
-            lines += self.reflown.contradictions
-        elif not lines:
-            lines.append("the file states it, and no episodes re-checked it (domain_flights=0)")
-        return "\n".join(f"not covered: {line}" for line in lines)
+        """Return whether it is covered, and the evidence."""
+        return render("drone_rl.trust", "coverage.j2", c=self)
 
 
 def inward(value: float, *, up: bool) -> str:

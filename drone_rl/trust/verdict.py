@@ -20,9 +20,9 @@ from drone_rl.sim.actions import Actions
 from drone_rl.sim.tasks import Task
 from drone_rl.trust.baselines import run_baselines
 from drone_rl.trust.metrics import failure_table, summarise
-from drone_rl.trust.results import Proof, Rounding, Verdict
-from drone_rl.trust.rounding_sensitivity import check_rounding
-from drone_rl.trust.rule import Quantity, Rule, decide, kinds_within
+from drone_rl.trust.repetition import exchange_images, repeat
+from drone_rl.trust.results import NEEDED_EPISODES, CameraUse, Proof, Repetition, Verdict
+from drone_rl.trust.rule import Quantity, Rule, VerdictKind, decide, kinds_within
 from drone_rl.utils.exit_codes import NOT_CERTAIN
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.utils.progress import Progress
@@ -65,10 +65,11 @@ def judge_policy(
     """Run so many episodes of a policy and of each baseline, and apply the rule.
 
     Initial states are the same. `sampled` also runs the policy with sampled actions; for the other
-    arguments see `apply_rule`.
+    arguments see `apply_rule`. In environments with images the policy's episodes are repeated, see
+    `drone_rl.trust.repetition`.
 
     Raises:
-        InputError: The task has no oracle, baselines or strata; also what `check_rounding` raises.
+        InputError: The task has no oracle, baselines or strata, or an output is not finite.
     """
     base, worlds = base_env(env), worlds_of(env)
     check_judged(worlds.task, worlds.dynamics.actions)  # before its episodes
@@ -82,7 +83,7 @@ def judge_policy(
         base.load_state_dict(state)
         drawn = rollout(actor, env, episodes, greedy=False)
     base.load_state_dict(state)
-    rounding = check_rounding(env, actor, episodes, greedy)
+    sees = base.pixels
     return apply_rule(
         greedy,
         baselines,
@@ -91,7 +92,8 @@ def judge_policy(
         claim=claim,
         unlike=unlike,
         seed=seed,
-        rounding=rounding,
+        repetition=repeat(env, actor, greedy) if sees else None,
+        camera=exchange_images(env, actor, greedy) if sees else None,
     )
 
 
@@ -138,7 +140,8 @@ def apply_rule(
     claim: Proof | None = None,
     unlike: Mapping[str, Any] | None = None,
     seed: RootSeed | None = None,
-    rounding: Rounding | None = None,
+    repetition: Repetition | None = None,
+    camera: CameraUse | None = None,
 ) -> Verdict:
     """Apply the rule to episodes.
 
@@ -151,7 +154,8 @@ def apply_rule(
         unlike: Settings that differ from the training, by name.
         seed: Root of the environments' random streams; without it the verdict says that a policy
             could have been fitted to these environments.
-        rounding: How far `greedy` depends on rounding; None if that was not checked.
+        repetition: The same episodes again; None for baselines, which see no images.
+        camera: What changes with the images of other episodes; None for baselines.
 
     Raises:
         ValueError: The initial states differ.
@@ -164,8 +168,10 @@ def apply_rule(
     quantities = measure(greedy, baselines, rule)
     kind = decide([quantity.level for quantity in quantities], len(rule.strata))
     is_enough = _is_certain(quantities, rule)
-    is_open = rounding is not None and rounding.excessive
-    certain = is_enough and not is_open
+    certain = is_enough and (repetition is None or repetition.is_enough)
+    if kind is VerdictKind.GOOD and camera is not None:
+        certain &= camera.is_used is not None
+        kind = VerdictKind.TRIVIAL if camera.is_used is False else kind
     return Verdict(
         kind=kind,
         certain=certain,
@@ -176,7 +182,8 @@ def apply_rule(
         good_share=rule.good_share,
         terms=task.vocabulary,
         num_cubes=greedy.goals.reached.shape[-1],
-        rounding=rounding and rounding.replace(decides=is_enough and is_open),
+        repetition=repetition,
+        camera=camera,
         proof=_unless_contradicted(claim, greedy),
         greedy=summarise(greedy),
         sampled=None if sampled is None else summarise(sampled),
@@ -189,7 +196,7 @@ def apply_rule(
         else mean_bounds(sampled.success - greedy.success, -1.0, 1.0),
         failures=failure_table(greedy),
         quantities=dict(zip(rule.quantities, quantities, strict=True)),
-        enough=_enough(greedy, baselines, rule) if is_enough or not is_open else None,
+        enough=_enough(greedy, baselines, rule),
         unlike=dict(unlike or {}),
     )
 
@@ -268,5 +275,5 @@ def _enough(
     """Return about how many episodes certainty needs; None if more than `MANY` covers."""
     for times in (1, *MANY):
         if _is_certain(measure(greedy, baselines, rule, times), rule):
-            return times * len(greedy)
+            return max(NEEDED_EPISODES, times * len(greedy))
     return None

@@ -6,13 +6,30 @@ import json
 import pytest
 
 import drone_rl
-from benchmarks import gamed, gamed_certificates, gamed_memory, gamed_rounding
+from benchmarks import adversaries, gamed, gamed_certificates, gamed_memory, gamed_rounding
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
+from drone_rl.utils.seeding import root_seed
 
 
 def test_a_policy_that_depends_on_the_batch_is_not_good(tmp_path):
     assert not gamed_rounding.cases(tmp_path)["bad one at a time"]()
+
+
+@pytest.mark.parametrize(
+    "name", ["recurrent rounding", "blind sweep with memory", "blind sweep that counts calls"]
+)
+def test_adversaries_are_not_good(name, tmp_path, monkeypatch):
+    monkeypatch.setattr(adversaries, "EPISODES", 150)
+    assert not adversaries.cases(tmp_path)[name](root_seed(None))
+
+
+def test_deceived_seeds_are_counted(setup, monkeypatch):
+    made = {"all": lambda seed: True, "none": lambda seed: False}
+    monkeypatch.setattr(adversaries, "cases", lambda folder: made)
+    figures = adversaries.bench_adversaries(setup)
+    assert figures["adversaries_deceived"] == {"all": 2, "none": 0}
+    assert (figures["adversaries_most"], figures["adversaries_rate"]) == (2, 0.5)
 
 
 def test_non_finite_logits_are_an_error(tmp_path):

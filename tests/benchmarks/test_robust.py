@@ -1,6 +1,7 @@
 """Gains of randomized training, and operating domains on every axis."""
 
 import dataclasses
+import json
 from types import SimpleNamespace
 
 import pytest
@@ -113,19 +114,16 @@ def test_means_by_kind_of_shift():
 
 
 @pytest.mark.parametrize("is_reversed", [False, True])
-def test_required_ranges_are_enforced_in_their_direction(setup, monkeypatch, is_reversed):
-    """Reversed, for example, a largest visibility in fog is required instead of a smallest one."""
-    contradictions = type("Recheck", (), {"contradictions": ()})
-    axes = ("fog", "blur") if is_reversed else tuple(AXES)
-    made = shifts_of(drone_rl.load_policy(domain_axes.POLICY), axes=axes)
-    measured = drone_rl.Shifts(**dict(made.replace(image_size=(25, 64))))
-    monkeypatch.setattr(domain_axes, "shifts", lambda *args, **options: measured)
-    monkeypatch.setattr(domain_axes, "recheck_domain", lambda *args: contradictions)
-    if is_reversed:
-        monkeypatch.setattr(
-            "drone_rl.trust.coverage.lacking",
-            lambda numbers, name, need: None if need.low is None else "reversed",
-        )
+def test_ranges_are_accepted_and_values_beyond_them_are_not(setup, monkeypatch, is_reversed):
+    made = shifts_of(drone_rl.load_policy(domain_axes.POLICY), axes=tuple(AXES))
+
+    def check(policy, path, settings, seed):
+        ((name, need),) = json.loads(path.read_text()).items()
+        is_within = need == made.requirements()[name]
+        return SimpleNamespace(is_covered=is_within != is_reversed)
+
+    monkeypatch.setattr(domain_axes, "shifts", lambda *args, **options: made)
+    monkeypatch.setattr(domain_axes, "check_required", check)
     figures = domain_axes.bench_domain_axes(setup)
-    assert figures["domain_axes"] == len(axes)
-    assert figures["domain_axes_right"] == (0 if is_reversed else 22)
+    assert figures["domain_axes"] == len(AXES)
+    assert figures["domain_axes_right"] == (0 if is_reversed else len(AXES))

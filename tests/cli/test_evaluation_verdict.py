@@ -5,7 +5,6 @@ import json
 import pytest
 
 import drone_rl
-from tests.trust.making import shifts_of
 from tests.verification.checker.making import of_every_place
 
 
@@ -71,22 +70,18 @@ def test_good_can_be_required(in_process, policy, more, status):
 @pytest.mark.parametrize(
     ("needed", "status", "words"),
     [
-        ("blur: {high: 1, unit: pixels}", 0, "covered: blur"),
-        ("blur: {high: 2, unit: pixels}", 17, "not covered: blur: needed 0 to 2 pixels, good 0"),
+        ("blur: {high: 0.5, unit: pixels}", 0, "covered: 100%"),
+        ("dead_rows: {low: 12, high: 12, unit: rows}", 17, "not covered: "),
     ],
 )
-def test_an_operating_domain_can_be_required(in_process, tmp_path, good, needed, status, words):
-    shifts_of(good).write_json(tmp_path / "s.json")
+def test_an_operating_domain_can_be_required(in_process, tmp_path, needed, status, words):
     (tmp_path / "needs.yaml").write_text(needed)
-    many = [*ONE, "episodes=150", "domain_flights=30", "shifts=s.json", "require_domain=needs.yaml"]
+    many = [*ONE, "episodes=150", "domain_flights=40", "require_domain=needs.yaml"]
     done = in_process(*many, "hydra.run.dir=v")
     assert done.returncode == status, done.stderr
     assert f"\n{words}" in done.stdout
     kept = json.loads((tmp_path / "v" / "verdict.json").read_text())
-    assert bool(kept["required_domain"]["lacking"]) == (status == 17)
-    if status == 0:
-        unchecked = in_process(*many, "episodes=10", "domain_flights=0")
-        assert unchecked.returncode == 17 and "no episodes re-checked it" in unchecked.stdout
+    assert kept["required_domain"]["test"]["success"]["trials"] == 40
 
 
 def test_a_verdict_under_another_appearance_says_so(in_process, tmp_path):

@@ -21,6 +21,7 @@ from drone_rl.trust.shifts_results import (
     NetworkIdentity,
     Plain,
     Probe,
+    RangeTest,
     Robustness,
     packed,
 )
@@ -60,16 +61,19 @@ def along(axis, of, last):
 def found_to(axis, of, last):
     """The range of an axis that is good as far as one of its strengths, and no farther."""
     limit = abs(axis.position(last)) + 1e-12
-    ends = {
-        end: walk(axis, sign, 0, lambda s, _: abs(axis.position(s)) <= limit)
-        for end, sign in axis.signs.items()
-    }
+
+    def probe(strength):
+        good = abs(axis.position(strength)) <= limit
+        return Probe(good=good, bad=not good)
+
+    ends = {end: walk(axis, sign, probe) for end, sign in axis.signs.items()}
     failed = [
         FailedEnd(good=False, bad=True, success=0.5, end=name, value=axis.value(end.failed, of))
         for name, end in ends.items()
         if end.failed is not None
     ]
-    return range_of(axis, ends, failed, of)
+    passed = RangeTest(success=proportion(EPISODES, EPISODES), required=0.9)
+    return range_of(axis, ends, failed, of, passed)
 
 
 def owned(name, of):

@@ -78,16 +78,6 @@ class Tied(ImageNetwork):
         return torch.stack([lead, torch.zeros_like(lead), torch.full_like(lead, -1.0)], -1)
 
 
-def test_fragile_episodes_are_recorded():
-    worlds = make_env()
-    for examines in (True, False):
-        agent = PolicyAgent(Tied(), examines_rounding=examines)
-        agent.act(sight(worlds, 0, 1, 2, pixels=[1.0, 0.0, 0.0]))
-        agent.act(sight(worlds, 1, 2, starts=False, pixels=[0.0, 0.0]))
-        assert agent.is_fragile.tolist() == [examines, False, False]
-    worlds.close()
-
-
 @pytest.fixture
 def evaluator():
     made = PairedEvaluator(subject(task=TaskSettings(num_cubes=2), camera=CameraSettings()), 30)

@@ -1,7 +1,6 @@
 """Which flights under other conditions are found, and which are not believed."""
 
 import json
-import math
 import os
 import shutil
 
@@ -11,20 +10,15 @@ import pytest
 import drone_rl
 from drone_rl.config.commands import JudgeSettings
 from drone_rl.policies.zoo import shifts_path
-from drone_rl.trust.axes import AXES
-from drone_rl.trust.coverage import (
-    _strengths,
-    find_domain,
-    lacking,
-    read_requirements,
-    recheck_domain,
-)
+from drone_rl.trust.axes import AXES, find_axes
+from drone_rl.trust.coverage import check_required, find_domain, read_requirements, required_span
+from drone_rl.trust.paired_evaluation import EvaluatedPolicy
 from drone_rl.trust.shifts_results import Need, Robustness
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import RootSeed
 from tests.evidence import SHIFTS, changed
-from tests.trust.making import shifts_of, subject_of
+from tests.trust.making import shifts_of
 
 
 @pytest.fixture
@@ -78,91 +72,85 @@ def test_given_file_must_be_of_the_policy(good, tmp_path):
         find_domain(foreign, path)
 
 
-def test_verdict_with_a_required_domain(good, tmp_path):
-    """With few flights it is not certain, and lets it stand; a stricter one does not."""
-    good = good.in_task(num_cubes=1)  # short episodes
-    path = leave(tmp_path / "a", shifts_of(good))
-    (tmp_path / "needs.yaml").write_text("blur: {high: 1.0, unit: pixels}")
-    told = {"shifts": path, "require_domain": tmp_path / "needs.yaml", "progress": silent}
-    told["domain_flights"] = 30
-    done = drone_rl.judge(good, episodes=5, sampled=False, **told)
-    (line,) = (one.text for one in done.findings if one.section == "shifts")
-    assert done.required_domain.is_covered and "ood with blur of up to 1 pixels" in line
-    assert f"see {path}, dated 1970-01-01 0" in line
-    assert "re-checked by 30 episodes at each of 3 strengths" in str(done)
-    assert len(str(done).splitlines()) == 5  # verdict, two findings, required domain, seed
-    assert line in str(done) and line in done._repr_html_()
-    assert done.as_dict()["required_domain"]["lacking"] == {}
-    strict = drone_rl.judge(good, episodes=5, sampled=False, good_share=0.99, **told)
-    assert not strict.required_domain.is_covered and "not quoted" in str(strict)
-    unchecked = drone_rl.judge(good, episodes=5, sampled=False, **{**told, "domain_flights": 0})
-    assert not unchecked.required_domain.is_covered
-    assert "not covered: it requires 0.9" in str(strict)
-
-
-def test_missing_domain_is_refused_before_any_episode(good, tmp_path, monkeypatch):
-    monkeypatch.setattr("drone_rl.sim.worlds.Worlds.render", None)
-    needs = tmp_path / "needs.yaml"
-    needs.write_text("blur: {high: 1.0, unit: pixels}")
-    told = {"require_domain": needs, "outputs": tmp_path, "progress": silent}
-    with pytest.raises(InputError, match=r"no shifts.json; run drone-rl shifts policy=.*mine"):
-        drone_rl.judge(good, **told)
-    path = leave(tmp_path / "shifts" / "runs" / "a", shifts_of(good).replace(domain=None))
-    with pytest.raises(InputError, match=r"has no ranges \(domain=false\); run drone-rl shifts"):
-        drone_rl.judge(good, **told)
-    shifts_path(good.path).write_text(path.read_text()[:-9])
-    with pytest.raises(InputError, match="is damaged"):
-        drone_rl.judge(good, **told)
-    with pytest.raises(InputError, match="policy=left has no network"):
-        drone_rl.judge("left", **told)
-
-
-FEW = JudgeSettings(domain_flights=60)
+FEW = JudgeSettings(domain_flights=40)
 SEED = RootSeed(3, True)
 
 
 @pytest.fixture(scope="module")
 def near():
+    """A good policy in short episodes."""
     return drone_rl.load_policy("good").in_task(num_cubes=1)
 
 
-def need(unit="", **ends):
-    return Need(unit=unit, **ends)
+@pytest.fixture
+def require(tmp_path):
+    def check(policy, text, settings=FEW):
+        (tmp_path / "needs.yaml").write_text(text)
+        return check_required(policy, tmp_path / "needs.yaml", settings, SEED)
+
+    return check
 
 
-def test_true_range_is_not_contradicted(near):
-    found = recheck_domain(near, {"blur": need(high=0.5)}, shifts_of(near), FEW, SEED)
-    assert found.contradictions == ()
-    assert found.strengths["blur"][0] == 0.5 and len(found.strengths["blur"]) == 3
-    assert all(0 < value < 0.5 for value in found.strengths["blur"][1:])
-    assert "(fixed seed 3, to which a policy could have been fitted)" in str(found)
-    assert "60 episodes at each of 3 strengths" in str(found)
+def test_required_ranges_are_tested_together(near, require):
+    found = require(near, "blur: {high: 0.5, unit: pixels}\nfog: {low: 100, unit: m of sight}")
+    assert found.is_covered and found.test.success.trials == 40
+    assert str(found).startswith("covered: 100% (95% CI 91.2% to 100%) over blur and fog together")
+    assert "it fails on at most 8.8% of the ranges. Fixed seed 3: a policy could" in str(found)
 
 
-def test_invented_range_is_contradicted(near):
-    """Good, says the file, with twelve of 25 rows dead."""
-    stated = shifts_of(near, axes=("dead_rows",))
-    found = recheck_domain(near, {"dead_rows": need(low=12.0, high=12.0)}, stated, FEW, SEED)
-    assert found.contradictions and all(
-        line.startswith("dead rows at 12 rows: ") and "certainly not good there" in line
-        for line in found.contradictions
-    )
+def test_a_range_in_which_the_policy_fails_is_not_covered(near, require):
+    found = require(near, "dead_rows: {low: 10, high: 12, unit: rows}")
+    assert not found.is_covered
+    assert {values["dead_rows"] for values in found.test.failed} <= {10.0, 11.0, 12.0}
+    assert "90.0% has to be exceeded; it fails at dead_rows=1" in str(found)
+
+
+def test_a_required_domain_of_a_callable_is_tested(near, require):
+    network = near.make_network()
+    policy = drone_rl.policy_from(network, task=near.task)
+    assert require(policy, "blur: {high: 0.5, unit: pixels}").is_covered
+
+
+def test_no_episodes_cover_nothing(near, require):
+    found = require(near, "blur: {high: 1, unit: pixels}", JudgeSettings(domain_flights=0))
+    assert not found.is_covered and "no episodes tested it" in str(found)
+
+
+def test_verdict_with_a_required_domain(near, tmp_path):
+    (tmp_path / "needs.yaml").write_text("blur: {high: 0.5, unit: pixels}")
+    told = {"require_domain": tmp_path / "needs.yaml", "progress": silent, "domain_flights": 40}
+    done = drone_rl.judge(near, episodes=5, sampled=False, **told)
+    assert done.required_domain.is_covered and "\ncovered: " in str(done)
+    assert done.as_dict()["required_domain"]["needs"]["blur"]["high"] == 0.5
+    strict = drone_rl.judge(near, episodes=5, sampled=False, good_share=0.99, **told)
+    assert not strict.required_domain.is_covered and strict.status() == 17
+    with pytest.raises(InputError, match="policy=left has no network"):
+        drone_rl.judge("left", **told)
 
 
 @pytest.mark.parametrize("name", list(AXES))
-def test_rechecked_strengths_are_within_the_required_range(near, name):
-    of, axis = subject_of(near), AXES[name]
-    value = axis.value(axis.strengths[1], of)
-    stated = shifts_of(near, axes=(name,))
-    neutral = stated.axes[name].neutral
-    neutral = math.inf if neutral is None else neutral
-    wanted = need(low=value) if value < neutral else need(high=value)
-    found = [*_strengths(axis, of, wanted, stated, np.random.default_rng(0))]
-    values = [axis.value(strength, of) for strength in found]
-    assert any(math.isclose(one, value) for one in values)
+def test_sampled_strengths_are_within_the_required_range(near, name):
+    of = EvaluatedPolicy.of(near)
+    (axis,) = find_axes([name], of)
+    value, neutral = (axis.value(s, of) for s in (axis.strengths[1], axis.neutral))
     low, high = sorted((value, neutral))
+    span = required_span(axis, Need(**{"low" if value < neutral else "high": value}, unit=""), of)
+    rng = np.random.default_rng(0)
+    values = [axis.value(axis.sample(*span, rng), of) for _ in range(20)]
     assert all(low - 1e-9 <= one <= high + 1e-9 for one in values)
-    assert len(found) == 3 or axis.whole
+    assert len({*values}) > 1
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("sun: {high: 50, unit: degrees}", "elevation of the sun: low is missing .* give low, too"),
+        ("sun: {low: 70, unit: degrees}", "elevation of the sun: high is missing .* but low is 70"),
+    ],
+)
+def test_requirements_that_do_not_fit_the_policy(require, text, message):
+    with pytest.raises(InputError, match=rf"require_domain=.*needs.yaml: .*{message}"):
+        require(drone_rl.load_policy("good"), text)
 
 
 @pytest.fixture
@@ -186,66 +174,16 @@ def test_requirements_in_yaml_and_json(read):
     assert read(json.dumps(data), "needs.json") == needs
 
 
+def need(unit="", **ends):
+    return Need(unit=unit, **ends)
+
+
 def test_domain_files_are_valid_requirements(read):
     ranges = Robustness.read(SHIFTS).requirements()
     assert ranges["sun"] == {"low": 21.07, "high": 60.0, "unit": "degrees"}
     read(json.dumps(ranges), "domain.json")
     bad = {"domain.ranges.sun.positions": None, "axes.blur.levels.1.modes.constant.unchanged": True}
     assert [*Robustness.read(changed(SHIFTS, bad)).requirements()] == ["brightness"]
-
-
-def lacks(name, changes=None, **ends):
-    return lacking(Robustness.read(changed(SHIFTS, changes or {})), name, need(**ends))
-
-
-@pytest.mark.parametrize(
-    ("name", "low", "high", "words"),
-    [
-        ("sun", 21.07, 60.0, None),
-        ("sun", 30.0, None, None),
-        ("sun", None, 60.0, None),
-        ("sun", 21.0, None, "needed 21 to 55 degrees, good 21.07 to 60 degrees"),
-        ("sun", 30.0, 61.0, "needed 30 to 61 degrees"),
-        ("blur", None, 1.5, None),
-        ("blur", None, 1.6, "needed 0 to 1.6 pixels, good 0 to 1.5 pixels"),
-        ("brightness", 0.9, 1.0, "good 1 to 1 times"),
-        ("fog", 60.0, None, "fog: not evaluated; run drone-rl shifts with axes=[fog]"),
-    ],
-)
-def test_lacking_range(name, low, high, words):
-    found = lacks(name, low=low, high=high)
-    assert found == words if words is None else words in found
-
-
-def test_single_end_beyond_the_unperturbed_value_is_refused():
-    with pytest.raises(InputError, match=r"^elevation of the sun: low is missing .* give low, too"):
-        lacks("sun", high=50.0)
-    with pytest.raises(
-        InputError, match=r"^elevation of the sun: high is missing .* but low is 70"
-    ):
-        lacks("sun", low=70.0)
-
-
-def test_required_fog_has_no_upper_end():
-    ranges = {"low": 80.0, "high": None, "positions": [0.0, 1 / 80]}  # from clear air
-    fog = {**SHIFTS["axes"]["blur"], "neutral": None, "unit": "m of sight"}
-    changes = {"axes.fog": fog, "domain.ranges.fog": ranges}
-    assert lacks("fog", changes, low=80.0) is None
-    words = "needed 60 and more m of sight, good 80 and more m of sight"
-    assert words in lacks("fog", changes, low=60.0)
-    clear = {**changes, "domain.ranges.fog.low": None, "domain.ranges.fog.positions": [0, 0]}
-    words = "fog: needed 60 and more m of sight, good only without fog"
-    assert lacks("fog", clear, low=60.0) == words
-
-
-def test_untested_axes_cover_nothing():
-    same = {"axes.blur.levels.1.modes.constant.unchanged": True}
-    assert "not tested" in lacks("blur", same, high=1.0)
-    nowhere = {"domain.ranges.blur.positions": None}
-    assert "without perturbation" in lacks("blur", nowhere, high=1.0)
-    end = {"end": "high", "good": False, "value": 2.0, "impossible": True}
-    lost = {"domain.ranges.blur.failed": [end]}
-    assert "impossible even for the oracle" in lacks("blur", lost, high=2.0)
 
 
 @pytest.mark.parametrize(

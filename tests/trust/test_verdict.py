@@ -11,7 +11,7 @@ from drone_rl.policies.baselines import ConstantAgent, OracleAgent
 from drone_rl.policies.policy import Policy
 from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.collect_cubes import Side
-from drone_rl.trust.results import Rounding
+from drone_rl.trust.results import CameraUse, Repeated, Repetition
 from drone_rl.trust.rule import Rule, VerdictKind
 from drone_rl.trust.verdict import apply_rule, judge_for_selection, judge_policy, measure, observe
 from drone_rl.utils.errors import InputError
@@ -218,39 +218,62 @@ def test_task_without_an_oracle_is_refused(monkeypatch):
         judge_policy(env, ConstantAgent(Move.LEFT), 2)
 
 
-def rounding(fragile, number=400, unexplained=0):
-    """A check of 40 frames for each of so many episodes, with fragile frames in all of them."""
-    return Rounding(
-        arithmetic="float32 on cpu, PyTorch",
-        bound=True,
-        frames=40 * number,
-        fragile=fragile,
-        episodes=number,
-        fragile_episodes=min(fragile, number),
-        compared="fused kernel",
-        compared_episodes=50,
-        differing=unexplained,
-        unexplained=unexplained,
-    )
+def repeated(different, successes=50, episodes=50):
+    run = Repeated(how="one environment at a time", different=different, successes=successes)
+    same = Repeated(how="8 environments at a time", different=0, successes=50)
+    made = {"implementation": "PyTorch", "episodes": episodes, "successes": 50}
+    return Repetition(**made, runs=(same, run))
 
 
-def test_few_fragile_frames_leave_a_verdict_certain(judged):
-    verdict = judged(lambda i, side: True, rounding=rounding(100))
-    assert (verdict.kind, verdict.exit_code) == (VerdictKind.GOOD, 0)
-    assert verdict.sentence.endswith("The verdict holds for float32 on cpu, PyTorch.")
+@pytest.mark.parametrize(("different", "is_certain"), [(0, True), (1, True), (2, False)])
+def test_a_verdict_is_certain_only_if_at_most_one_repeated_episode_differs(
+    judged, different, is_certain
+):
+    verdict = judged(lambda i, side: True, repetition=repeated(different, 50 - different))
+    assert (verdict.kind, verdict.certain) == (VerdictKind.GOOD, is_certain)
+    assert verdict.exit_code == (0 if is_certain else 13)
+    words = "2 of 50 episodes end otherwise: it collects every cube in 48 of them instead of 50."
+    assert (words in verdict.sentence) != is_certain
 
 
-@pytest.mark.parametrize("found", [rounding(321), rounding(101), rounding(0, unexplained=1)])
-def test_many_fragile_frames_or_episodes_or_other_actions_make_it_uncertain(judged, found):
-    verdict = judged(lambda i, side: True, rounding=found)
-    assert (verdict.kind, verdict.certain, verdict.exit_code) == (VerdictKind.GOOD, False, 13)
-    assert "Not certain: decisions depend on rounding." in verdict.sentence
-    assert verdict.rounding.decides
+def test_too_few_repeated_episodes_are_not_certain(judged):
+    verdict = judged(lambda i, side: True, repetition=repeated(0, 49, episodes=49))
+    assert not verdict.certain
 
 
-def test_more_episodes_do_not_help_where_rounding_decides(judged):
-    verdict = judged(lambda i, side: True, number=8, rounding=rounding(320, number=8))
-    assert not verdict.certain and verdict.enough is None
+def camera(own, exchanged, low, high, strata=(0.0, 0.0)):
+    """The lower and the upper end of the intervals of the differences."""
+    success = {"mean": own - exchanged, "lower95": low, "upper95": high, "count": 200}
+    left = dict(zip(("lower95", "upper95"), strata, strict=True))
+    made = {"success": success, "strata": {"left": {"mean": 0.0, "count": 200, **left}}}
+    return CameraUse.read({"own": own, "exchanged": exchanged, **made})
+
+
+@pytest.mark.parametrize(
+    ("found", "is_used"),
+    [
+        (camera(1.0, 0.99, -0.02, 0.04), False),
+        (camera(1.0, 0.95, 0.01, 0.1), False),
+        (camera(1.0, 0.91, 0.05, 0.11), None),
+        (camera(1.0, 0.5, 0.4, 0.6), True),
+        (camera(0.29, 0.29, -0.02, 0.02), None),  # hardly ever succeeds, so goals decide
+        (camera(0.05, 0.0, 0.01, 0.09, strata=(0.11, 0.3)), True),
+        (camera(0.05, 0.0, 0.01, 0.09, strata=(0.1, 0.3)), None),
+    ],
+)
+def test_use_of_the_camera(found, is_used):
+    assert found.is_used is is_used
+
+
+def test_only_a_policy_that_uses_its_camera_is_good(judged):
+    seeing = judged(lambda i, side: True, camera=camera(1.0, 0.5, 0.4, 0.6))
+    assert (seeing.kind, seeing.certain) == (VerdictKind.GOOD, True)
+    blind = judged(lambda i, side: True, camera=camera(1.0, 0.98, -0.02, 0.05))
+    assert (blind.kind, blind.certain, blind.exit_code) == (VerdictKind.TRIVIAL, True, 18)
+    assert "does not use its camera: with the images of other episodes it" in blind.sentence
+    unknown = judged(lambda i, side: True, camera=camera(1.0, 0.9, 0.05, 0.15))
+    assert (unknown.kind, unknown.certain) == (VerdictKind.GOOD, False)
+    assert "too few to determine whether it uses its camera" in unknown.sentence
 
 
 @pytest.fixture

@@ -269,13 +269,13 @@ ADVERSARIAL = (
     ),
     Row(
         "fragile_honest",
-        'honest policies, bundled or trained by default, "not certain" because of rounding',
+        'honest policies, bundled or trained by default, "not certain" when episodes are repeated',
         "{fragile_honest} of {fragile_honest_total}",
         "0",
     ),
     Row(
         "domain_axes",
-        "axes whose operating domain is enforced in the right direction, from file to verdict",
+        "axes on which the range that was found is accepted, and bad values are refused",
         "{domain_axes_right} of {domain_axes}",
         "all",
     ),

@@ -199,6 +199,13 @@ class Task(abc.ABC, Generic[S]):
         `state` is that before the step and stays as it is; `body` are the drones after it.
         """
 
+    def advance(self, state: S, body: BodyState, speeds: Tensor) -> tuple[S, Tensor]:
+        """Return `step`; a task whose rules depend on the commanded speeds overrides this.
+
+        `speeds` are forward, left, up and turning left, as fractions of the greatest. (N, 4).
+        """
+        return self.step(state, body)
+
     def touch(self, state: S, position: Tensor, before: Tensor | None = None) -> Tensor | None:
         """Apply the rules of contact in place, without a step or reward; by default there are none.
 

@@ -11,10 +11,10 @@ from torch.nn import functional
 
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.layers import Layer, Unsupported, as_layers
-from drone_rl.policies.rounded_layers import SLACK, UNIT
-from drone_rl.policies.rounding import PIXEL_UNITS, RoundingBound
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.cube_images import NOTHING
+from drone_rl.verification.prover.rounded_layers import SLACK, UNIT
+from drone_rl.verification.prover.rounding import PIXEL_UNITS, RoundingBound
 
 
 class NetworkBounds:
@@ -30,7 +30,7 @@ class NetworkBounds:
         """Prepare the layers.
 
         An action is certain only if its logit leads by more than `gap` and by more than the bound
-        on rounding errors, see `drone_rl.policies.rounding`.
+        on rounding errors, see `drone_rl.verification.prover.rounding`.
 
         Raises:
             InputError: `as_layers` does not support the network.
@@ -38,7 +38,7 @@ class NetworkBounds:
         layers = as_layers(network)
         if isinstance(layers, Unsupported):
             raise InputError(f"proofs do not support it: {layers.reason}; prove another policy")
-        self.gap, self._rounding = gap, RoundingBound(layers, network.actions)
+        self.gap, self._rounding = gap, RoundingBound(layers)
         *inner, last = layers.in_turn
         scale, self._steps = 2, []
         for layer in inner:
@@ -84,8 +84,8 @@ class NetworkBounds:
     @torch.no_grad()
     def decide(self, images: Tensor) -> tuple[Tensor, Tensor]:
         """Return the bits of the possible actions of images, and the gap of the top two logits."""
-        decisions = self._rounding.decide(images)
-        logits, loses = decisions.outputs, ~decisions.possible[:, self._second]
+        logits, possible = self._rounding.decide(images)
+        loses = ~possible[:, self._second]
         lead = logits[:, self._first] - logits[:, self._second]
         highest = logits.topk(2).values
         return self._bits(loses & (lead > self.gap)), highest[:, 0] - highest[:, 1]

@@ -10,7 +10,6 @@ from torch import Tensor, nn
 from torchrl.envs import EnvBase
 
 from drone_rl.envs import base_env, worlds_of
-from drone_rl.policies.rounding import RoundingBound
 from drone_rl.sim.tasks.collect_cubes import CubesEnd, WorldState
 from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError
@@ -19,6 +18,7 @@ from drone_rl.verification.prover.boxes import Boxes
 from drone_rl.verification.prover.cells import Cells
 from drone_rl.verification.prover.lattice import AHEAD, LEFT, RIGHT, Graph, LatticeState
 from drone_rl.verification.prover.policy_spec import PolicySpec
+from drone_rl.verification.prover.rounding import RoundingBound
 
 MIN_PROBABILITY = 1e-18  # nodes less probable than this at every step are not evaluated
 NEGLIGIBLE = 1e-15  # sum of the probabilities of running episodes at which propagation stops

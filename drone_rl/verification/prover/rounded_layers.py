@@ -1,4 +1,4 @@
-"""Rounding errors of single layers, see `drone_rl.policies.rounding`.
+"""Rounding errors of single layers, see `drone_rl.verification.prover.rounding`.
 
 Errors are bounds, in float64, on the difference between any float32 result and the exact one.
 """

@@ -1,0 +1,1 @@
+"""Tasks of terms: objects, and named functions of a step for rewards, ends and success."""

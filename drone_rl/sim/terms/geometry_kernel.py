@@ -1,0 +1,151 @@
+"""Distances to boxes, balls and upright cylinders: the one contact query, for tasks and audits.
+
+All functions are of one environment. Lengths in metres, world frame, in float64.
+"""
+
+from typing import Any
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+BALL = wp.constant(0)
+CYLINDER = wp.constant(1)
+BOX = wp.constant(2)
+"""Shapes; a cylinder stands upright, and a box is parallel to the world's axes."""
+GOAL = wp.constant(0)
+OBSTACLE = wp.constant(1)
+DECORATION = wp.constant(2)
+"""Roles: only obstacles are solid, and decorations are never touched."""
+NOTHING = wp.constant(-1)
+"""Number of no object."""
+_SEARCHES = wp.constant(48)
+"""Steps of searches along a path, which shrink it by a third or a half: to below 1e-8 of it."""
+
+
+@wp.struct
+class Objects:
+    """P objects of each of N environments."""
+
+    shapes: wp.array[int]
+    roles: wp.array[int]
+    sizes: wp.array[wp.vec3d]
+    """Half extents; of a ball and a cylinder the first is the radius."""
+    places: wp.array2d[wp.vec3d]
+    """Centres. Shape: (N, P), as of what follows."""
+    present: wp.array2d[wp.bool]
+    touched: wp.array2d[wp.bool]
+    """Whether the drone has touched it in this episode."""
+
+
+@wp.struct
+class Nearest:
+    """What is nearest to a point."""
+
+    distance: wp.float64
+    """To its surface; negative inside."""
+    normal: wp.vec3d
+    """Unit vector out of the surface, towards the point from outside."""
+    thing: int
+    """Number of the object, or `NOTHING`."""
+
+
+@wp.func
+def distance_to(shape: int, size: wp.vec3d, away: wp.vec3d) -> wp.float64:
+    """Return the distance of a point to a surface, negative inside; `away` is from the centre."""
+    zero = wp.float64(0.0)
+    if shape == BALL:
+        return wp.length(away) - size[0]
+    beyond = wp.vec3d(wp.abs(away[0]), wp.abs(away[1]), wp.abs(away[2])) - size
+    if shape == CYLINDER:
+        flat = wp.sqrt(away[0] * away[0] + away[1] * away[1])
+        beyond = wp.vec3d(flat - size[0], -size[0], wp.abs(away[2]) - size[2])
+    outside = wp.vec3d(wp.max(beyond[0], zero), wp.max(beyond[1], zero), wp.max(beyond[2], zero))
+    return wp.length(outside) + wp.min(wp.max(beyond), zero)
+
+
+@wp.func
+def normal_of(shape: int, size: wp.vec3d, away: wp.vec3d) -> wp.vec3d:
+    """Return the outward normal of the surface point that is nearest to a point."""
+    step = wp.float64(1.0e-6)
+    slope = wp.vec3d()
+    for axis in range(3):
+        ahead = wp.vec3d(away)
+        behind = wp.vec3d(away)
+        ahead[axis] = ahead[axis] + step
+        behind[axis] = behind[axis] - step
+        slope[axis] = distance_to(shape, size, ahead) - distance_to(shape, size, behind)
+    if wp.length(slope) == wp.float64(0.0):
+        return wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(1.0))
+    return wp.normalize(slope)
+
+
+@wp.func
+def nearest(objects: Objects, env: int, point: wp.vec3d, role: int) -> Nearest:
+    """Return the nearest present object of a role; at an infinite distance if there is none."""
+    found = Nearest(wp.float64(wp.inf), wp.vec3d(), int(NOTHING))
+    for i in range(objects.shapes.shape[0]):
+        if objects.roles[i] == role and objects.present[env, i]:
+            away = point - objects.places[env, i]
+            distance = distance_to(objects.shapes[i], objects.sizes[i], away)
+            if distance < found.distance:
+                found.distance = distance
+                found.thing = i
+    if found.thing != NOTHING:
+        i = found.thing
+        away = point - objects.places[env, i]
+        found.normal = normal_of(objects.shapes[i], objects.sizes[i], away)
+    return found
+
+
+@wp.func
+def sweep(
+    objects: Objects, env: int, thing: int, before: wp.vec3d, now: wp.vec3d, radius: wp.float64
+) -> wp.float64:
+    """Return the fraction of a straight path after which a ball touches an object; inf for never.
+
+    The distance to a convex body is convex along a line: search its least value, and from there
+    back for the place where it falls to the radius.
+    """
+    shape = objects.shapes[thing]
+    size = objects.sizes[thing]
+    start = before - objects.places[env, thing]
+    path = now - before
+    if distance_to(shape, size, start) <= radius:
+        return wp.float64(0.0)
+    low = wp.float64(0.0)
+    high = wp.float64(1.0)
+    third = wp.float64(1.0 / 3.0)
+    for _ in range(_SEARCHES):
+        left = low + (high - low) * third
+        right = high - (high - low) * third
+        if distance_to(shape, size, start + left * path) < distance_to(
+            shape, size, start + right * path
+        ):
+            high = right
+        else:
+            low = left
+    if distance_to(shape, size, start + high * path) > radius:
+        return wp.float64(wp.inf)
+    low = wp.float64(0.0)
+    for _ in range(_SEARCHES):
+        middle = wp.float64(0.5) * (low + high)
+        if distance_to(shape, size, start + middle * path) > radius:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+@wp.kernel
+def _query(
+    objects: Objects, points: wp.array2d[wp.vec3d], role: int, found: wp.array2d[Nearest]
+) -> None:
+    """Answer queries, a thread for each point of each environment."""
+    env, i = wp.tid()
+    found[env, i] = nearest(objects, env, points[env, i], role)
+
+
+def query(objects: Any, points: Any, role: int, found: Any) -> None:
+    """Write `nearest` of points, (N, K), to an array of `Nearest`."""
+    wp.launch(_query, points.shape, inputs=[objects, points, role, found], device="cpu")

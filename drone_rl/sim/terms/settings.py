@@ -1,0 +1,140 @@
+"""Settings of a task of terms: objects, starts, bounds, rewards, ends and success."""
+
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator
+
+from drone_rl.config.task import BaseTaskSettings, Color, ObjectRegion
+from drone_rl.sim.terms.terms import ENDS, REWARDS, SUCCESSES, Terms, TermSettings
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import OneOf, Real, Several, Span, Whole
+from drone_rl.utils.settings import Settings
+
+Coordinate = Annotated[Any, Span(Real(-1000.0, 1000.0, unit="m"))]
+Size = Real(0.01, 1000.0, unit="m")
+ROLES = ("goal", "obstacle", "decoration")
+SHAPES = ("ball", "cylinder", "box")
+
+
+class ObjectSettings(Settings):
+    """Objects of one kind. Lengths in metres, world frame: x forward, y left, z up."""
+
+    shape: Annotated[str, OneOf(SHAPES)] = "box"
+    """ball, cylinder (upright) or box (parallel to the axes)."""
+    role: Annotated[str, OneOf(ROLES)] = "obstacle"
+    """goal, which vanishes when the drone touches it; obstacle, which is solid; decoration."""
+    count: Annotated[int, Whole(1, 200, "objects")] = 1
+    """How many there are."""
+    size: Annotated[tuple[float, float, float], Several(Size, 3, 3)] = (1.0, 1.0, 1.0)
+    """Edges along x, y and z; of a ball the diameter thrice, of a cylinder the diameter twice."""
+    color: Color = (0.25, 0.16, 0.12)
+    """Red, green, blue in [0, 1]."""
+    x: Coordinate = (5.0, 20.0)
+    """Of the centre: a number, or the range in which each episode places it."""
+    y: Coordinate = (-6.0, 6.0)
+    """See x."""
+    z: Annotated[Any, Span(Real(-1000.0, 1000.0, unit="m"))] | None = None
+    """See x; None stands it on the ground."""
+    apart: Annotated[float, Real(0.0, 1000.0, unit="m")] = 0.0
+    """Least distance between its surface and those of the objects placed before it."""
+
+    @property
+    def half_size(self) -> tuple[float, float, float]:
+        """Half of the edges."""
+        x, y, z = self.size
+        return 0.5 * x, 0.5 * y, 0.5 * z
+
+    def range_of(self, axis: str) -> tuple[float, float]:
+        """Return the lowest and highest value of a coordinate of the centre."""
+        value = getattr(self, axis)
+        value = self.half_size[2] if value is None else value
+        return value if isinstance(value, tuple) else (value, value)
+
+    def check(self) -> None:
+        """Reject shapes that their sizes contradict."""
+        x, y, z = self.size
+        if (x != y and self.shape != "box") or (x != z and self.shape == "ball"):
+            equal = "three equal sizes" if self.shape == "ball" else "equal sizes along x and y"
+            raise InputError(f"size={list(self.size)} is no {self.shape}; give {equal}, or a box")
+
+
+class StartSettings(Settings):
+    """Where the drone starts. Metres and degrees, world frame."""
+
+    x: Coordinate = 0.0
+    """A number, or the range in which each episode draws it."""
+    y: Coordinate = 0.0
+    """See x."""
+    z: Coordinate = 2.5
+    """See x."""
+    heading: Annotated[Any, Span(Real(-360.0, 360.0, unit="deg"))] = 0.0
+    """To the left of the x axis."""
+    apart: Annotated[float, Real(0.0, 1000.0, unit="m")] = 1.0
+    """Least distance between the drone's surface and those of obstacles and goals."""
+
+    def range_of(self, axis: str) -> tuple[float, float]:
+        """Return the lowest and highest value of a coordinate or of the heading."""
+        value = getattr(self, axis)
+        return value if isinstance(value, tuple) else (value, value)
+
+
+def _terms(of: Terms) -> Any:
+    return Annotated[dict[str, TermSettings], BeforeValidator(of.read)]
+
+
+class TermTaskSettings(BaseTaskSettings):
+    """A task of terms; `drone_rl.define_task` gives one a name. Lengths in metres."""
+
+    objects: dict[str, ObjectSettings] = {}
+    """Objects by name; those placed later keep away from earlier ones."""
+    start: StartSettings = StartSettings()
+    """Where the drone starts."""
+    reward: _terms(REWARDS) = {}  # pyright: ignore[reportInvalidTypeForm] (made by a function)
+    """Terms of the reward by name, each with a weight and parameters of its own."""
+    end: _terms(ENDS) = {}  # pyright: ignore[reportInvalidTypeForm]
+    """Reasons to end an episode, by name; earlier ones precede later ones and success."""
+    success: _terms(SUCCESSES) = {}  # pyright: ignore[reportInvalidTypeForm]
+    """The one meaning of success, by name."""
+    margin: Annotated[float, Real(0.0, 1000.0, unit="m")] = 10.0
+    """How far outside the region of starts and objects the bounds are."""
+    drone_size: Annotated[float, Real(0.01, 10.0, unit="m")] = 0.8
+    """Diameter of the ball that touches objects."""
+    step_length: Annotated[float, Real(0.001, 100.0, unit="m")] = 1.0
+    """Length of one move."""
+    step_limit: Annotated[int, Whole(1, 100_000, "steps")] = 100
+    """Steps after which an episode is truncated."""
+
+    def check(self) -> None:
+        """Reject tasks without a goal or meaning of success, or whose rewards are all zero."""
+        if not any(of.role == "goal" for of in self.objects.values()):
+            raise InputError("objects have no goal; give one of them role: goal")
+        if len(self.success) != 1:
+            raise InputError(f"success has {len(self.success)} terms; give one, such as all_goals")
+        weights: dict[str, Any] = {name: term for name, term in self.reward.items()}
+        if not any(term.weight for term in weights.values()):
+            raise InputError("reward has no weight other than 0; give one, such as progress: 1.0")
+
+    @property
+    def low(self) -> tuple[float, ...]:
+        """Least coordinates within the bounds."""
+        return tuple(low - self.margin for low, _ in map(self._reach, "xyz"))
+
+    @property
+    def high(self) -> tuple[float, ...]:
+        """Largest coordinates within the bounds."""
+        return tuple(high + self.margin for _, high in map(self._reach, "xyz"))
+
+    def _reach(self, axis: str) -> tuple[float, float]:
+        ranges = [of.range_of(axis) for of in (self.start, *self.objects.values())]
+        return min(low for low, _ in ranges), max(high for _, high in ranges)
+
+    @property
+    def object_region(self) -> ObjectRegion:
+        """Where the objects are; see `BaseTaskSettings`."""
+        every = self.objects.values()
+        size = max(max(of.size[:2]) for of in every)
+        color = next(of.color for of in every if of.role == "goal")
+        bound = max(abs(y) for of in every for y in of.range_of("y"))
+        first = min(of.range_of("x")[0] for of in every)
+        last = max(of.range_of("x")[1] for of in every)
+        return ObjectRegion(size, color, bound, first, last, self.start.range_of("z")[1])

@@ -1,0 +1,73 @@
+"""The terms that any task can name without a file of its own."""
+
+import warp as wp
+
+from drone_rl.sim.terms.step_kernel import Step
+from drone_rl.sim.terms.terms import end, reward, success
+
+
+@reward("progress")
+def progress(step: Step) -> float:
+    """Metres by which the drone has come nearer to its goal."""
+    return step.distance_before - step.distance
+
+
+@reward("reached")
+def reached(step: Step) -> float:
+    """Number of goals reached."""
+    return float(step.reached)
+
+
+@reward("contact", weight=-1.0)
+def contact(step: Step) -> float:
+    """1 in contact with an obstacle or the ground."""
+    return wp.where(step.contact, 1.0, 0.0)
+
+
+@reward("time", weight=-0.01)
+def time(step: Step) -> float:
+    """1 in every step."""
+    return 1.0
+
+
+@reward("control", weight=-0.01)
+def control(step: Step) -> float:
+    """Sum of the squared speeds that are commanded, as fractions of the greatest ones."""
+    return wp.length_sq(step.action)
+
+
+@reward("smoothness", weight=-0.01)
+def smoothness(step: Step) -> float:
+    """Sum of the squared differences of the commanded speeds from those of the step before."""
+    return wp.length_sq(step.action - step.last_action)
+
+
+@reward("facing", weight=0.01)
+def facing(step: Step) -> float:
+    """Cosine of the horizontal angle between the drone's heading and its goal."""
+    flat = wp.sqrt(step.goal[0] * step.goal[0] + step.goal[1] * step.goal[1])
+    return wp.where(flat > 0.0, step.goal[0] / flat, 0.0)
+
+
+@reward("altitude", weight=-0.01)
+def altitude(step: Step, height: float = 2.5) -> float:
+    """Metres between the drone's altitude and `height`."""
+    return wp.abs(step.position[2] - height)
+
+
+@end("contact")
+def touches(step: Step) -> bool:
+    """The drone touches an obstacle or the ground."""
+    return step.contact
+
+
+@end("out_of_bounds")
+def is_out_of_bounds(step: Step) -> bool:
+    """The drone leaves the task's bounds."""
+    return step.out_of_bounds
+
+
+@success("all_goals")
+def has_all_goals(step: Step) -> bool:
+    """The drone has reached every goal."""
+    return step.remaining == 0

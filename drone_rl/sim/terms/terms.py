@@ -1,0 +1,140 @@
+"""Terms of tasks: named functions of a `Step`, for rewards, ends and success.
+
+A user's file registers a term with a decorator, and any task can then name it:
+
+    @reward("near_wall", weight=-0.1)
+    def near_wall(step: Step, distance: float = 0.5) -> float:
+        return wp.where(step.clearance < distance, 1.0, 0.0)
+
+Warp compiles the functions into the kernels of single steps and of whole episodes. Their numbers,
+weights included, are arrays there, so that other numbers compile nothing.
+"""
+
+import dataclasses
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, TypeVar
+
+from drone_rl.utils.errors import InputError, did_you_mean
+from drone_rl.utils.plugins import place_of
+from drone_rl.utils.schema import Real, shown
+from drone_rl.utils.settings import Settings, about
+
+MOST_PARAMETERS = 4
+"""Largest number of parameters of a term."""
+F = TypeVar("F", bound=Callable[..., Any])
+Number = Annotated[float, Real(-1e6, 1e6)]
+
+
+class TermSettings(Settings):
+    """The numbers of a term: its parameters, and the weight of a reward."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Term:
+    """A registered term."""
+
+    name: str
+    function: Callable[..., Any]
+    """Maps a `Step` and the parameters to a number, or to whether an episode ends."""
+    settings: type[TermSettings]
+    parameters: tuple[str, ...]
+    """Names of the parameters, in order."""
+
+    @property
+    def meaning(self) -> str:
+        """First paragraph of the function's docstring."""
+        return about(self.function)  # pyright: ignore[reportArgumentType] (of any object)
+
+
+class Terms:
+    """The registered terms of a kind, by name."""
+
+    def __init__(self, kind: str) -> None:
+        """Begin without terms; `kind` is the name of the decorator."""
+        self.kind, self.by_name = kind, dict[str, Term]()
+
+    def register(self, name: str, **own: float) -> Callable[[F], F]:
+        """Return a decorator that registers a function; `own` are numbers that are not arguments.
+
+        Raises:
+            InputError: The function has too many parameters, or one without a number as default.
+        """
+
+        def decorate(function: F) -> F:
+            _, *rest = inspect.signature(function).parameters.values()
+            if len(rest) > MOST_PARAMETERS:
+                raise InputError(
+                    f"{place_of(function)} has {len(rest)} parameters besides the step; give at "
+                    f"most {MOST_PARAMETERS}"
+                )
+            for parameter in rest:
+                if not isinstance(parameter.default, int | float):
+                    raise InputError(
+                        f"{place_of(function)}: the parameter {parameter.name} has no number as "
+                        f"default; write {parameter.name}: float = 1.0"
+                    )
+            numbers = {**own, **{p.name: float(p.default) for p in rest}}
+            hints = dict.fromkeys(numbers, Number)
+            members = {"__annotations__": hints, "__module__": __name__, **numbers}
+            settings: Any = type(f"{name}_settings", (TermSettings,), members)
+            names = tuple(p.name for p in rest)
+            self.by_name[name] = Term(name, function, settings, names)
+            return function
+
+        return decorate
+
+    def read(self, given: Any) -> Any:
+        """Return settings by name from a mapping or a list of names; None leaves a term out.
+
+        A number is the weight of a term with its default parameters. Raises an `InputError` for
+        unknown names.
+        """
+        if isinstance(given, list | tuple):
+            given = {name: {} for name in given}
+        if not isinstance(given, Mapping):
+            return given
+        return {name: self._settings(name, of) for name, of in given.items() if of is not None}
+
+    def _settings(self, name: Any, given: Any) -> TermSettings:
+        if name not in self.by_name:
+            raise InputError(
+                f"{name} is unknown; choose from {', '.join(self.by_name)}, or register a "
+                f"function with @drone_rl.{self.kind}({shown(name)})"
+                f"{did_you_mean(name, self.by_name)}"
+            )
+        of = self.by_name[name].settings
+        if isinstance(given, of):
+            return given
+        return of.read({"weight": given} if isinstance(given, int | float) else given, name)
+
+
+REWARDS, ENDS, SUCCESSES = Terms("reward"), Terms("end"), Terms("success")
+
+
+def reward(name: str, weight: float = 1.0) -> Callable[[F], F]:
+    """Register a reward term, a function of a `Step` and of numbers with defaults.
+
+    Args:
+        name: What settings call it: `task.reward.NAME.weight`.
+        weight: Default factor of its values.
+    """
+    return REWARDS.register(name, weight=weight)
+
+
+def end(name: str) -> Callable[[F], F]:
+    """Register a reason to end an episode: a function that returns whether it ends.
+
+    Args:
+        name: What settings and results call it: `task.end.NAME`.
+    """
+    return ENDS.register(name)
+
+
+def success(name: str) -> Callable[[F], F]:
+    """Register a meaning of success: a function that returns whether the task is done.
+
+    Args:
+        name: What settings call it: `task.success.NAME`.
+    """
+    return SUCCESSES.register(name)

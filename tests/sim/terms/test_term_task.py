@@ -1,0 +1,168 @@
+"""Tasks of terms: rules and payments by hand, one at a time and fused."""
+
+import numpy as np
+import pytest
+import torch
+import warp as wp
+from torchrl.envs.utils import ExplorationType, set_exploration_type
+
+from drone_rl import InputError, Step, define_task, reward
+from drone_rl.acceleration import FusedEpisodes
+from drone_rl.config.task import BaseTaskSettings
+from drone_rl.sim.tasks import as_task
+from drone_rl.sim.worlds import Worlds
+from tests.acceleration.test_fused_episodes import make
+
+FORWARD, LEFT, RIGHT = 0, 1, 2
+
+
+@reward("test_near", weight=-0.25)
+def near(step: Step, distance: float = 0.5) -> float:
+    """1 near something solid."""
+    return wp.where(step.clearance < distance, 1.0, 0.0)
+
+
+BALL = {"shape": "ball", "role": "goal", "size": [2.0, 2.0, 2.0], "x": 6.0, "y": 0.0, "z": 2.5}
+POST = {"shape": "cylinder", "size": [1.0, 1.0, 5.0], "x": 4.0, "y": 2.0}
+define_task(
+    "test_reach",
+    objects={"ball": BALL, "post": POST},
+    reward={"progress": 0.5, "reached": 2.0, "contact": -1.0, "test_near": {}},
+    end=["contact", "out_of_bounds"],
+    success=["all_goals"],
+    step_limit=12,
+)
+
+
+def worlds(**changes):
+    made = Worlds(1, BaseTaskSettings.read({"name": "test_reach", **changes}))
+    made.reset(torch.arange(1), [np.random.RandomState(0)])
+    return made
+
+
+def fly(made, *actions):
+    rewards = [float(made.step(torch.arange(1), torch.tensor([a]))) for a in actions]
+    return rewards, made.task.ends(int(made.state.end_reason)).name
+
+
+def test_a_goal_is_reached_where_the_balls_touch():
+    made = worlds()
+    rewards, end = fly(made, *[FORWARD] * 4)
+    assert rewards == pytest.approx([0.5] * 4) and end == "RUNNING"
+    # centres 1 m apart, reach 1.4 m: progress 0.5, reached 2
+    assert fly(made, FORWARD) == (pytest.approx([2.5]), "SUCCESS")
+    assert made.state.paid[0].tolist() == pytest.approx([2.5, 2.0, 0.0, 0.0])
+    assert made.info()["reached"].tolist() == [[True]]
+    assert made.task.places(made.state)[0, 0, 2] < 0.0  # it has vanished
+
+
+def test_an_obstacle_is_touched_between_two_positions():
+    made = worlds()
+    fly(made, LEFT, LEFT, FORWARD, FORWARD)
+    # from x 2 to 3 beside nothing: the post's surface is 0.5 m away from x 3, the drone's 0.1 m
+    rewards, end = fly(made, FORWARD)
+    before, after = np.hypot(4.0, 2.0), np.hypot(3.0, 2.0)
+    assert rewards == pytest.approx([0.5 * (before - after) - 0.25]) and end == "RUNNING"
+    rewards, end = fly(made, FORWARD)
+    assert rewards == pytest.approx([0.5 * (after - np.hypot(2.0, 2.0)) - 1.25])
+    assert end == "CONTACT" and made.info()["touched"].tolist() == [[False, True]]
+
+
+@pytest.mark.parametrize(
+    ("actions", "end"), [([LEFT] * 12, "STEP_LIMIT"), ([LEFT] * 13, "OUT_OF_BOUNDS")]
+)
+def test_ends(actions, end):
+    assert fly(worlds(step_limit=len(actions)), *actions)[1] == end  # y is at most 2 + 10
+
+
+def test_weights_and_parameters_are_settings():
+    changes = {"reward": {"progress": 1.0, "test_near": {"distance": 3.0}}}
+    made = worlds(**changes)
+    assert fly(made, FORWARD)[0] == pytest.approx([1.0 - 0.25])  # the ground is 2.1 m away
+
+
+def test_the_side_of_a_goal_is_that_of_the_drone_when_it_comes_up():
+    low = {**BALL, "x": 9.0, "y": -4.0}
+    made = worlds(objects={"first": BALL, "second": low})
+    assert made.info()["sides"].tolist() == [[1, -1]]
+    fly(made, *[FORWARD] * 5)
+    assert made.info()["sides"].tolist() == [[1, 2]]
+
+
+def test_starts_turn_the_drone_and_the_offset_of_its_goal():
+    made = worlds(start={"heading": 90.0})
+
+    @reward("test_offset")
+    def offset(step: Step) -> float:
+        return step.goal[1] + 100.0 * step.goal[0] + 10000.0 * step.heading
+
+    made = worlds(start={"heading": 90.0}, reward={"test_offset": 1.0})
+    # at (1, 0), looking to y: the goal is 5 m to the right; a float's rounding of 10000 pi / 2
+    assert fly(made, FORWARD)[0] == pytest.approx([10000 * np.pi / 2 - 5.0], abs=0.01)
+
+
+def test_sampled_objects_keep_apart():
+    box = {"count": 8, "size": [1.0, 1.0, 2.0], "x": [4.0, 12.0], "y": [-4.0, 4.0], "apart": 0.7}
+    task = as_task(BaseTaskSettings.read({"name": "test_reach", "objects": {"b": BALL, "x": box}}))
+    for seed in range(20):
+        at = task.sample(np.random.RandomState(seed))[4:].reshape(9, 3)[1:]
+        gap = (at[:, None] - at[None]).abs() - torch.tensor([1.0, 1.0, 2.0]).double()
+        apart = gap.clamp(min=0.0).norm(dim=-1)
+        assert apart[~torch.eye(8, dtype=torch.bool)].min() >= 0.7
+        assert at[:, 2].tolist() == [1.0] * 8
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"reward": {"progres": 1.0}}, "progress"),
+        ({"reward": {"progress": 0.0}}, "reward"),
+        ({"reward": {"test_near": {"distanc": 1.0}}}, "distance"),
+        ({"objects": {"post": POST}}, "goal"),
+        ({"objects": {"ball": {**BALL, "size": [1.0, 2.0, 1.0]}}}, "size"),
+        ({"success": {}}, "success"),
+        ({"start": {"x": [2.0, 1.0]}}, "start.x"),
+    ],
+)
+def test_invalid_tasks_are_refused(changes, named):
+    with pytest.raises(InputError, match=named):
+        BaseTaskSettings.read({"name": "test_reach", **changes})
+
+
+def test_objects_without_room_are_named():
+    boxes = {"count": 20, "size": [1.0, 1.0, 1.0], "x": [4.0, 6.0], "y": [-1.0, 1.0], "apart": 1.0}
+    task = as_task(
+        BaseTaskSettings.read({"name": "test_reach", "objects": {"b": BALL, "boxes": boxes}})
+    )
+    with pytest.raises(InputError, match="boxes"):
+        task.sample(np.random.RandomState(0))
+
+
+@reward("test_undefined")
+def undefined(step: Step) -> float:
+    """Not finite."""
+    return wp.log(-step.time)
+
+
+@reward("test_uncompiled")
+def uncompiled(step: Step) -> float:
+    """Not in Warp's language."""
+    return len([step.time])
+
+
+@pytest.mark.parametrize("term", ["test_undefined", "test_uncompiled"])
+def test_unusable_terms_are_named(term):
+    with pytest.raises(InputError, match=term.removeprefix("test_")):
+        fly(worlds(reward={term: 1.0}), FORWARD)
+
+
+@pytest.mark.parametrize("objects", [{"ball": {**BALL, "y": [-3.0, 3.0]}, "post": POST}])
+def test_fused_episodes_are_the_stepped_ones(objects):
+    task = BaseTaskSettings.read({"name": "test_reach", "objects": objects})
+    collectors = [make(task=task, num_envs=32, compiled=fused) for fused in (True, False)]
+    assert isinstance(collectors[0].fused, FusedEpisodes)
+    with set_exploration_type(ExplorationType.DETERMINISTIC):
+        one, other = (collector.collect() for collector in collectors)
+    for key in ("pixels", "action", ("next", "reward"), ("next", "info", "end_reason")):
+        assert torch.equal(one[key], other[key]), key
+    assert len(one["next", "info", "end_reason"].unique()) > 2

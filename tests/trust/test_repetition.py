@@ -1,0 +1,152 @@
+"""Repeated episodes of policies that act by their images, or by something else."""
+
+import pytest
+import torch
+
+from drone_rl.collectors.complete_episodes import rollout
+from drone_rl.config import TaskSettings
+from drone_rl.envs import DroneEnv, GrayPixels
+from drone_rl.envs.rollout import Act
+from drone_rl.policies import make_actor
+from drone_rl.sim.actions import Move
+from drone_rl.trust.repetition import InGroups, WithOtherImages, exchange_images, repeat
+from drone_rl.utils.seeding import Stream
+from tests.trust.subjects import SMALL, TASK, Blind, Steering
+
+EPISODES = 60
+
+
+@pytest.fixture
+def make_run():
+    """Episodes of a network or an agent, with the environments in the state before them."""
+
+    def run(policy, task=TASK, episodes=EPISODES):
+        env = DroneEnv(20, task, SMALL, transforms=[GrayPixels()], seed=3, stream=Stream.REPORT)
+        actor = make_actor(policy, env.action_spec) if hasattr(policy, "in_shape") else policy
+        state = env.state_dict()
+        greedy = rollout(actor, env, episodes)
+        env.load_state_dict(state)
+        return env, actor, greedy
+
+    return run
+
+
+def test_a_policy_that_acts_by_its_images_is_repeatable_and_uses_its_camera(make_run):
+    run = make_run(Steering())
+    found = repeat(*run)
+    assert (found.episodes, [one.different for one in found.runs]) == (50, [0, 0])
+    assert found.is_enough and found.successes > 45
+    camera = exchange_images(*run)
+    assert camera.is_used and camera.own > 0.95 and camera.exchanged < 0.7
+    again = exchange_images(*run)
+    assert again == camera, "the environments keep their state"
+
+
+class ByBatch(Steering):
+    """Steers in batches, and flies to the left one at a time."""
+
+    def forward(self, pixels):
+        logits = super().forward(pixels)
+        logits[..., Move.LEFT] += 10.0 * (len(pixels) == 1)
+        return logits
+
+
+def test_a_policy_that_acts_by_the_size_of_the_batch_is_found(make_run):
+    found = repeat(*make_run(ByBatch()))
+    assert not found.is_same and found.worst.how == "one environment at a time"
+    assert found.worst.successes == 0 < found.successes
+
+
+class ByPlace(Steering):
+    """Flies to the left in the first place of a batch."""
+
+    def forward(self, pixels):
+        logits = super().forward(pixels)
+        logits[:1, Move.LEFT] += 10.0
+        return logits
+
+
+class ByCalls(Steering):
+    """Flies to the left after so many calls."""
+
+    def __init__(self):
+        super().__init__()
+        self.calls = 0
+
+    def forward(self, pixels):
+        self.calls += 1
+        logits = super().forward(pixels)
+        logits[..., Move.LEFT] += 10.0 * (self.calls > 400)
+        return logits
+
+
+class ByChance(Steering):
+    """Flies to the left in about half of the steps, by chance."""
+
+    def forward(self, pixels):
+        logits = super().forward(pixels)
+        logits[torch.rand(len(pixels)) < 0.45, Move.LEFT] += 10.0
+        return logits
+
+
+@pytest.mark.parametrize("make", [ByPlace, ByCalls, ByChance])
+def test_policies_that_act_by_more_than_their_images_are_found(make_run, make):
+    assert not repeat(*make_run(make())).is_same
+
+
+def test_a_blind_policy_does_not_use_its_camera(make_run):
+    wide = TaskSettings(
+        num_cubes=1, first_distance=8.0, front_margin=4.0, cube_size=4.0, lateral_bound=0.5
+    )
+    camera = exchange_images(*make_run(Blind(), wide))
+    assert camera.own == camera.exchanged == 1.0
+    assert camera.is_used is False
+
+
+class OneSided(Steering):
+    """Never flies to the right."""
+
+    def forward(self, pixels):
+        logits = super().forward(pixels)
+        logits[..., Move.RIGHT] -= 10.0
+        return logits
+
+
+def test_a_policy_that_hardly_ever_succeeds_uses_its_camera_if_goals_depend_on_it(make_run):
+    three = TASK.replace(num_cubes=3)
+    camera = exchange_images(*make_run(OneSided(), three, 200))
+    assert camera.own < 0.3 and camera.is_used
+    assert exchange_images(*make_run(Blind(), three, 200)).is_used is None
+
+
+class Noting:
+    """Flies straight on, and notes what it observes of which environments."""
+
+    def __init__(self):
+        self.seen = []
+
+    def act(self, context):
+        self.seen.append((context.rows.tolist(), context.observe().flatten(1).sum(-1)))
+        return Act(torch.zeros(len(context.rows), dtype=torch.long))
+
+
+def test_groups_of_environments_share_calls(make_run):
+    whole, grouped = Noting(), Noting()
+    make_run(whole, episodes=20)
+    make_run(InGroups(grouped, 8), episodes=20)
+    assert [rows for rows, _ in grouped.seen[:3]] == [
+        [*range(8)], [*range(8, 16)], [*range(16, 20)]
+    ]  # fmt: skip
+    first = torch.cat([seen for _, seen in grouped.seen[:3]])
+    assert torch.equal(first, whole.seen[0][1])
+
+
+def test_other_images_are_those_of_the_next_environment_and_its_last_ones(make_run):
+    whole, other = Noting(), Noting()
+    make_run(whole, episodes=20)
+    make_run(WithOtherImages(other), episodes=20)
+    last = torch.zeros(20)
+    for (rows, own), (same_rows, seen) in zip(whole.seen, other.seen, strict=True):
+        assert rows == same_rows
+        last[rows] = own
+        assert torch.equal(seen, last[[(row + 1) % 20 for row in rows]])
