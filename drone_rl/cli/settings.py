@@ -53,13 +53,13 @@ class CommandSettings(Settings):
 
 
 def with_name(overrides: Sequence[str], setting: str) -> list[str]:
-    """Return a command line on which a value without a name is that of `setting`."""
+    """Return a command line on which values without a name are that of `setting`."""
     from drone_rl.sweeps.manifest import quoted
 
-    return [
-        o if "=" in o.split("/")[0] or o.startswith("-") else f"{setting}={quoted(o)}"
-        for o in overrides
-    ]
+    words = [o for o in overrides if "=" in o.split("/")[0] or o.startswith("-")]
+    values = [quoted(o) for o in overrides if o not in words]
+    value = values[0] if len(values) == 1 else f"[{','.join(values)}]"
+    return [*words, f"{setting}={value}"] if values else words
 
 
 class PolicyCommandSettings(CommandSettings):

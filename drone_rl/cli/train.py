@@ -96,7 +96,7 @@ class TrainCommand(CommandSettings, TrainSettings):
 
 def _callbacks(settings: TrainCommand, folder: Path) -> list["Callback"]:
     """Return the callbacks. A resumed run's files stay unchanged until its state is accepted."""
-    from drone_rl.sweeps.pruning import PruneCallback
+    from drone_rl.sweeps.pruning import TrialCallback
     from drone_rl.sweeps.search import study_folder
     from drone_rl.training import Callback, LoggerCallback
 
@@ -108,7 +108,7 @@ def _callbacks(settings: TrainCommand, folder: Path) -> list["Callback"]:
         return [logger.make() for logger in settings.logger]
 
     trial = settings.trial
-    searching = [] if trial is None else [PruneCallback(study_folder(folder), trial)]
+    searching = [] if trial is None else [TrialCallback(study_folder(folder), trial)]
     if settings.resume is None:
         return [LoggerCallback(make()), *searching]
     resuming.check_folder(settings.resume, folder)

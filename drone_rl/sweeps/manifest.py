@@ -196,8 +196,8 @@ def open_sweep(
     return sweep
 
 
-_NOT_IDENTIFYING = ("hydra.", "hydra/", "paths.", "+hydra", "-")
-"""Prefixes of overrides that do not identify a sweep."""
+_NOT_IDENTIFYING = re.compile(r"\+?hydra(?!\.sweeper\.metric)|paths\.|-")
+"""Beginning of overrides that do not identify a sweep."""
 
 
 def is_sweep(overrides: Sequence[str]) -> bool:
@@ -212,7 +212,7 @@ def sweep_name(overrides: Sequence[str]) -> str:
 
     It contains the file in conf/sweep, or else the swept settings, and a hash of the overrides.
     """
-    what = sorted(o for o in overrides if not o.startswith(_NOT_IDENTIFYING))
+    what = sorted(o for o in overrides if not _NOT_IDENTIFYING.match(o))
     files = [o.partition("=")[2] for o in what if o.startswith("sweep=")]
     keys = [o.partition("=")[0] for o in what if "," in o or "range(" in o]
     label = re.sub(r"[^\w.-]+", "-", "+".join(files or keys))[:60]

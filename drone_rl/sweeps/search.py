@@ -12,6 +12,8 @@ from drone_rl.utils.files import read_bytes
 from drone_rl.utils.limits import JOURNAL_BYTES
 
 NAME = "sweep"
+METRICS = {"running_reward": "running reward", "success": "success rate"}
+"""What a search can maximize, with its name in text."""
 _JOURNAL = "optuna.journal"
 _DAMAGE = (LookupError, TypeError, ValueError, AttributeError, AssertionError, RecursionError)
 """Exceptions that Optuna raises for an inconsistent journal."""
@@ -57,6 +59,11 @@ def open_study(folder: Path, direction: str | None = None) -> Any:
         ) from error
 
 
+def metric_of(study: Any) -> str:
+    """Return what a study maximizes, one of `METRICS`."""
+    return study.user_attrs.get("metric", "running_reward")
+
+
 def next_trials(study: Any, space: Mapping[str, Any], count: int, seed: int) -> list[Any]:
     """Return the trials from the first to the last unfinished one, or else `count` new ones.
 
@@ -76,13 +83,16 @@ def next_trials(study: Any, space: Mapping[str, Any], count: int, seed: int) -> 
 
 
 def note_outcome(study: Any, number: int, result: Mapping[str, Any] | None) -> None:
-    """Report the outcome of a trial: its running reward, pruned or failed."""
+    """Report the outcome of a trial: the value of the study's metric, pruned or failed."""
     states = import_optuna().trial.TrialState
     if study.trials[number].state != states.RUNNING:
         return
-    if result is None:
+    by_success = metric_of(study) == "success"
+    if result is None or (by_success and not result.get("confirming_flights")):
         study.tell(number, state=states.FAIL)
     elif result["reason"] == "pruned":
         study.tell(number, state=states.PRUNED)
+    elif by_success:
+        study.tell(number, result["confirming_flights_succeeded"] / result["confirming_flights"])
     else:
         study.tell(number, float(result["running_reward"]))

@@ -28,6 +28,8 @@ class OngoingTraining(Protocol):
     """Frames after which it stops."""
     stop_request: str
     """A callback's reason to stop after this update; empty to go on."""
+    confirm: Callable[[int], bool] | None
+    """Evaluates the policy greedily for `result.json`; see `Trainer`."""
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything that the next update depends on."""

@@ -1,7 +1,6 @@
 """Collecting by workers on a Ray cluster."""
 
 import functools
-import importlib
 from typing import Any
 
 from drone_rl.collectors import EpisodeCollector
@@ -10,7 +9,7 @@ from drone_rl.config.registry import implements, modules_of
 from drone_rl.config.training import TrainSettings
 from drone_rl.sim.tasks import FailureReplayTask
 from drone_rl.training.train import Components, group_sizes, make_groups
-from drone_rl.utils.plugins import IMPORTED
+from drone_rl.utils.plugins import IMPORTED, import_plugin
 
 
 @implements(Ray)
@@ -23,7 +22,7 @@ def ray_collector(settings: TrainSettings, replay: FailureReplayTask | None = No
     sizes = group_sizes(settings)
     ((env, actor),) = make_groups(settings, [1])  # only the actor is needed
     env.close()
-    sent = (settings.config(), sorted(modules_of(settings) | {*IMPORTED}), sizes)
+    sent = (settings.config(), [*IMPORTED, *sorted(modules_of(settings))], sizes)
     makers = [functools.partial(_remote_collector, *sent, i, replay) for i in range(len(sizes))]
     collector = RayEpisodeCollector(
         makers,
@@ -39,14 +38,14 @@ def ray_collector(settings: TrainSettings, replay: FailureReplayTask | None = No
 
 def _remote_collector(
     config: dict[str, Any],
-    modules: list[str],
+    plugins: list[str],
     sizes: list[int],
     number: int,
     replay: FailureReplayTask | None,
 ) -> EpisodeCollector:
-    """Make a worker's collector, from arguments that can be sent; `modules` register its parts."""
-    for module in modules:
-        importlib.import_module(module)
+    """Make a worker's collector, from arguments that can be sent; `plugins` register its parts."""
+    for plugin in plugins:
+        import_plugin(plugin)
     settings = TrainSettings.read(config)
     chosen = settings.collector
     assert isinstance(chosen, Ray)

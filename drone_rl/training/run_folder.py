@@ -40,7 +40,7 @@ from drone_rl.utils.files import (
 )
 from drone_rl.utils.models import Model
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.readers import read_table
+from drone_rl.utils.readers import read_metrics
 from drone_rl.utils.schema import shown
 
 _log = logging.getLogger(__name__)
@@ -81,8 +81,7 @@ class Training(Result):
 
     def metrics(self) -> dict[str, list[float]]:
         """Return the columns of `metrics.csv`: one value for each update."""
-        head, *rows = read_table(self.folder / "metrics.csv")
-        return {name: [float(row[i]) for row in rows] for i, name in enumerate(head)}
+        return read_metrics(self.folder)
 
     def __str__(self) -> str:
         judged = self.result.get("verdict")

@@ -1,6 +1,7 @@
-"""Errors of a user's own code, such as a registered part: one line with its file."""
+"""Import a user's own code, such as a registered part; its errors are one line with its file."""
 
 import contextlib
+import importlib.util
 import os
 import sys
 import sysconfig
@@ -12,10 +13,63 @@ from typing import Any
 from drone_rl.utils.errors import InputError
 
 IMPORTED: list[str] = []
-"""Modules that `plugins=` named; other processes must import them, too."""
+"""Modules, and absolute paths of files, that `plugins=` named; other processes must import them,
+too, by `import_plugin`."""
 _FOLDERS = (Path(__file__).parents[1], *map(sysconfig.get_path, ("stdlib", "purelib")))
 _OTHERS = tuple(f"{folder}{os.sep}" for folder in _FOLDERS)
 """Folders of code that is not the user's."""
+
+
+def import_plugin(name: str) -> str:
+    """Import a module, or a Python file as the module of its stem, and add it to `IMPORTED`.
+
+    Modules of the current folder, or of the file's, are found last: they replace no others.
+
+    Args:
+        name: A module's name, or the path of a file.
+
+    Returns:
+        The module's name, or the absolute path.
+
+    Raises:
+        InputError: It is not found, has the name of another module, or fails.
+    """
+    is_path = name.endswith(".py") or not name.replace(".", "").isidentifier()
+    file = Path(name if is_path else f"{name}.py").absolute()
+    module, plugin = (file.stem, str(file)) if is_path else (name, name)
+    if is_path and not (file.suffix == ".py" and file.is_file() and "." not in module):
+        raise InputError(
+            f"plugins={name} is no Python file; give the path of one, NAME.py, or a module's name"
+        )
+    if str(file.parent) not in sys.path:
+        sys.path.append(str(file.parent))
+    if file.is_file():
+        _refuse_other(module, file, name)
+    try:
+        importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        is_plugin = f"{module}.".startswith(f"{error.name}.")  # or its package
+        place = "give a module in this folder or on PYTHONPATH, or the path of a Python file"
+        remedy = place if is_plugin else f"install {error.name}"
+        reason = " in ".join(filter(None, (str(error), line_of(error))))
+        raise InputError(f"plugins={name} can't be imported ({reason}); {remedy}") from error
+    except (Exception, SystemExit) as error:  # any that the user's module raises
+        raise InputError(failure(f"plugins={name}", error, name)) from error
+    if plugin not in IMPORTED:
+        IMPORTED.append(plugin)
+    return plugin
+
+
+def _refuse_other(module: str, file: Path, name: str) -> None:
+    """Raise an `InputError` if the module's name is that of another module."""
+    loaded = sys.modules.get(module)
+    spec = importlib.util.find_spec(module) if loaded is None else None
+    origin = getattr(loaded, "__file__", None) if spec is None else spec.origin
+    if origin is None or Path(origin).resolve() != file.resolve():
+        raise InputError(
+            f"plugins={name}: the module {module} of {origin or 'Python'} has precedence over your "
+            f"{file.name}; rename the file"
+        )
 
 
 def place_of(code: Callable[..., Any]) -> str:

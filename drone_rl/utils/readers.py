@@ -75,6 +75,12 @@ def read_table(path: Path) -> Iterator[list[str]]:
         raise InputError(f"{path} is damaged: no CSV ({error})") from None
 
 
+def read_metrics(folder: Path) -> dict[str, list[float]]:
+    """Return the columns of a run's `metrics.csv`, one value for each update; see `read_table`."""
+    head, *rows = read_table(folder / "metrics.csv")
+    return {name: [float(row[i]) for row in rows] for i, name in enumerate(head)}
+
+
 def read_result(folder: Path) -> dict[str, Any] | None:
     """Return `result.json` of a finished run, or None for an unfinished one."""
     try:

@@ -74,6 +74,22 @@ def test_a_policy_of_registered_parts_is_evaluated(folder):
     assert done.returncode == 0, done.stderr
 
 
+def test_a_file_of_another_folder_is_a_plug_in_of_sweeps_and_resumed_runs(folder, tmp_path):
+    file, work = tmp_path / "my parts" / "my_parts.py", tmp_path / "work"
+    file.parent.mkdir()
+    work.mkdir()
+    shutil.copy(folder / "my_parts.py", file)
+    sweep = ["seed=0,1", "hydra.sweep.dir=s", "hydra.sweep.subdir='r${seed}'"]
+    plugin, *chosen = "plugins=[../my parts/my_parts.py]", "returns=centred"
+    done = drone_rl("train", "-m", *TINY, plugin, *chosen, *sweep, cwd=work)
+    assert done.returncode == 0, done.stderr
+    more = ["plugins=my parts/my_parts.py", "trainer.total_frames=500"]
+    done = drone_rl("train", f"resume={work}/s/r1", *more, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    saved = (work / "s" / "r1" / ".hydra" / "overrides.yaml").read_text()
+    assert f"plugins=['{file}']" in saved.replace("''", "'")
+
+
 def test_without_the_plug_in_one_line_names_the_part_and_the_remedy(folder):
     line = error_line(drone_rl("evaluate", "policy=run", *FEW, cwd=folder))
     assert "transforms[3].name='mirror': it must be one of" in line
@@ -93,13 +109,20 @@ FILES = {
     ("words", "message"),
     [
         (["plugins=[nowhere]"], "give a module in this folder or on PYTHONPATH"),
-        (["plugins=[my_parts.py]"], "type the module's name, plugins=[my_parts]"),
-        (["plugins=[./my_parts]"], "type the module's name, plugins=[my_parts]"),
+        (["plugins=[nowhere.py]"], "plugins=nowhere.py is no Python file; give the path of one"),
+        (["plugins=[./my_parts]"], "plugins=./my_parts is no Python file; give the path of one"),
+        (["plugins=my_parts,fails"], "give plugins=[MODULE,FILE.py]"),
         (["plugins=nowhere"], "give a module in this folder or on PYTHONPATH"),
-        (["plugins=[needs_more]"], "install not_installed"),
+        (["plugins=[needs_more]"], "needs_more.py); install not_installed"),
         (["plugins=[fails]"], "fails.py (ZeroDivisionError: division by zero); correct it"),
+        (["plugins=fails.py"], "plugins=fails.py failed in line 2 of "),
+        (
+            ["plugins=[other/my_parts.py,my_parts.py]"],
+            "has precedence over your my_parts.py; rename",
+        ),
         (["plugins=[nameless]"], "nameless.py: give a name in brackets"),
         (["plugins=[leaves]"], "plugins=leaves failed in line 2 of "),
+        (["plugins=mujoco.py"], "has precedence over your mujoco.py; rename the file"),
         (["plugins=[mujoco]"], "has precedence over your mujoco.py; rename the file"),
         (["plugins=[my_parts]", "network=cells", "network.row=3"], "did you mean network.rows?"),
         (["plugins=[my_parts]", "network=cells", "network.rows=many"], "network.rows"),
@@ -110,6 +133,8 @@ def test_mistakes(folder, tmp_path, words, message):
     shutil.copy(folder / "my_parts.py", tmp_path)
     for name, text in FILES.items():
         (tmp_path / f"{name}.py").write_text(text)
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "my_parts.py").touch()
     assert message in error_line(drone_rl("train", *TINY, *words, cwd=tmp_path))
 
 

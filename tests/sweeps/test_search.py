@@ -7,7 +7,7 @@ import pytest
 optuna = pytest.importorskip("optuna", reason="pip install -e '.[optuna]'")
 
 from drone_rl.sweeps import search  # noqa: E402
-from drone_rl.sweeps.pruning import PruneCallback  # noqa: E402
+from drone_rl.sweeps.pruning import TrialCallback  # noqa: E402
 from drone_rl.sweeps.search import next_trials, note_outcome, open_study  # noqa: E402
 from drone_rl.utils.errors import InputError  # noqa: E402
 from drone_rl.utils.files import refuse_links  # noqa: E402
@@ -67,6 +67,23 @@ def test_outcomes_of_trials(tmp_path):
     assert study.best_value == 2.97
 
 
+def test_a_search_by_success_takes_it_from_confirmation_episodes_of_the_last_policy(tmp_path):
+    study = begin(tmp_path, metric="success")
+    next_trials(study, SPACE, 2, seed=0)
+    confirmed = []
+    progress = SimpleNamespace(updates=7)
+    training = SimpleNamespace(progress=progress, confirm=confirmed.append)
+    callback = TrialCallback(tmp_path, 0)
+    for reason in ("frames", "solved", "SIGTERM"):
+        callback.on_end(training, reason)
+    assert confirmed == [7]
+    figures = {"reason": "frames", "running_reward": 9.0}
+    confirmations = {"confirming_flights": 200, "confirming_flights_succeeded": 150}
+    note_outcome(study, 0, figures | confirmations)
+    note_outcome(study, 1, figures | {"confirming_flights": 0, "confirming_flights_succeeded": 0})
+    assert [t.value for t in study.trials] == [0.75, None]
+
+
 @pytest.mark.parametrize("content", [b"{}\n", b'{"op_code": 4}\n', b"[" * 10_000 + b"\n"])
 def test_a_damaged_journal_is_refused(tmp_path, content):
     next_trials(begin(tmp_path), SPACE, 1, seed=0)
@@ -95,7 +112,7 @@ def test_a_run_below_the_median_is_stopped(tmp_path, prune, reason):
     for number, reward in ((0, 2.0), (1, 0.5)):
         progress = SimpleNamespace(frames=0, running_reward=reward)
         trainer = SimpleNamespace(progress=progress, stop_request="")
-        callback = PruneCallback(tmp_path, number)
+        callback = TrialCallback(tmp_path, number)
         for frames in (50, 120, 130, 250):
             progress.frames = frames
             callback.on_update(trainer, {})

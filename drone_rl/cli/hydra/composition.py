@@ -1,8 +1,6 @@
 """Compose a command's settings from a command line with Hydra, and run the command."""
 
 import contextlib
-import importlib.util
-import os
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -12,6 +10,7 @@ from typing import Any
 import hydra
 from hydra.core.config_store import ConfigStore
 from hydra.core.hydra_config import HydraConfig
+from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.utils import run_job
 from hydra.errors import HydraException
 from hydra.experimental.callback import Callback
@@ -39,10 +38,10 @@ from drone_rl.config.networks import Network
 from drone_rl.config.parts import Part
 from drone_rl.config.training import CloningSettings, Logger, TrainerSettings
 from drone_rl.config.transforms import Transform
-from drone_rl.sweeps.manifest import is_sweep
+from drone_rl.sweeps.manifest import is_sweep, path_argument
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import OUTPUT_CLOSED, USER_ERROR
-from drone_rl.utils.plugins import IMPORTED, failure, line_of
+from drone_rl.utils.plugins import IMPORTED, failure, import_plugin, line_of
 from drone_rl.utils.progress import Heartbeat
 from drone_rl.utils.settings import S, Settings, conf_dir, hints_of, inner_types, plain
 
@@ -110,43 +109,26 @@ def _defaults_of(command: type[CommandSettings]) -> tuple[dict[str, str | None],
     return groups, values
 
 
-def import_plugins(overrides: Sequence[str]) -> None:
-    """Import the modules that `plugins=[MODULE, ...]` names on a command line, and none from files.
+def import_plugins(overrides: Sequence[str]) -> list[str]:
+    """Import what `plugins=[MODULE, FILE.py, ...]` names on a command line, and none from files.
+
+    Returns:
+        The command line with absolute paths, which other folders and processes can use.
 
     Raises:
-        InputError: A module is not found, has the name of an installed one, or fails.
+        InputError: See `import_plugin`.
     """
-    typed = [o.partition("=")[2] for o in overrides if re.match(r"\+{0,2}plugins=", o)]
-    names = re.findall(r"[^\[\]\s,'\"]+", typed[-1]) if typed else []
-    if names and os.getcwd() not in sys.path:
-        sys.path.append(os.getcwd())  # the end: no file here replaces an installed package
-    for name in names:
-        _check_module(name)
-        try:
-            importlib.import_module(name)
-            IMPORTED.append(name)
-        except ModuleNotFoundError as error:
-            is_plugin = f"{name}.".startswith(f"{error.name}.")  # or its package
-            place = "give a module in this folder or on PYTHONPATH"
-            remedy = place if is_plugin else f"install {error.name}"
-            raise InputError(f"plugins={name} can't be imported ({error}); {remedy}") from error
-        except (Exception, SystemExit) as error:  # any that the user's module raises
-            raise InputError(failure(f"plugins={name}", error, name)) from error
-
-
-def _check_module(name: str) -> None:
-    """Raise an `InputError` for a path, and for a file that another module has precedence over."""
-    path = Path(name)
-    if path.suffix == ".py" or not name.replace(".", "").isidentifier():
-        module = path.name.removesuffix(".py")
-        raise InputError(f"plugins={name} is a path; type the module's name, plugins=[{module}]")
-    file = Path(f"{name}.py")
-    spec = importlib.util.find_spec(name) if file.is_file() else None
-    if spec is not None and Path(spec.origin or "").resolve() != file.resolve():
-        raise InputError(
-            f"plugins={name} is a module of Python or of an installed package, which has "
-            f"precedence over your {file}; rename the file"
-        )
+    words = [*overrides]
+    for i, word in enumerate(words):
+        if re.match(r"\+{0,2}plugins=", word):
+            override = OverridesParser.create().parse_override(word)
+            if override.is_sweep_override():
+                raise InputError(f"{word} is no list; give plugins=[MODULE,FILE.py]")
+            value: Any = override.value()
+            names = value if isinstance(value, list) else [value] if value else []
+            plugins = [path_argument(Path(import_plugin(str(name)))) for name in names]
+            words[i] = f"{word.partition('=')[0]}=[{','.join(plugins)}]"
+    return words
 
 
 def run_command(name: str, command: type[CommandSettings], overrides: Sequence[str]) -> int:
@@ -157,10 +139,10 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
     is_help = bool({"--help", "-h"} & set(overrides))
     topics = [word for word in overrides if is_help and re.fullmatch(r"[A-Za-z_][\w.]*", word)]
     words = [word for word in overrides if word not in topics]
+    with _explained(name, words):
+        words = import_plugins(words)
     words = spare_run(command.prepare(words))
-    words = [re.sub(r"^(\+{0,2}plugins)=([\w.]+)$", r"\1=[\2]", word) for word in words]
     words.sort(key=lambda word: word not in OPTIONS)  # Hydra needs options before settings
-    import_plugins(words)
     store_defaults({name: command})
     check_words(name, words)
     if is_help:

@@ -4,6 +4,7 @@ import inspect
 import shlex
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import yaml
@@ -14,6 +15,7 @@ from drone_rl.cli.hydra.mistakes import choices, composed, flattened, similar
 from drone_rl.config import TASKS
 from drone_rl.config.configuration import Changes
 from drone_rl.config.parts import Named, Parts
+from drone_rl.sweeps.manifest import path_argument
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import (
     Settings,
@@ -26,7 +28,7 @@ from drone_rl.utils.settings import (
 
 _WIDTH = 100
 _LONGEST_VALUE = 60
-_PLUGINS = "Modules that register parts of your own: networks, transforms and so on."
+_PLUGINS = "Modules and Python files with parts of your own: networks, transforms and so on."
 _RUN_FOLDER = "Folder of this command's files; a new one under outputs/ by default."
 
 
@@ -92,7 +94,7 @@ def next_steps(name: str, policy: str, plugins: Sequence[str] = ()) -> str:
     """Return the lines about the policy that a command used, and what a user may do next."""
     words = [f"policy={policy}"]
     if plugins:
-        words.append(f"plugins=[{','.join(dict.fromkeys(plugins))}]")
+        words.append(f"plugins=[{','.join(path_argument(Path(plugin)) for plugin in plugins)}]")
     following = TABLE[name].get("next", ())
     lines = [f"  {shlex.join(['drone-rl', command, *words])}" for command in following]
     return "\n".join([f"policy: {policy}", "next:", *lines]) if lines else ""

@@ -12,13 +12,20 @@ from hydra.core.plugins import Plugins
 from hydra.plugins.launcher import Launcher
 from hydra.plugins.sweeper import Sweeper
 from hydra.types import HydraContext, TaskFunction
-from omegaconf import DictConfig
+from omegaconf import DictConfig, OmegaConf
 
-from drone_rl.sweeps.search import import_optuna, next_trials, note_outcome, open_study
+from drone_rl.sweeps.search import (
+    METRICS,
+    import_optuna,
+    metric_of,
+    next_trials,
+    note_outcome,
+    open_study,
+)
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import refuse_links
 from drone_rl.utils.readers import read_result
-from drone_rl.utils.schema import Whole, shown
+from drone_rl.utils.schema import OneOf, Whole, shown
 
 _log = logging.getLogger(__name__)
 
@@ -76,11 +83,12 @@ def _value(override: Override) -> str:
 
 
 class SearchSweeper(CombiningSweeper):
-    """Maximize the final running mean of rewards, see conf/hydra/sweeper/optuna.yaml."""
+    """Maximize the final running reward or success rate, see conf/hydra/sweeper/optuna.yaml."""
 
     def __init__(
         self,
         *,
+        metric: str,
         num_trials: int,
         batch: int,
         seed: int,
@@ -96,7 +104,9 @@ class SearchSweeper(CombiningSweeper):
             Whole(1).read(number, f"hydra.sweeper.{name}")
         self.num_trials, self.batch = num_trials, batch
         self.seed = Whole(0, 2**31).read(seed, "hydra.sweeper.seed")
+        self.metric = OneOf(tuple(METRICS)).read(metric, "hydra.sweeper.metric")
         self.shared = {
+            "metric": metric,
             "prune": prune,
             "startup_trials": startup_trials,
             "report_frames": report_frames,
@@ -112,20 +122,40 @@ class SearchSweeper(CombiningSweeper):
                 "there is nothing to search; give a range such as "
                 "'optimizer.lr=tag(log,interval(1e-4,1e-1))' or sweep=search"
             )
-        for key in space:
-            if key.partition(".")[0] in ("task", "experiment"):
-                raise InputError(
-                    f"{overrides[key].input_line} can't be searched: it changes the task, and a "
-                    "search maximizes the running reward, which is comparable within one task "
-                    "only; give one value"
-                )
+        self._check_comparable(space, fixed, overrides)
         folder = Path(str(self.config.hydra.sweep.dir)).absolute()
         folder.mkdir(parents=True, exist_ok=True)
         refuse_links(folder)
         study = open_study(folder, direction="maximize")
+        if study.trials and metric_of(study) != self.metric:
+            raise InputError(
+                f"hydra.sweeper.metric={self.metric}, but hydra.sweep.dir={folder} holds a search "
+                f"by {metric_of(study)}; choose another folder"
+            )
         for name, value in self.shared.items():
             study.set_user_attr(name, value)
         self._search(study, space, fixed)
+
+    def _check_comparable(
+        self, space: Mapping[str, Any], fixed: list[str], overrides: Mapping[str, Override]
+    ) -> None:
+        """Refuse ranges in which the metric is not comparable, and runs without the metric."""
+        is_success = self.metric == "success"
+        for key in space:
+            name = key if is_success else key.partition(".")[0]
+            if name in ("task", "experiment"):
+                other = "" if is_success else ", or add hydra.sweeper.metric=success"
+                raise InputError(
+                    f"{overrides[key].input_line} can't be searched: it changes the task, and a "
+                    f"search maximizes the {METRICS[self.metric]}, which is comparable within one "
+                    f"task only; give one value{other}"
+                )
+        config = self.hydra_context.config_loader.load_sweep_config(self.config, fixed)
+        if is_success and not OmegaConf.select(config, "trainer.confirm_episodes"):
+            raise InputError(
+                "hydra.sweeper.metric=success is measured in trainer.confirm_episodes, which are "
+                "0; give 1 or more"
+            )
 
     def _search(self, study: Any, space: dict[str, Any], fixed: list[str]) -> None:
         states = import_optuna().trial.TrialState
@@ -142,7 +172,8 @@ class SearchSweeper(CombiningSweeper):
                 note_outcome(study, trial.number, read_result(Path(str(job.working_dir))))
         if any(trial.state == states.COMPLETE for trial in study.trials):
             best = study.best_trial
-            _log.info("best: run %d, running reward %.3f, %s", best.number, best.value, best.params)
+            what = METRICS[self.metric]
+            _log.info("best: run %d, %s %.3f, %s", best.number, what, best.value, best.params)
 
 
 def check_params(params: Mapping[str, Any], space: Mapping[str, Any]) -> None:

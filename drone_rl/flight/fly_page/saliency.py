@@ -3,7 +3,6 @@
 The tests take up to a minute. They run in another process, so that the flight goes on meanwhile.
 """
 
-import importlib
 import logging
 import multiprocessing
 import os
@@ -20,7 +19,7 @@ from drone_rl.explanations.scenes import empty_scene
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.flight.fly_page.world import Seen, World
 from drone_rl.policies.policy import Policy
-from drone_rl.utils.plugins import IMPORTED
+from drone_rl.utils.plugins import IMPORTED, import_plugin
 from drone_rl.utils.seeding import root_seed
 
 _log = logging.getLogger(__name__)
@@ -43,8 +42,8 @@ def _work(policy: Policy, plugins: Sequence[str]) -> str | None:
     """Call `find_trusted` in a process of its own."""
     os.nice(_NICE)
     torch.set_num_threads(1)
-    for module in plugins:  # which may register the policy's task
-        importlib.import_module(module)
+    for plugin in plugins:  # which may register the policy's task
+        import_plugin(plugin)
     return find_trusted(policy)
 
 

@@ -53,6 +53,7 @@ def test_ranges_that_cannot_be_searched_are_refused(text):
 
 def test_numbers_below_one_are_refused():
     settings = {"seed": 0, "prune": True, "startup_trials": 1, "report_frames": 1, "params": {}}
+    settings["metric"] = "running_reward"
     with pytest.raises(InputError, match="num_trials=0"):
         SearchSweeper(num_trials=0, batch=1, **settings)
 
@@ -66,13 +67,19 @@ def test_a_journal_sets_only_what_is_searched():
 
 
 @pytest.mark.parametrize(
-    "words",
+    ("words", "message"),
     [
-        ["task=pillars", "task.collision_penalty=interval(0,1)"],
-        ["experiment=smoke,pillars", "optimizer.lr=interval(1e-4,1e-2)"],
+        (["task.collision_penalty=interval(0,1)"], "add hydra.sweeper.metric=success"),
+        (["experiment=smoke,pillars", "optimizer.lr=1,2"], "it changes the task"),
+        (["hydra.sweeper.metric=success", "task=collect_cubes,pillars"], "it changes the task"),
+        (["hydra.sweeper.metric=loss", "seed=0,1"], "metric='loss': it must be"),
+        (
+            ["hydra.sweeper.metric=success", "seed=0,1", "trainer.confirm_episodes=0"],
+            "give 1 or more",
+        ),
     ],
 )
-def test_settings_that_change_the_task_are_not_searched(in_process, tmp_path, words):
-    line = error_line(in_process("train", "-m", "hydra/sweeper=optuna", *words))
-    assert "can't be searched: it changes the task" in line
+def test_searches_without_a_comparable_metric_are_refused(in_process, tmp_path, words, message):
+    chosen = ["hydra/sweeper=optuna", "task=pillars"]
+    assert message in error_line(in_process("train", "-m", *chosen, *words))
     assert [*tmp_path.iterdir()] == []
