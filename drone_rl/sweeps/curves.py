@@ -1,6 +1,7 @@
 """`drone-rl plot`: learning curves of any runs. Runs that differ only in the seed are one curve."""
 
 import re
+import textwrap
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -32,7 +33,7 @@ class RunCurves(NamedTuple):
     settings: str
     """All training settings but the seed."""
     typed: set[str]
-    """Overrides on its command line but the seed."""
+    """Overrides on its command line that may describe it."""
     x: Array
     """Frames or seconds until each update. Shape: (num_updates,)."""
     y: dict[str, Array]
@@ -72,7 +73,9 @@ def read_run(folder: Path, x: str) -> RunCurves:
             if rates is not None:
                 y[_SUCCESS] = success_rates(columns["episodes"], rates)
         settings = read_yaml(folder / "run.yaml")["config"] | {"seed": None}
-        typed = {o for o in read_overrides(folder) if not o.startswith("seed=")}
+        typed = {
+            o for o in read_overrides(folder) if not o.startswith(("seed=", "trial=", "logger="))
+        }
         return RunCurves(folder, str(settings), typed, columns[x], y)
 
 
@@ -107,7 +110,7 @@ def _draw(groups: Sequence[Sequence[RunCurves]], x: str) -> Figure:
         grid = np.unique(np.concatenate([run.x for run in group]))
         ends.append(grid[-1])
         values = np.stack([on_grid(run.x, run.y[y], grid) for run in group])
-        label = f"{name} (runs: {len(group)})"
+        label = textwrap.fill(f"{name} (runs: {len(group)})", 80)
         axes.plot(grid, np.median(values, 0), color=color, label=label)
         axes.fill_between(grid, values.min(0), values.max(0), color=color, alpha=0.2)
     scale = "log" if max(ends) > 10 * min(ends) else "linear"
