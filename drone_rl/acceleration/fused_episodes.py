@@ -63,7 +63,7 @@ class FusedEpisodes:
         camera.poses = rules.poses
         camera.mean, camera.deviation = _mean_and_deviation(env.observer)
         self._camera = camera
-        self._rows = _cropped_rows(env.observer)
+        self._visible = _visible_lines(env.observer)
         size = network.offsets.outputs[-1]
         shape = (self._workers.size, int(rollout_kernel.TOGETHER) * size)
         self._workspaces = wp.empty(shape, dtype=float, device="cpu")
@@ -107,7 +107,7 @@ class FusedEpisodes:
             reasons.append(f"task {names} is not fused")
         if reasons or rules is None:
             return Reasons(reasons)
-        first_pixel = _cropped_rows(env.observer).start * env.observer.view.width
+        first_pixel = _visible_lines(env.observer).start * env.observer.view.width
         network = PackedNetwork(actor.network, first_pixel)
         return cls(env, actor, keeps_inputs, network, rules, num_threads)
 
@@ -143,8 +143,8 @@ class FusedEpisodes:
         envs, rows = envs[order], rows[order]
         logged = self._buffer.read(rows, names)
         if self._keeps_inputs:
-            if self._rows != slice(0, self._env.observer.view.height):
-                logged["pixels"] = logged["pixels"][..., self._rows, :].contiguous()
+            if self._visible != slice(0, self._env.observer.view.height):
+                logged["pixels"] = logged["pixels"][..., self._visible, :].contiguous()
             self.activations.record(rows, self._network.weights, logged["pixels"])
         return {
             EPISODE: envs,
@@ -193,7 +193,7 @@ def _mean_and_deviation(observer: Observer) -> tuple[float, float]:
     return 0.0, 1.0
 
 
-def _cropped_rows(observer: Observer) -> slice:
+def _visible_lines(observer: Observer) -> slice:
     """Return the rows of rendered frames that the policy sees."""
     for transform in observer.pipeline.transforms:
         if type(transform) is CropRows:
@@ -229,7 +229,7 @@ def _not_fused_policy(env: DroneEnv, actor: Any) -> list[str]:
     network = actor.network
     if reasons := unsupported(network):
         return reasons
-    rows, num_actions = _cropped_rows(env.observer), env.worlds.dynamics.actions.num_outputs
+    rows, num_actions = _visible_lines(env.observer), env.worlds.dynamics.actions.num_outputs
     shape = (1, rows.stop - rows.start, env.observer.view.width)
     if (network.in_shape, network.num_actions) != (shape, num_actions):
         return [

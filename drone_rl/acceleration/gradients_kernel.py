@@ -75,7 +75,7 @@ for (int row = 0; row < kernel_rows; ++row) {
 
 
 @wp.func_native(_TILES)
-def accumulate(
+def add_weight_gradients(
     inputs: wp.array[float], deltas: wp.array[float], gradients: wp.array[float], g: LayerGeometry
 ) -> None:
     """Add the gradient with respect to the weights; `deltas` is that with respect to outputs."""
@@ -279,7 +279,7 @@ def _linear(params: PackedParams, layer: int, count: int, workspace: Workspace) 
         g.row_stride = 0
         g.column_stride = params.inputs_stride
         g.output_stride = _stride(layers, layer)
-        accumulate(workspace.inputs, workspace.deltas, workspace.gradients, g)
+        add_weight_gradients(workspace.inputs, workspace.deltas, workspace.gradients, g)
     transposed = params.transposed[layer]
     transposed.input_offset = BLOCK * layers.output_offsets[layer]
     transposed.output_offset = BLOCK * layers.kept_offsets[layer - 1]
@@ -321,9 +321,9 @@ def _convolution(
         unpool(batch.outputs, outputs_at, kept_at, workspace.deltas, kept_delta_at, g)
     if workspace.gradients.shape[0] > 0:
         if layer == 0:
-            accumulate(batch.frames[frame], workspace.deltas, workspace.gradients, g)
+            add_weight_gradients(batch.frames[frame], workspace.deltas, workspace.gradients, g)
         else:
-            accumulate(batch.outputs, workspace.deltas, workspace.gradients, g)
+            add_weight_gradients(batch.outputs, workspace.deltas, workspace.gradients, g)
     if layer == 0 and batch.grad_frames.shape[0] == 0:
         return
     transposed = params.transposed[layer]

@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 import importlib
+import inspect
 from collections.abc import Callable, Mapping
 from importlib import metadata
 from typing import Annotated, Any, ClassVar, Self, TypedDict, Unpack
@@ -108,9 +109,21 @@ class Part(Named):
             cls.registry[cls.name] = cls
 
     def make(self, *parts: Any, **options: Unpack[NetworkOptions]) -> Any:
-        """Build the part from objects, such as parameters, and the settings; see `locate`."""
+        """Build the part from objects, such as parameters, and the settings.
+
+        Raises:
+            InputError: There is no class of this name, or it takes other arguments.
+        """
         factory = type(self).factory or locate(self.target)
-        return factory(*parts, **self.arguments(), **options)
+        arguments = self.arguments()
+        if not self.is_known:
+            try:
+                inspect.signature(factory).bind(*parts, **arguments, **options)
+            except TypeError as error:
+                raise InputError(
+                    f"_target_={self.target}: {error}; give arguments of this class"
+                ) from error
+        return factory(*parts, **arguments, **options)
 
     def arguments(self) -> dict[str, Any]:
         """Return the settings that are passed to the factory."""

@@ -26,7 +26,7 @@ from drone_rl.sim.tasks import FailureReplayTask
 from drone_rl.training.learners import (
     GradientLearner,
     NotANumberError,
-    accumulate,
+    add_gradients,
     check_batch,
     descend,
 )
@@ -151,7 +151,7 @@ class ActorCriticLearner(GradientLearner):
             for rows in order.chunk(pieces):
                 self.optimizer.zero_grad()
                 minibatch = take_rows(steps, rows)
-                terms = accumulate(minibatch, self._losses, self.chunk_frames)
+                terms = add_gradients(minibatch, self._losses, self.chunk_frames)
                 norm = descend(self.optimizer, self.model.named_parameters(), self.max_grad_norm)
                 yield {**{k: terms[k] for k in logged if k in terms}, "grad_norm": norm}
 

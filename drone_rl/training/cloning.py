@@ -24,7 +24,7 @@ from drone_rl.policies.zoo import describe
 from drone_rl.sim.continuous_actions import MOST_MEAN
 from drone_rl.training.callbacks import Callback
 from drone_rl.training.demonstrations import Demonstration
-from drone_rl.training.learners import NotANumberError, accumulate, descend
+from drone_rl.training.learners import NotANumberError, add_gradients, descend
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Whole
 from drone_rl.utils.seeding import Stream, torch_generator
@@ -141,7 +141,7 @@ class Cloner:
         for rows in order.split(self.how.minibatch_size):
             self.optimizer.zero_grad()
             minibatch = TensorDict({"row": rows}, [len(rows)])
-            terms = accumulate(
+            terms = add_gradients(
                 minibatch, lambda chunk: self._terms(frames, chunk), self.limits.chunk_frames
             )
             descend(self.optimizer, self.network.named_parameters(), self.limits.max_grad_norm)

@@ -150,7 +150,7 @@ class ReinforceLearner(GradientLearner):
             chunks = episode_chunks(steps.get(("next", "done"))[:, 0], self.chunk_frames)
         self.optimizer.zero_grad()
         try:
-            terms = accumulate(steps, self.loss, chunks, self.loss.divisor)
+            terms = add_gradients(steps, self.loss, chunks, self.loss.divisor)
             norm = descend(self.optimizer, self.network.named_parameters(), self.max_grad_norm)
         except NotANumberError:
             self.optimizer.zero_grad()
@@ -196,7 +196,7 @@ def episode_chunks(done: Tensor, chunk_frames: int) -> list[int]:
     return [*sizes, end - begin]
 
 
-def accumulate(
+def add_gradients(
     batch: TensorDictBase,
     losses: Callable[[TensorDictBase], TensorDictBase],
     chunks: int | list[int],

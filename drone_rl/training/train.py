@@ -274,6 +274,8 @@ def reinforce_learner(
     limits, network, actor = settings.trainer, components.network, components.collector.actor
     learning = network
     if limits.compiled and not network.is_recurrent:
+        # its logits are those that the collector has recorded, its gradients come from a kernel;
+        # the loss must keep this very object: a copy would hold a recorder of its own
         activations = components.activations
         learning = with_fused_passes(network, limits.num_threads, activations=activations)
     is_fused = learning is not network  # its kernel has `limits.num_threads` threads

@@ -1,6 +1,8 @@
 """Findings on what a policy's success depends on, the largest effect first.
 
-Verdicts, model cards and reports begin with them, and what no finding tests is "not shown".
+Verdicts, model cards and reports begin with them, and what no finding tests is "not shown". They
+come from `Verdict.own_findings`, `SavedShifts.finding` and `Outcomes.finding`; `find` in
+`shifts_results.py` merges them.
 """
 
 from collections.abc import Iterable

@@ -1,4 +1,7 @@
-"""Judge a policy: run episodes, apply the rule and return a verdict."""
+"""Judge a policy: run episodes, apply the rule and return a verdict.
+
+The class of verdicts is in `results.py`, their text in `templates/verdict.j2`.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path

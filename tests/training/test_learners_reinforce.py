@@ -6,7 +6,7 @@ from tensordict import TensorDict
 from torch import nn
 
 from drone_rl.objectives import TimeBaseline
-from drone_rl.training.learners import NotANumberError, accumulate, descend
+from drone_rl.training.learners import NotANumberError, add_gradients, descend
 
 
 @pytest.mark.parametrize("reduction", ["mean", "sum", "episode_mean"])
@@ -87,7 +87,8 @@ def test_gradient_and_terms_match_hand_computed_values(chunk, is_sum, wanted):
     """1 + 4 + 36 = 41; the gradient of w^2 s at w = 1 is 2 s."""
     layer = one_weight()
     losses = squares(layer, torch.sum if is_sum else torch.mean)
-    terms = accumulate(TensorDict({"x": X}, [3]), losses, chunk, (lambda _: 1) if is_sum else len)
+    divisor = (lambda _: 1) if is_sum else len
+    terms = add_gradients(TensorDict({"x": X}, [3]), losses, chunk, divisor)
     assert terms == {"loss_square": pytest.approx(wanted), "mean": pytest.approx(3.0)}
     assert float(layer.weight.grad) == pytest.approx(2 * wanted)
 
@@ -104,7 +105,7 @@ def test_gradient_norm_is_clipped(most, step):
 def test_nan_gradient_raises_without_a_step():
     layer = one_weight(float("nan"))
     with pytest.raises(NotANumberError, match=r"^loss_square is NaN"):
-        accumulate(TensorDict({"x": X}, [3]), squares(layer), 2)
+        add_gradients(TensorDict({"x": X}, [3]), squares(layer), 2)
     layer = one_weight()
     layer.weight.grad = torch.tensor([[float("inf")]])
     with pytest.raises(NotANumberError, match=r"^the gradient of weight is NaN or infinite"):

@@ -185,8 +185,7 @@ def start_all(
 def make_bounds(settings: TaskSettings) -> Bounds:
     """Return the bounds for kernels."""
     bounds = Bounds()
-    names = ("touch_distance", "front_bound", "side_bound", "height_bound", "altitude")
-    for name in (*names, "step_limit"):
+    for name in Bounds.vars:
         setattr(bounds, name, getattr(settings, name))
     return bounds
 
