@@ -1,5 +1,6 @@
 """Settings of a training."""
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Self, Unpack
 
 from drone_rl.config import (
@@ -150,14 +151,23 @@ class TrainSettings(Settings):
                 )
 
     def replace(self, **changes: Any) -> Self:
-        """See `Settings`; a new objective brings the parts that it needs, unless they are given."""
+        """See `Settings`.
+
+        A new objective brings the parts that it needs, unless they are given. A mapping without a
+        name has values of the variant that it replaces, as on the command line.
+        """
         objective = changes.get("objective")
         if isinstance(objective, str):
             objective = Objective.read(objective, "objective")
-        if isinstance(objective, Objective):
-            for name, part in objective.needs.items():
-                if not isinstance(getattr(self, name), type(part)):
-                    changes.setdefault(name, part)
+        needs = objective.needs if isinstance(objective, Objective) else {}
+        for name, part in needs.items():
+            if not isinstance(getattr(self, name), type(part)):
+                changes.setdefault(name, part)
+        for name, part in {**dict(self), **needs}.items():
+            values = changes.get(name)
+            is_named = isinstance(values, Mapping) and values.keys() & {"name", "_target_"}
+            if isinstance(part, Part) and isinstance(values, Mapping) and not is_named:
+                changes[name] = {"name": part.name, **values}
         return super().replace(**changes)
 
 

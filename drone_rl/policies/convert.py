@@ -80,12 +80,13 @@ def convert(path: Path, output: Path | None = None) -> list[Path]:
         if output.exists() or output.suffix != path.suffix:
             fault = "exists" if output.exists() else f"does not end in {path.suffix}"
             raise InputError(f"output={output} {fault}; give another path")
-        _convert_file(path, output)
+        _write(output, _converted(path))
         return [output]
     if output is not None:
         raise InputError(f"{path} is a folder, which is converted in its place; leave output out")
     refuse_links(path, _FOLDERS)
-    names = ("**/checkpoints/*.pt", *(f"**/{name}" for name in _DESCRIBED))
+    results = [f"**/{before}{name}" for name in _DESCRIBED for before in ("", "*.")]
+    names = ("**/checkpoints/*.pt", "**/*.safetensors", *results)
     files = [file for name in names for file in sorted(path.glob(name)) if not _is_kept(file)]
     converted = [file for file in files if _convert_in_place(file)]
     if not converted:
@@ -99,32 +100,38 @@ def _is_kept(path: Path) -> bool:
 
 def _convert_in_place(path: Path) -> bool:
     """Convert a file and keep the former one; return False if it has the present layout."""
-    new = path.with_stem(f"{path.stem}_converted")
     try:
-        _convert_file(path, new)
+        converted = _converted(path)
     except _PresentError:
         return False
-    path.rename(path.with_stem(f"{path.stem}_former"))
-    new.rename(path)
+    _write(path.with_stem(f"{path.stem}_former"), path.read_bytes())
+    _write(path, converted)
     return True
 
 
-def _convert_file(path: Path, output: Path) -> None:
-    """Write the converted file; raise `_PresentError` if there is nothing to do."""
+def _converted(path: Path) -> bytes | dict[str, Any]:
+    """Return the content, or a checkpoint's state; raise `_PresentError` if it is of now."""
     try:
         if path.suffix == ".safetensors":
-            _write(output, _converted_export(read_exported_bytes(path)))
-        elif path.suffix == ".json":
-            _write(output, _converted_result(path))
-        else:
-            state = _converted_state(checkpoint.read_any_version(path))
-            checkpoint.save_checkpoint(output, state)
+            return _converted_export(read_exported_bytes(path))
+        if path.suffix == ".json":
+            return _converted_result(path)
+        return _converted_state(checkpoint.read_any_version(path))
     except _PresentError:
         raise _PresentError(f"{path} has the present layout; use it as it is") from None
     except InputError as error:
         raise InputError(
-            f"{path} can't be converted ({error}); files from before version 0.1 must be made again"
+            f"{path} can't be converted ({error}); if it is from before version 0.1, make it again"
         ) from None
+
+
+def _write(path: Path, converted: bytes | dict[str, Any]) -> None:
+    if not isinstance(converted, bytes):
+        return checkpoint.save_checkpoint(path, converted)
+    try:
+        write_atomically(path, converted)
+    except OSError as error:
+        raise InputError(f"{path} can't be written ({error.strerror}); give output=PATH") from error
 
 
 def _converted_export(content: bytes) -> bytes:
@@ -223,10 +230,3 @@ def _with_present_names(override: str) -> str:
     for former, present in _OVERRIDES:
         override = re.sub(former, present, override)
     return override
-
-
-def _write(path: Path, content: bytes) -> None:
-    try:
-        write_atomically(path, content)
-    except OSError as error:
-        raise InputError(f"{path} can't be written ({error.strerror}); give output=PATH") from error

@@ -1,6 +1,7 @@
 """Environments for training, with the transforms of policies."""
 
-from collections.abc import Sequence
+import inspect
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypedDict, Unpack
 
 from torchrl.envs import EnvBase
@@ -17,7 +18,7 @@ from drone_rl.config.transforms import DEFAULT_TRANSFORMS, Transform, as_transfo
 from drone_rl.sim.dynamics import Dynamics
 from drone_rl.sim.rendering.renderer import RendererFactory
 from drone_rl.sim.tasks import Task
-from drone_rl.utils.errors import InputError
+from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.schema import Instance, shown
 from drone_rl.utils.seeding import Stream
 
@@ -39,6 +40,16 @@ class EnvOptions(TypedDict, total=False):
     """Number of the first environment."""
     num_shards: int | None
     """Threads that render on the CPU; the number of cores by default."""
+
+
+def check_names(function: Callable[..., Any], options: Iterable[str]) -> None:
+    """Raise an `InputError` if an option of a function is none of `EnvOptions`."""
+    names = [*inspect.signature(function).parameters, *EnvOptions.__annotations__]
+    names = [name for name in names if name not in ("self", "options")]
+    for name in options:
+        if name not in EnvOptions.__annotations__:
+            valid = ", ".join(names)
+            raise InputError(f"{name} is unknown; valid names: {valid}{did_you_mean(name, names)}")
 
 
 def make_env(
@@ -65,8 +76,9 @@ def make_env(
         options: See `EnvOptions`.
 
     Raises:
-        InputError: A setting is out of range; the message begins with its name.
+        InputError: A setting is unknown or out of range; the message begins with its name.
     """
+    check_names(make_env, options)
     camera = Instance(CameraSettings | None).read(camera, "camera")
     actions = Instance(ActionSettings | None).read(options.get("actions"), "actions")
     dynamics = options.get("dynamics")

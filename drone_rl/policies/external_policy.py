@@ -77,8 +77,9 @@ class ExternalPolicy(BasePolicy):
         """Its name."""
         return self.name
 
-    def in_task(self, **changes: Any) -> "ExternalPolicy":
-        """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`."""
+    def in_task(self, task: Mapping[str, Any] | None = None, /, **changes: Any) -> "ExternalPolicy":
+        """See `BasePolicy`."""
+        changes = {**as_changes(task, "task"), **changes}
         if not isinstance(self.task, Settings):
             if changes:
                 raise InputError(
@@ -90,13 +91,16 @@ class ExternalPolicy(BasePolicy):
         with prefixed_errors("task"):
             return dataclasses.replace(self, task=self.task.replace(**changed))
 
-    def in_dynamics(self, **changes: Any) -> "ExternalPolicy":
-        """Return the same policy with other dynamics, such as `in_dynamics(wind=(5, 0, 0))`."""
+    def in_dynamics(
+        self, dynamics: Mapping[str, Any] | None = None, /, **changes: Any
+    ) -> "ExternalPolicy":
+        """See `BasePolicy`."""
+        changes = {**as_changes(dynamics, "dynamics"), **changes}
         changed = Changes(DynamicsSettings).read(changes, "dynamics")
         with prefixed_errors("dynamics"):
-            dynamics = self.dynamics.replace(**changed)
-        dynamics.check_air()
-        return dataclasses.replace(self, dynamics=dynamics)
+            now = self.dynamics.replace(**changed)
+        now.check_air()
+        return dataclasses.replace(self, dynamics=now)
 
     def in_appearance(self, appearance: AppearanceSettings | str) -> "ExternalPolicy":
         """Return the same policy in scenes of another appearance, which may be a name."""
@@ -297,8 +301,8 @@ def as_policy(
         InputError: There is no such policy, or it or a setting is unusable.
     """
     policy = _converted(which, outputs)
-    policy = policy.in_task(**as_changes(task, "task")) if task else policy
-    policy = policy.in_dynamics(**as_changes(dynamics, "dynamics")) if dynamics else policy
+    policy = policy.in_task(task) if task else policy
+    policy = policy.in_dynamics(dynamics) if dynamics else policy
     return policy if appearance is None else policy.in_appearance(appearance)
 
 

@@ -4,7 +4,7 @@ import abc
 import contextlib
 import dataclasses
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Self, Unpack
 
@@ -21,7 +21,7 @@ from drone_rl.config import (
     BaseTaskSettings,
     DynamicsSettings,
 )
-from drone_rl.config.configuration import Changes
+from drone_rl.config.configuration import Changes, as_changes
 from drone_rl.envs import Pipeline
 from drone_rl.policies import ImageNetwork, RecurrentNetwork, make_actor
 from drone_rl.policies.environment import EnvOptions
@@ -108,16 +108,20 @@ class BasePolicy(abc.ABC):
         return None
 
     @abc.abstractmethod
-    def in_task(self, **changes: Any) -> Self:
+    def in_task(self, task: Mapping[str, Any] | None = None, /, **changes: Any) -> Self:
         """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`.
+
+        The changes may also be a mapping, or settings of the same task.
 
         Raises:
             InputError: A setting is unknown or out of range.
         """
 
     @abc.abstractmethod
-    def in_dynamics(self, **changes: Any) -> Self:
+    def in_dynamics(self, dynamics: Mapping[str, Any] | None = None, /, **changes: Any) -> Self:
         """Return the same policy with other dynamics: `policy.in_dynamics(mode="simple_flight")`.
+
+        The changes may also be a mapping, or settings.
 
         Raises:
             InputError: A setting is unknown or out of range.
@@ -242,15 +246,17 @@ class Policy(BasePolicy):
         names = {"description", "progress", "provenance", "command"}
         return self.state.model_dump(mode="json", include=names)
 
-    def in_task(self, **changes: Any) -> "Policy":
-        """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`."""
+    def in_task(self, task: Mapping[str, Any] | None = None, /, **changes: Any) -> "Policy":
+        """See `BasePolicy`."""
+        changes = {**as_changes(task, "task"), **changes}
         changed = Changes(type(self.task)).read(changes, "task")
         with prefixed_errors("task"):
-            task = TaskDescription.of(self.task.replace(**changed))
-        return self._described(task=task)
+            described = TaskDescription.of(self.task.replace(**changed))
+        return self._described(task=described)
 
-    def in_dynamics(self, **changes: Any) -> "Policy":
-        """Return the same policy with other dynamics, as in `in_dynamics(mode="simple_flight")`."""
+    def in_dynamics(self, dynamics: Mapping[str, Any] | None = None, /, **changes: Any) -> "Policy":
+        """See `BasePolicy`."""
+        changes = {**as_changes(dynamics, "dynamics"), **changes}
         changed = Changes(DynamicsSettings).read(changes, "dynamics")
         with prefixed_errors("dynamics"):
             return self._described(dynamics=self.dynamics.replace(**changed))
@@ -291,8 +297,17 @@ class Policy(BasePolicy):
 
         Returns:
             The index of the action, or the values of a continuous one.
+
+        Raises:
+            InputError: See `act_batch`.
         """
-        action = self.act_batch(_copied(image)[None])[0].numpy()
+        image = _copied(image)
+        if image.ndim != 3:
+            raise InputError(
+                f"an image of shape {tuple(image.shape)} is not one of shape (H, W, 3); give one "
+                "image, or several to act_batch"
+            )
+        action = self.act_batch(image[None])[0].numpy()
         return action if action.ndim else int(action)
 
     @torch.no_grad()

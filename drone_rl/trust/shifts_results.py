@@ -471,8 +471,8 @@ def find(
 class Need(Model):
     """Required range of an axis; None stands for the value without perturbation."""
 
-    low: Annotated[float, pydantic.Field(ge=-1e9, le=1e9)] | None = None
-    high: Annotated[float, pydantic.Field(ge=-1e9, le=1e9)] | None = None
+    low: Annotated[float, pydantic.Field(strict=True, ge=-1e9, le=1e9)] | None = None
+    high: Annotated[float, pydantic.Field(strict=True, ge=-1e9, le=1e9)] | None = None
     unit: str
 
 

@@ -98,8 +98,8 @@ def taken_over(folder: Path, typed: Collection[str]) -> list[str]:
     for override in must_be_typed(recorded):
         raise InputError(
             f"{folder}/.hydra/overrides.yaml sets {shown(override)}, which can't be read from a "
-            "file for safety; if you trust it, repeat it on the command line; start a run of an "
-            "older version of drone_rl again"
+            "file for safety; if you trust it, repeat it on the command line; if there is no such "
+            "setting now, start a new run"
         )
     return recorded
 

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ChanceSettings, ProveSettings
-from drone_rl.config.configuration import as_changes, from_arguments
+from drone_rl.config.configuration import from_arguments
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, CubesEnd
 from drone_rl.utils.display import TableResult
@@ -181,7 +181,7 @@ def chances(
     """
     settings, seed = with_seed(from_arguments(ChanceSettings, settings, changes, chances))
     progress = as_progress(progress)
-    policy = load_policy(policy, outputs=outputs).in_task(**as_changes(task, "task"))
+    policy = load_policy(policy, outputs=outputs).in_task(task)
     task_settings = require_cubes(policy.description, "exact probabilities")
     placed = (
         _sampled(task_settings, settings.placements, seed)

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import CheckSettings
-from drone_rl.config.configuration import as_changes, from_arguments
+from drone_rl.config.configuration import from_arguments
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import policy_names
 from drone_rl.utils.display import Result, table
@@ -114,7 +114,7 @@ def check(
         )
     policy = load_policy(stated.policy.name if policy is None else policy, outputs=outputs)
     weights = policy.state.weights
-    required = policy.in_task(**as_changes(task, "task")).task if task else None
+    required = policy.in_task(task).task if task else None
     check_same_policy(stated, policy.description, weights, required)
     found = check_certificate(
         stated,

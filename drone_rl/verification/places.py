@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from pydantic import Field
 
 from drone_rl.config.commands import PlacesSettings
-from drone_rl.config.configuration import as_changes, from_arguments
+from drone_rl.config.configuration import from_arguments
 from drone_rl.envs import Pipeline
 from drone_rl.explanations.report.places import chart, describe, rows
 from drone_rl.explanations.results import ExactMap, Outlines
@@ -113,7 +113,7 @@ def places(
     """
     settings = from_arguments(PlacesSettings, settings, changes, places)
     progress = as_progress(progress)
-    policy = load_policy(policy, outputs=outputs).in_task(**as_changes(task, "task"))
+    policy = load_policy(policy, outputs=outputs).in_task(task)
     begin = time.perf_counter()
     network, gap = policy.make_network(), settings.logit_gap
     spec = make_policy_spec(policy.description, network, gap, settings.renderer)

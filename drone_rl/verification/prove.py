@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from drone_rl.config.commands import ProveSettings
-from drone_rl.config.configuration import as_changes, from_arguments
+from drone_rl.config.configuration import from_arguments
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import fingerprint
 from drone_rl.utils.display import TableResult
@@ -120,7 +120,7 @@ def prove(
             unfinished proof of another policy, task, logit_gap or renderer; the message says why.
     """
     settings = from_arguments(ProveSettings, settings, changes, prove)
-    policy = load_policy(policy, outputs=outputs).in_task(**as_changes(task, "task"))
+    policy = load_policy(policy, outputs=outputs).in_task(task)
     network, gap = policy.make_network(), settings.logit_gap
     spec = make_policy_spec(policy.description, network, gap, settings.renderer)
     with torch_threads(1), closing(spec), contextlib.ExitStack() as stack:

@@ -50,19 +50,23 @@ def judge(name, sampled=None):
     return apply_rule(run(name), baselines(task), sampled=sampled, seed=RootSeed(0, False))
 
 
+def shown(verdict):
+    return "\n".join([verdict.sentence, *(finding.text for finding in verdict.own_findings)])
+
+
 @pytest.mark.parametrize(
     ("kind", "name"), [(k, name) for k, names in KINDS.items() for name in names]
 )
 def test_a_known_flaw_decides_the_verdict(kind, name):
     verdict = judge(name)
     assert (verdict.kind.value if verdict.certain else "not certain") == kind, verdict.sentence
-    assert PHRASES.get(name, "") in verdict.sentence
+    assert PHRASES.get(name, "") in shown(verdict)
 
 
 def test_sampled_actions_of_an_uncertain_policy_fail():
     verdict = judge("sure of nothing", run("sure of nothing", greedy=False))
     assert (verdict.kind.value, verdict.certain) == ("good", True)
-    assert "in 17.0% of episodes" in verdict.sentence
+    assert "in 17.0% of episodes" in shown(verdict)
 
 
 def test_right_and_certain_verdicts_are_counted():

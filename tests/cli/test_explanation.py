@@ -42,5 +42,5 @@ def test_several_policies_are_explained_together(in_process, monkeypatch):
     done = in_process("explain", "policy=[good,poor]", "frames=150", "num_envs=7")
     assert (done.returncode, seen["names"]) == (0, ["good", "poor"])
     assert (seen["frames"], seen["num_envs"]) == (150, 7)
-    assert "good: good. This policy" in done.stdout and "poor: poor. This policy" in done.stdout
+    assert "good: good: This policy" in done.stdout and "poor: poor: This policy" in done.stdout
     assert in_process("explain", "policy=[good,poor]", "require=good").returncode == 13

@@ -49,6 +49,8 @@ def test_usage_and_version_write_no_files(monkeypatch, capsys, tmp_path, args, p
         (["train", "returns.gamma=high"], ["gamma='high'", "from 0 to 1"]),
         (["train", "trainer.total_frames=0"], ["total_frames=0 trains nothing", "1 or more"]),
         (["train", *(f"transforms.resize.{s}=2" for s in ("height", "width"))], ["2x2", "small"]),
+        (["train", "transforms=[]"], ["needs floats", "add a transform"]),
+        (["train", "transforms={}"], ["transforms={}", "[] for none"]),
         (["train", "resume=nowhere"], ["nowhere", "folder of a run"]),
         (["train", "hydra.run.dir=/dev/null/x"], ["/dev/null"]),
         (["train", "plugins=[no_such_module]"], ["no_such_module", "PYTHONPATH"]),

@@ -125,6 +125,29 @@ def test_a_certificate_is_converted(tmp_path):
     assert converted.policy == shipped.policy and converted.success == shipped.success
 
 
+def test_exported_files_of_a_folder_are_converted_in_their_places(tmp_path):
+    path = former_export(tmp_path)
+    policy = drone_rl.load_policy("proved")
+    content = json.loads(certificate_path(policy.path).read_text())
+    content["policy"]["description"] = former_description(policy)
+    certificate = certificate_path(path)
+    certificate.write_text(json.dumps(content))
+    assert convert(tmp_path) == [path, certificate]
+    assert drone_rl.load_policy(path).description == drone_rl.load_policy("good").description
+    assert (
+        read_certificate(certificate).policy
+        == read_certificate(certificate_path(policy.path)).policy
+    )
+    with pytest.raises(InputError, match="no files of a former layout"):
+        convert(tmp_path)
+
+
+def test_a_write_error_says_nothing_of_the_file_that_was_read(tmp_path):
+    path = former_export(tmp_path)
+    with pytest.raises(InputError, match=r"can't be written .*; give output=PATH$"):
+        convert(path, tmp_path / "absent" / "a.safetensors")
+
+
 def test_files_are_not_replaced_and_present_ones_not_converted(tmp_path):
     path = former_export(tmp_path)
     convert(path)
@@ -134,8 +157,11 @@ def test_files_are_not_replaced_and_present_ones_not_converted(tmp_path):
         convert(path, tmp_path / "a.pt")
     with pytest.raises(InputError, match="present layout"):
         convert(policy_path("good"), tmp_path / "a.safetensors")
+    present = tmp_path / "present"
+    present.mkdir()
+    (tmp_path / "mine_converted.safetensors").rename(present / "mine.safetensors")
     with pytest.raises(InputError, match="no files of a former layout"):
-        convert(tmp_path)
+        convert(present)
     for name, content in {"b.safetensors": b"no policy", "b.json": b"[]", "c.json": b"{}"}.items():
         (tmp_path / name).write_bytes(content)
         with pytest.raises(InputError, match="can't be converted"):

@@ -40,6 +40,7 @@ def test_task_is_selected_by_name():
     [
         ({"task": "pillar"}, "task='pillar': it must be one of"),
         ({"task": 3}, "task=3 is no task"),
+        ({"taks": 3}, "taks is unknown; valid names: .* mean task"),
         ({"camera": "tiny"}, "camera='tiny'"),
         ({"camera": {"heigth": 9}}, "camera.heigth is unknown; valid names: .* mean height"),
         ({"dynamics": "simple_flight"}, "dynamics='simple_flight'"),
@@ -52,6 +53,13 @@ def test_task_is_selected_by_name():
 def test_values_of_wrong_type_raise_with_the_name(given, message):
     with pytest.raises(InputError, match=f"^{message}"):
         drone_rl.make_env(1, **given)
+
+
+def test_a_policys_environment_has_no_other_options():
+    policy = drone_rl.load_policy("good")
+    for one in (policy, drone_rl.policy_from(lambda images: images[:, 0, 0, :3])):
+        with pytest.raises(InputError, match=r"^apearance is unknown; .* mean appearance"):
+            one.make_env(1, apearance="fog")
 
 
 @pytest.mark.parametrize(

@@ -88,6 +88,23 @@ def test_invalid_task_changes_raise(changes, message):
         drone_rl.load_policy("good").in_task(**changes)
 
 
+def test_changes_are_also_given_as_a_mapping():
+    for policy in (
+        drone_rl.load_policy("good"),
+        drone_rl.policy_from(lambda images: images[:, 0, 0, :3]),
+    ):
+        assert policy.in_task({"num_cubes": 1}, spacing=4.0).task == policy.task.replace(
+            num_cubes=1, spacing=4.0
+        )
+        wind = (5.0, 0.0, 0.0)
+        simple = policy.in_dynamics({"mode": "simple_flight", "wind": wind})
+        assert simple.dynamics.wind == wind
+        with pytest.raises(InputError, match=r"^task='pillars' gives no changes"):
+            policy.in_task("pillars")
+        with pytest.raises(InputError, match=r"^dynamics='simple_flight' gives no changes"):
+            policy.in_dynamics("simple_flight")
+
+
 def test_actor_can_be_created_without_environment():
     policy = drone_rl.load_policy("good")
     env = policy.make_env(2, seed=3)
@@ -189,6 +206,8 @@ def test_images_that_do_not_fit_the_camera_raise():
     ):
         with pytest.raises(InputError, match=rf"give uint8 of shape \(N, {height}, {width}, 3\)"):
             policy.act_batch(wrong)
+    with pytest.raises(InputError, match=rf"\(2, {height}, {width}, 3\) .* act_batch"):
+        policy.act(torch.zeros(2, height, width, 3, dtype=torch.uint8))
     policy.act_batch(torch.zeros(2, height, width, 3, dtype=torch.uint8))
     three = torch.zeros(3, height, width, 3, dtype=torch.uint8)
     with pytest.raises(InputError, match=r"^3 images follow 2; call reset\(\)"):

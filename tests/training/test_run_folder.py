@@ -1,5 +1,6 @@
 """Files that a training reads from and writes to its folder."""
 
+from types import SimpleNamespace
 from unittest.mock import patch
 
 import pytest
@@ -28,7 +29,7 @@ def test_checkpoint_settings_are_restored_and_validated():
 
 
 def test_changed_settings_prevent_resuming(tmp_path):
-    state = {"config": TrainSettings(seed=1).config()}
+    state = SimpleNamespace(config=TrainSettings(seed=1).config())
     with pytest.raises(InputError, match="seed=0: the run was started with seed=1"):
         RunFolder(tmp_path).prepare(TrainSettings(), state)
 

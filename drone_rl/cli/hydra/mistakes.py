@@ -79,6 +79,8 @@ def _problem(word: str, name: str, words: Sequence[str]) -> str | None:
     group = key.lstrip("+").partition("@")[0]
     if not _is_group(group) or "(" in value or _has_own_folders(words):
         return None
+    if value == "{}":
+        return f"it changes nothing; {group} is one of {', '.join(choices(group))}, or [] for none"
     options = choices(group)
     unknown = {*re.findall(r"[\w.-]+", value)} - {*options}
     alternative = ", or your own with plugins=[MODULE]" if group in _EXTENSIBLE else ""

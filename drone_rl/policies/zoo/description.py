@@ -30,7 +30,7 @@ from drone_rl.config.training import TrainSettings
 from drone_rl.config.transforms import MOST_TRANSFORMS, Fault, Frame, Stack, Transform
 from drone_rl.envs import DroneEnv, with_others
 from drone_rl.policies import ImageNetwork
-from drone_rl.policies.environment import EnvOptions
+from drone_rl.policies.environment import EnvOptions, check_names
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import Dynamics, make_dynamics
 from drone_rl.sim.tasks import Task, as_task
@@ -274,6 +274,7 @@ class PolicyDescription(Model):
 
         `task` is the same task with other starts of episodes. Without `pixels`: no transforms.
         """
+        check_names(self.build_env, options)
         parts: Any = {"appearance": self.appearance, **options}
         parts["dynamics"] = options.get("dynamics") or self.dynamics
         if isinstance(parts["dynamics"], DynamicsSettings):  # others have actions of their own

@@ -23,6 +23,7 @@ from drone_rl.utils.schema import Plain, Real, Whole, as_mapping
 MAX_HEADER = 2**20
 """Bytes of the header of an exported file."""
 _FOLDER = Path(__file__).resolve().parent
+_EXPORT = "give a file that drone-rl export wrote"
 _Count = Annotated[int, Whole(0, 2**62)]
 
 
@@ -163,12 +164,9 @@ def read_policy(path: Path) -> SavedPolicy:
         return read_checkpoint(path)
     content = read_exported_bytes(path)
     try:
-        return parse_exported(content)
+        return parse_exported(content, path)
     except InputError as error:
-        raise InputError(
-            f"policy {path} can't be read: {error}; give one that drone-rl export wrote, or "
-            f"convert one of an older version with drone-rl convert {path}"
-        ) from None
+        raise InputError(f"policy {path} can't be read: {error}") from None
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
@@ -192,11 +190,11 @@ def read_exported_bytes(path: Path) -> bytes:
     return read_bytes(path, 8 + MAX_HEADER + 4 * MAX_PARAMETERS)
 
 
-def parse_exported(content: bytes) -> SavedPolicy:
-    """Return an exported policy from the content of its file."""
+def parse_exported(content: bytes, path: Path) -> SavedPolicy:
+    """Return an exported policy from the content of its file, whose path messages name."""
     text = metadata_of(content).get("policy")
     if not isinstance(text, str):
-        raise InputError("it has a former layout")
+        raise InputError(f"it has a former layout; convert it with drone-rl convert {path}")
     about = as_mapping(parse_json(text, "its description"), "its description")
     return SavedPolicy.read({**about, "weights": weights_of(content)})
 
@@ -206,7 +204,7 @@ def weights_of(content: bytes) -> dict[str, torch.Tensor]:
     try:
         return load(content)
     except (SafetensorError, ValueError, KeyError, TypeError, RuntimeError) as error:
-        raise InputError(f"its weights are damaged ({str(error)[:100]})") from None
+        raise InputError(f"its weights are damaged ({str(error)[:100]}); {_EXPORT}") from None
 
 
 def metadata_of(content: bytes) -> Mapping[str, Any]:
@@ -214,11 +212,12 @@ def metadata_of(content: bytes) -> Mapping[str, Any]:
     size = int.from_bytes(content[:8], "little")
     if not 2 <= size <= min(MAX_HEADER, len(content) - 8):
         other = None if content[8:9] == b"{" else other_format(content)
-        raise InputError(f"it is {other or 'not in the safetensors format, or damaged'}")
+        damaged = f"not in the safetensors format, or damaged; {_EXPORT}"
+        raise InputError(f"it is {other or damaged}")
     header = as_mapping(parse_json(content[8 : 8 + size], "its header"), "header")
     metadata = as_mapping(header.get("__metadata__", {}), "metadata")
     if metadata.get("format") != FORMAT:
-        raise InputError("it is not a drone_rl policy")
+        raise InputError(f"it is not a drone_rl policy; {_EXPORT}")
     return metadata
 
 

@@ -8,8 +8,9 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl import InputError, Step, define_task, reward
 from drone_rl.acceleration import FusedEpisodes
-from drone_rl.config.task import BaseTaskSettings
+from drone_rl.config.task import TASKS, BaseTaskSettings
 from drone_rl.sim.tasks import as_task
+from drone_rl.sim.tasks.task import MAKERS
 from drone_rl.sim.worlds import Worlds
 from tests.acceleration.test_fused_episodes import make
 
@@ -24,14 +25,21 @@ def near(step: Step, distance: float = 0.5) -> float:
 
 BALL = {"shape": "ball", "role": "goal", "size": [2.0, 2.0, 2.0], "x": 6.0, "y": 0.0, "z": 2.5}
 POST = {"shape": "cylinder", "size": [1.0, 1.0, 5.0], "x": 4.0, "y": 2.0}
-define_task(
-    "test_reach",
-    objects={"ball": BALL, "post": POST},
-    reward={"progress": 0.5, "reached": 2.0, "contact": -1.0, "test_near": {}},
-    end=["contact", "out_of_bounds"],
-    success=["all_goals"],
-    step_limit=12,
-)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def task():
+    """The task of these tests, which others must not find among the registered ones."""
+    kind = define_task(
+        "test_reach",
+        objects={"ball": BALL, "post": POST},
+        reward={"progress": 0.5, "reached": 2.0, "contact": -1.0, "test_near": {}},
+        end=["contact", "out_of_bounds"],
+        success=["all_goals"],
+        step_limit=12,
+    )
+    yield
+    del TASKS[kind.name], MAKERS[kind]
 
 
 def worlds(**changes):

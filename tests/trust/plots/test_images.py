@@ -71,10 +71,10 @@ def test_stack_and_grid_of_images():
 
 
 FIVE = ShownActions(
-    ("up", "down", "left", "right", "stay"),
-    (2, 0, 4, 1, 3),
-    ((0.0, 1.0), (0.0, -1.0), (-1.0, 0.0), (1.0, 0.0), (0.0, 0.0)),
-    ((0, 0, 0),) * 5,
+    names=("up", "down", "left", "right", "stay"),
+    order=(2, 0, 4, 1, 3),
+    arrows=((0.0, 1.0), (0.0, -1.0), (-1.0, 0.0), (1.0, 0.0), (0.0, 0.0)),
+    colors=((0, 0, 0),) * 5,
 )
 
 
