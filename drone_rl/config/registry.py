@@ -84,8 +84,9 @@ def register_transform(
 ) -> Callable[[F], F]:
     """Decorate a class derived from TorchRL's `Transform` to register it as an image transform.
 
-    Its `_apply_transform` is called with each batch of images. What remembers something of each
-    environment derives from `drone_rl.envs.CameraFault`.
+    Its `_apply_transform` is called with each batch of images, whose result must depend on these
+    and the settings only: policy files and checkpoints save no buffers of transforms. What
+    remembers something of each environment derives from `drone_rl.envs.CameraFault`.
 
     `output` maps the input's `Frame` and the settings to the output's `Frame`. By default, the
     shape is that of two transformed images. See `register_network` for errors.

@@ -1,6 +1,7 @@
 """Compose a command's settings from a command line with Hydra, and run the command."""
 
 import contextlib
+import functools
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -240,4 +241,5 @@ def _job(
 
     job.__module__ = f"drone_rl.cli.{name}"  # Hydra names the job by it
     vars(job)["statuses"] = statuses  # launchers append the statuses of other processes
+    vars(job)["check"] = functools.partial(read_settings, command)  # they call it before any run
     return job

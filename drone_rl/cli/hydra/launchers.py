@@ -19,10 +19,11 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.core.utils import JobReturn, JobStatus, configure_log, run_job, setup_globals
 from hydra.plugins.launcher import Launcher
 from hydra.types import HydraContext, TaskFunction
-from omegaconf import DictConfig, OmegaConf, open_dict
+from omegaconf import DictConfig, OmegaConf, open_dict, read_write
 
 from drone_rl.sweeps.executors import Executor, describe_active
 from drone_rl.sweeps.manifest import Run, Sweep, check_folders, inside, open_sweep, read_failure
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock
 from drone_rl.utils.progress import Heartbeat
 from drone_rl.utils.readers import read_result
@@ -33,7 +34,7 @@ _log = logging.getLogger(__name__)
 
 
 class RunLauncher(Launcher):
-    """Composes the settings of all runs and checks their folders before the first run starts."""
+    """Composes and checks settings and folders of all runs before the first run starts."""
 
     config: DictConfig
     hydra_context: HydraContext
@@ -60,7 +61,21 @@ class RunLauncher(Launcher):
         configs = [self._compose(initial_job_idx + i, o) for i, o in enumerate(job_overrides)]
         runs = [self._run(config, o) for config, o in zip(configs, job_overrides, strict=True)]
         check_folders(runs)
+        for run, config in zip(runs, configs, strict=True):
+            if config.get("trial") is None:  # a search continues after a trial with bad settings
+                self._check(run, config)
         return self.execute(runs, configs)
+
+    def _check(self, run: Run, config: DictConfig) -> None:
+        """Raise an `InputError` if the command does not accept a run's settings."""
+        with read_write(config.hydra.runtime), open_dict(config.hydra.runtime):
+            config.hydra.runtime.output_dir = str(run.folder)  # settings may refer to it
+        HydraConfig.instance().set_config(config)
+        job: Any = self.task_function
+        try:
+            job.check(OmegaConf.masked_copy(config, [str(k) for k in config if k != "hydra"]))
+        except InputError as error:
+            raise InputError(f"run {run.number} ({' '.join(run.overrides)}): {error}") from None
 
     def execute(self, runs: Sequence[Run], configs: Sequence[DictConfig]) -> list[JobReturn]:
         """Execute runs with these settings."""

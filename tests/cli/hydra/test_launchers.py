@@ -73,6 +73,10 @@ def test_an_interrupted_sweep_logs_the_command_that_resumes_it(in_process, monke
         ([*GRID, "hydra.sweep.subdir=${seed}"], "runs 0 and 1 have the same folder"),
         ([*GRID, "hydra.sweep.subdir=../${hydra.job.num}"], "'../0' is not inside"),
         ([*GRID, "sed=0,1"], "has no setting sed"),
+        (
+            [*GRID, "optimizer.lr=0.1,-1"],
+            "run 1 (seed=0 optimizer.lr=-1): optimizer.lr=-1: it must",
+        ),
         ([*GRID, "seed=range(0)"], "a sweep of no runs"),
     ],
 )
