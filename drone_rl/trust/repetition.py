@@ -6,6 +6,7 @@ depend on something else: the order of sums, the batch, other calls. If they suc
 the images of other episodes, it does not use its camera.
 """
 
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -30,6 +31,8 @@ FEW = 8
 """Environments that a policy is called with at a time, in the second repetition."""
 EXCHANGED = 200
 """Episodes with the images of other episodes; the interval of no difference ends at 3 points."""
+_REPEATED = zlib.crc32(b"repeated episodes")
+"""Key of the random stream that selects them; see `DroneEnv.side_streams`."""
 
 
 class InGroups:
@@ -72,29 +75,33 @@ class WithOtherImages:
 def repeat(
     env: EnvBase, actor: TensorDictModuleBase | Agent, greedy: CompleteEpisodes
 ) -> Repetition:
-    """Run the first episodes again, and compare how they end.
+    """Run episodes that are drawn at random again, at other places, and compare how they end.
 
-    The policy is called with one environment at a time, and with `FEW`. PyTorch evaluates it, so
-    that these are another implementation if a fused kernel ran the first episodes.
+    The policy is called with one environment at a time, and with `FEW` if there are so many.
+    PyTorch evaluates it, so that these are another implementation if a fused kernel ran the first
+    episodes.
 
     Args:
         env: The environments, in the state in which `greedy` began; they keep it.
         actor: The policy.
         greedy: Its greedy episodes.
     """
-    first = greedy.first(min(NEEDED_EPISODES, len(greedy)))
+    source = base_env(env).side_streams(torch.tensor([0]), _REPEATED)[0]
+    count = min(NEEDED_EPISODES, len(greedy))
+    drawn = torch.from_numpy(source.choice(len(greedy), count, replace=False))
     runs = []
-    for size, how in ((1, "one environment at a time"), (FEW, f"{FEW} environments at a time")):
-        again = _again(InGroups(_as_agent(actor), size), env, len(first), flushes=size == 1)
-        is_other = (again.end_reason != first.end_reason) | (
-            again.goals.reached != first.goals.reached
+    for size in sorted({1, min(FEW, count, env.batch_size[0])}):
+        how = "one environment at a time" if size == 1 else f"{size} environments at a time"
+        again = _again(InGroups(_as_agent(actor), size), env, drawn, flushes=size == 1)
+        is_other = (again.end_reason != greedy.end_reason[drawn]) | (
+            again.goals.reached != greedy.goals.reached[drawn]
         ).any(-1)
         successes = int(again.success.sum())
         runs.append(Repeated(how=how, different=int(is_other.sum()), successes=successes))
     return Repetition(
         implementation=greedy.implementation,
-        episodes=len(first),
-        successes=int(first.success.sum()),
+        episodes=count,
+        successes=int(greedy.success[drawn].sum()),
         runs=tuple(runs),
     )
 
@@ -102,9 +109,17 @@ def repeat(
 def exchange_images(
     env: EnvBase, actor: TensorDictModuleBase | Agent, greedy: CompleteEpisodes
 ) -> CameraUse:
-    """Run the episodes again with the images of other episodes; the arguments are `repeat`'s."""
-    greedy = greedy.first(min(EXCHANGED, len(greedy)))
-    exchanged = _again(WithOtherImages(_as_agent(actor)), env, len(greedy))
+    """Run the episodes again with the images of other episodes; the arguments are `repeat`'s.
+
+    An episode that is alone in its batch is left out, since there are no other images.
+    """
+    own, size = float(greedy.success.mean()), env.batch_size[0]
+    count = min(EXCHANGED, len(greedy))
+    count = 0 if size == 1 else count - (count % size == 1)
+    if not count:
+        return CameraUse(own=own, exchanged=None, success=mean_bounds([], -1.0, 1.0), strata={})
+    greedy = greedy.first(count)
+    exchanged = _again(WithOtherImages(_as_agent(actor)), env, torch.arange(count))
     strata = {}
     confidence = 1.0 - 0.05 / len(greedy.task.strata)
     for i, name in enumerate(greedy.task.strata):
@@ -155,13 +170,23 @@ def _as_agent(actor: TensorDictModuleBase | Agent) -> Agent:
     return ActorAgent(actor) if isinstance(actor, TensorDictModuleBase) else actor
 
 
-def _again(agent: Agent, env: EnvBase, episodes: int, *, flushes: bool = False) -> CompleteEpisodes:
-    """Run the first episodes again and restore the environments."""
-    state = base_env(env).state_dict()
+def _again(agent: Agent, env: EnvBase, which: Tensor, *, flushes: bool = False) -> CompleteEpisodes:
+    """Run episodes of these numbers, (n,), again in this order, and restore the environments."""
+    base = base_env(env)
+    state = base.state_dict()
+    starts = [*state["random_states"]]  # random streams at the start of each episode
+    while len(starts) <= int(which.max()):
+        base.start()
+        starts += base.state_dict()["random_states"]
+    parts = []
     with _subnormal_numbers(flushed=flushes):
-        done = rollout(agent, env, episodes, exact=True)
-    base_env(env).load_state_dict(state)
-    return done
+        for batch in which.split(env.batch_size[0]):
+            chosen = [starts[episode] for episode in batch.tolist()]
+            unused = state["random_states"][len(chosen) :]
+            base.load_state_dict({"random_states": [*chosen, *unused]})
+            parts.append(rollout(agent, env, len(batch), exact=True))
+    base.load_state_dict(state)
+    return CompleteEpisodes.joined(parts)
 
 
 @contextmanager

@@ -132,12 +132,16 @@ class CameraUse(Stored):
 
     own: float
     """Success rate with its own images."""
-    exchanged: float
-    """Success rate with the images of other episodes, from the same initial states."""
+    exchanged: float | None
+    """Success rate with the images of other episodes, from the same initial states; None if no
+    episode got such images, since there was one environment at a time."""
     success: Mean
     """Difference of the success rates, paired."""
     strata: dict[str, Mean]
     """By stratum, difference of the fractions of goals reached; all intervals hold at once."""
+    needs_images: bool = True
+    """Whether no blind baseline is as good as a good policy has to be. If one is, success with
+    other images does not show that the policy ignores its own."""
 
     @pydantic.computed_field
     @property
@@ -148,7 +152,7 @@ class CameraUse(Stored):
         """
         if self.own >= SUCCEEDS:
             if max(-self.success.lower95, self.success.upper95) <= SAME:
-                return False
+                return False if self.needs_images else None
             return _is_outside(self.success) or None
         return any(map(_is_outside, self.strata.values())) or None
 
@@ -239,6 +243,11 @@ class Verdict(Seeded):
     def sentence(self) -> str:
         """The verdict as text."""
         return render("drone_rl.trust", "verdict.j2", v=self)
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether the episodes are enough for the rule; repetition and camera are further tests."""
+        return self.enough is not None and self.enough <= self.greedy.episodes
 
     @property
     def own_findings(self) -> list[Finding]:

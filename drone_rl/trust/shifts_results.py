@@ -21,7 +21,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import Mean, Share
 from drone_rl.utils.models import Model, Seeded, Stored
 from drone_rl.utils.provenance import Provenance
-from drone_rl.utils.text import listed, percent, render
+from drone_rl.utils.text import at_most, listed, percent, render
 
 FORMAT_VERSION = 2
 Mode = Literal["constant", "drifting", "onset"]
@@ -169,7 +169,7 @@ class RangeTest(Stored):
 
     @property
     def fails_at_most(self) -> float:
-        """Largest fraction of the ranges on which it fails, with 95% confidence."""
+        """Largest rate of failures at strengths drawn from the ranges, with 95% confidence."""
         return 1.0 - self.success.lower95
 
 
@@ -373,7 +373,8 @@ class Robustness(Seeded, Provenance):
             elif bad is not None:
                 aside.append(f"certainly not at {number(bad)}")
         if found.test is not None:
-            aside.append(f"fails on at most {percent(found.test.fails_at_most)} of it")
+            most = at_most(found.test.fails_at_most)
+            aside.append(f"fails in at most {most} of episodes at strengths drawn from it")
         return f"{text} ({listed(aside)})" if aside else text
 
     def frames(self, name: str) -> list[NDArray[np.uint8] | None]:

@@ -175,7 +175,7 @@ def apply_rule(
     if kind is VerdictKind.GOOD and camera is not None:
         certain &= camera.is_used is not None
         kind = VerdictKind.TRIVIAL if camera.is_used is False else kind
-    return Verdict(
+    verdict = Verdict(
         kind=kind,
         certain=certain,
         exit_code=kind.exit_code if certain else NOT_CERTAIN,
@@ -202,6 +202,9 @@ def apply_rule(
         enough=_enough(greedy, baselines, rule),
         unlike=dict(unlike or {}),
     )
+    if camera is None:
+        return verdict
+    return verdict.replace(camera=camera.replace(needs_images=not verdict.is_trivial))
 
 
 def _unless_contradicted(claim: Proof | None, greedy: CompleteEpisodes) -> Proof | None:

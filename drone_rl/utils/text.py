@@ -2,6 +2,7 @@
 
 import functools
 import json
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -83,6 +84,12 @@ def percent(share: float, digits: int = 1) -> str:
     return f"<{step:g}%" if share >= 0 and float(text[:-1]) <= 0 else text
 
 
+def at_most(share: float, digits: int = 1) -> str:
+    """Return an upper bound of a rate in percent with so many decimals, rounded up."""
+    steps = 10.0 ** (digits + 2)
+    return percent(min(math.ceil(round(share * steps, 6)) / steps, 1.0), digits)
+
+
 exact_percent = functools.partial(percent, digits=2)
 """Returns a known fraction in percent with two decimals."""
 
@@ -103,5 +110,7 @@ def rate(figure: "Share | Mean", label: str = "95% CI ") -> str:
     return "not offered" if share is None else f"{percent(share)} ({label}{interval(figure)})"
 
 
-FILTERS = {f.__name__: f for f in (percent, interval, rate, listed, plural, count, setting)}
+FILTERS = {
+    f.__name__: f for f in (percent, at_most, interval, rate, listed, plural, count, setting)
+}
 """Filters of templates, also of pages."""

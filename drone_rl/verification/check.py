@@ -20,7 +20,7 @@ from drone_rl.utils.models import Seeded
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import Provenance, provenance
 from drone_rl.utils.seeding import with_seed
-from drone_rl.utils.text import exact_percent, percent
+from drone_rl.utils.text import at_most, exact_percent
 from drone_rl.verification.checker.certificate import (
     Certificate,
     certificate_file,
@@ -55,7 +55,7 @@ class Check(Result, CheckFindings, Seeded, Provenance):
         """Return the result, the statements, and each finding in one line."""
         stated, usual = self.stated, TaskSettings().values()
         changed = [f"{n}={v}" for n, v in self.task.items() if usual.get(n) != v]
-        bound = f": not refuted, wrong on at most {percent(self.wrong_at_most, 2)} of placements"
+        bound = f": not refuted, wrong on at most {at_most(self.wrong_at_most, 2)} of placements"
         return [
             f"{'accepted' if self.accepted else 'refused'}: {self.certificate}, "
             f"of policy {stated.policy.name}"

@@ -20,8 +20,10 @@ EPISODES = 60
 def make_run():
     """Episodes of a network or an agent, with the environments in the state before them."""
 
-    def run(policy, task=TASK, episodes=EPISODES):
-        env = DroneEnv(20, task, SMALL, transforms=[GrayPixels()], seed=3, stream=Stream.REPORT)
+    def run(policy, task=TASK, episodes=EPISODES, num_envs=20):
+        env = DroneEnv(
+            num_envs, task, SMALL, transforms=[GrayPixels()], seed=3, stream=Stream.REPORT
+        )
         actor = make_actor(policy, env.action_spec) if hasattr(policy, "in_shape") else policy
         state = env.state_dict()
         greedy = rollout(actor, env, episodes)
@@ -92,6 +94,37 @@ class ByChance(Steering):
 @pytest.mark.parametrize("make", [ByPlace, ByCalls, ByChance])
 def test_policies_that_act_by_more_than_their_images_are_found(make_run, make):
     assert not repeat(*make_run(make())).is_same
+
+
+class InFirstPlaces(Steering):
+    """Flies to the left in the first 50 places of a batch."""
+
+    def forward(self, pixels):
+        logits = super().forward(pixels)
+        logits[:50, Move.LEFT] += 10.0
+        return logits
+
+
+def test_a_policy_that_is_spoiled_in_the_first_places_of_a_large_batch_is_found(make_run):
+    found = repeat(*make_run(InFirstPlaces(), episodes=200, num_envs=100))
+    assert not found.is_same and found.successes > 0
+    assert found.worst.successes == 0, "it is always in the first places when run again"
+
+
+@pytest.mark.parametrize(
+    ("num_envs", "sizes"), [(1, ["one"]), (3, ["one", "3"]), (60, ["one", "8"])]
+)
+def test_episodes_of_any_batch_are_repeated_with_the_stated_sizes(make_run, num_envs, sizes):
+    found = repeat(*make_run(Steering(), num_envs=num_envs))
+    assert [run.how.split()[0] for run in found.runs] == sizes
+    assert [run.different for run in found.runs] == [0] * len(sizes)
+
+
+def test_an_episode_without_another_one_says_nothing_about_the_camera(make_run):
+    alone = exchange_images(*make_run(Steering(), episodes=4, num_envs=1))
+    assert alone.exchanged is None and alone.is_used is None
+    assert exchange_images(*make_run(Steering(), episodes=21, num_envs=20)).success.count == 20
+    assert exchange_images(*make_run(Steering(), episodes=22, num_envs=20)).success.count == 22
 
 
 def test_a_blind_policy_does_not_use_its_camera(make_run):

@@ -232,7 +232,7 @@ def test_a_verdict_is_certain_only_if_at_most_one_repeated_episode_differs(
     verdict = judged(lambda i, side: True, repetition=repeated(different, 50 - different))
     assert (verdict.kind, verdict.certain) == (VerdictKind.GOOD, is_certain)
     assert verdict.exit_code == (0 if is_certain else 13)
-    words = "2 of 50 episodes end otherwise: it collects every cube in 48 of them instead of 50."
+    words = "2 of 50 episodes drawn at random end otherwise: it collects every cube in 48 of them "
     assert (words in verdict.sentence) != is_certain
 
 
@@ -274,6 +274,20 @@ def test_only_a_policy_that_uses_its_camera_is_good(judged):
     unknown = judged(lambda i, side: True, camera=camera(1.0, 0.9, 0.05, 0.15))
     assert (unknown.kind, unknown.certain) == (VerdictKind.GOOD, False)
     assert "do not determine whether it uses its camera" in unknown.sentence
+
+    alone = camera(1.0, 1.0, -1.0, 1.0).replace(exchanged=None)
+    assert "no two environments ran together" in judged(lambda i, side: True, camera=alone).sentence
+    few = judged(lambda i, side: True, number=12, camera=camera(1.0, 0.9, 0.05, 0.15))
+    assert not few.certain and "12 episodes are too few to be certain" in few.sentence
+
+
+def test_in_a_trivial_task_success_with_other_images_shows_nothing(make_episodes):
+    episodes = make_episodes([[AHEAD]] * 400, [[True]] * 400)
+    every = dict.fromkeys(("random", "forward", "left", "right", "oracle"), episodes)
+    verdict = apply_rule(episodes, every, camera=camera(1.0, 1.0, -0.02, 0.02))
+    assert (verdict.kind, verdict.certain) == (VerdictKind.TRIVIAL, True)
+    assert verdict.camera and verdict.camera.is_used is None
+    assert "task is trivial" in verdict.sentence and "camera" not in verdict.sentence
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@ import pytest
 
 from drone_rl.utils.intervals import Share
 from drone_rl.utils.models import Seeded
-from drone_rl.utils.text import listed, ordinal, percent, plural, rate
+from drone_rl.utils.text import at_most, listed, ordinal, percent, plural, rate
 
 
 def test_lists_and_counts():
@@ -19,6 +19,12 @@ def test_percentages_are_never_rounded_to_none_or_all():
         "0%", "<0.1%", "1.2%", "97.5%", ">99.9%", "100%"
     ]  # fmt: skip
     assert percent(-0.2) == "-20.0%" and percent(0.0031, 2) == "0.31%"
+
+
+def test_upper_bounds_are_rounded_up():
+    shares = (0, 0.0004, 0.00918, 0.45, 0.9996, 1.0)
+    assert [at_most(share) for share in shares] == ["0%", "0.1%", "1.0%", "45.0%", "100%", "100%"]
+    assert at_most(0.00918, 2) == "0.92%"
 
 
 @pytest.mark.parametrize(
