@@ -7,6 +7,7 @@ import pytest
 pytest.importorskip("selenium.webdriver")
 pytest.importorskip("websockets")
 
+from selenium.common.exceptions import JavascriptException
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -44,7 +45,9 @@ def browser(session, page):
 
 
 def until(browser, script, seconds=WAIT_S):
-    return WebDriverWait(browser, seconds, 0.05).until(lambda d: d.execute_script(script))
+    return WebDriverWait(browser, seconds, 0.05, [JavascriptException]).until(
+        lambda d: d.execute_script(script)  # fails until the page has run its own script
+    )
 
 
 def click(browser, name):
