@@ -14,6 +14,7 @@ from drone_rl.trust.evaluate import Evaluation
 from drone_rl.trust.judge import Judgement
 from drone_rl.trust.shifts import Shifts
 from drone_rl.utils.models import Model
+from drone_rl.utils.settings import meanings
 from drone_rl.verification.chances import Chances
 from drone_rl.verification.checker.certificate import Certificate
 
@@ -30,8 +31,21 @@ RESULTS: dict[str, type[Model]] = {
 """Classes of result files by the file's name without its suffix."""
 
 
+def describe(cls: type[Model]) -> None:
+    """Give the fields of a class and its subclasses the descriptions in their docstrings."""
+    texts = meanings(cls)
+    for name, field in cls.model_fields.items():
+        field.description = texts.get(name, field.description)
+    if cls.__pydantic_complete__:  # the others are built when they are first used
+        cls.model_rebuild(force=True)
+    for subclass in cls.__subclasses__():
+        describe(subclass)
+
+
 def schemas() -> dict[str, str]:
     """Return JSON schemas by file name."""
+    for result in Model.__subclasses__():
+        describe(result)
     return {
         f"{name}.schema.json": json.dumps(result.model_json_schema(mode="serialization"), indent=2)
         for name, result in RESULTS.items()

@@ -36,7 +36,8 @@ class Model(pydantic.BaseModel, metaclass=_Checked, frozen=True):
 
     model_config = pydantic.ConfigDict(
         extra="forbid",
-        use_attribute_docstrings=True,
+        defer_build=True,  # most commands use few classes, and reading docstrings is slow; see
+        # `drone_rl.utils.settings.meanings`
         allow_inf_nan=False,
         arbitrary_types_allowed=True,
     )

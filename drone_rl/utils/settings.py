@@ -37,8 +37,6 @@ class Settings(Model):
     """
 
     model_config = pydantic.ConfigDict(
-        defer_build=True,  # most commands use few settings
-        use_attribute_docstrings=False,  # reading the source is slow; see `meanings`
         coerce_numbers_to_str=True,  # folder=2024 on the command line is a number for Hydra
         str_max_length=4000,
         validate_default=True,
@@ -134,10 +132,10 @@ def unit_of(hint: Any) -> str:
     return getattr(kind, "unit", "") or ("" if inner is None else unit_of(inner))
 
 
-def meanings(cls: type[Settings]) -> Mapping[str, str]:
+def meanings(cls: type[Model]) -> Mapping[str, str]:
     """Return the docstring of each field of a class, inherited fields included."""
     texts: dict[str, str] = {}
-    for part in reversed(cls.__mro__[: cls.__mro__.index(Settings)]):
+    for part in reversed(cls.__mro__[: cls.__mro__.index(Model)]):
         with contextlib.suppress(OSError, TypeError):  # made from a signature, without source
             (body,) = ast.parse(textwrap.dedent(inspect.getsource(part))).body
             texts |= dict(_docstrings(typing.cast(Any, body).body))
