@@ -6,8 +6,8 @@ import pytest
 import warp as wp
 
 from drone_rl.sim.rendering.devices import start_warp
-from drone_rl.sim.terms import geometry_kernel as geometry
-from drone_rl.sim.terms.geometry_kernel import BALL, BOX, CYLINDER, OBSTACLE
+from drone_rl.sim.tasks import geometry_kernel as geometry
+from drone_rl.sim.tasks.geometry_kernel import BALL, BOX, CYLINDER, OBSTACLE
 
 _GEOMS = {int(BALL): "sphere", int(CYLINDER): "cylinder", int(BOX): "box"}
 

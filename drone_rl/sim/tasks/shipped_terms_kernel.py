@@ -2,8 +2,8 @@
 
 import warp as wp
 
-from drone_rl.sim.terms.step_kernel import Step
-from drone_rl.sim.terms.terms import end, reward, success
+from drone_rl.config.terms import end, reward, success
+from drone_rl.sim.tasks.step_kernel import Step
 
 
 @reward("progress")

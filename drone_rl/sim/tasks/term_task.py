@@ -13,21 +13,21 @@ import warp as wp
 from torch import Tensor
 
 from drone_rl.config import CameraSettings
+from drone_rl.config.terms import ENDS, REWARDS, SUCCESSES
 from drone_rl.sim.actions import Entry, Move
 from drone_rl.sim.dynamics import BodyState, ComputerVision, Dynamics, Quadrotor
 from drone_rl.sim.dynamics.state import FlightState
 from drone_rl.sim.entities import VisualEntity
 from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.tasks import shipped_terms_kernel as shipped_terms_kernel  # registers them
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH, SIDES, Side, place_in_view, side_of
+from drone_rl.sim.tasks.fused import FusedTerms
+from drone_rl.sim.tasks.geometry_kernel import GOAL, NOTHING, OBSTACLE, Objects
+from drone_rl.sim.tasks.rules_kernel import SUCCESS, make_rules
+from drone_rl.sim.tasks.step_kernel import World, begin
 from drone_rl.sim.tasks.task import Goals, Grid, State, Task, register_task
-from drone_rl.sim.terms import shipped_terms_kernel as shipped_terms_kernel  # registers them
-from drone_rl.sim.terms.fused import FusedTerms
-from drone_rl.sim.terms.geometry_kernel import GOAL, NOTHING, OBSTACLE, Objects
-from drone_rl.sim.terms.rules_kernel import SUCCESS, make_rules
-from drone_rl.sim.terms.settings import ROLES, SHAPES, ObjectSettings, TermTaskSettings
-from drone_rl.sim.terms.step_kernel import World, begin
-from drone_rl.sim.terms.terms import ENDS, REWARDS, SUCCESSES
+from drone_rl.sim.tasks.term_settings import ROLES, SHAPES, ObjectSettings, TermTaskSettings
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.utils.errors import InputError
 

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator
 
 from drone_rl.config.task import BaseTaskSettings, Color, ObjectRegion
-from drone_rl.sim.terms.terms import ENDS, REWARDS, SUCCESSES, Terms, TermSettings
+from drone_rl.config.terms import ENDS, REWARDS, SUCCESSES, Terms, TermSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import OneOf, Real, Several, Span, Whole
 from drone_rl.utils.settings import Settings

@@ -3,7 +3,7 @@
 import warp as wp
 
 from drone_rl.sim.rendering.raytrace.structs_kernel import struct
-from drone_rl.sim.terms.geometry_kernel import GOAL, NOTHING, OBSTACLE, Objects, nearest, sweep
+from drone_rl.sim.tasks.geometry_kernel import GOAL, NOTHING, OBSTACLE, Objects, nearest, sweep
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 

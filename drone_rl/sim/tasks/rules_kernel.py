@@ -7,13 +7,13 @@ from typing import Any
 
 import warp as wp
 
+from drone_rl.config.terms import Term
 from drone_rl.sim.dynamics.moves_kernel import Fleet, camera_attitude, fly_move, is_flying, is_lost
 from drone_rl.sim.dynamics.state import VELOCITY
 from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, PoseArrays
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
-from drone_rl.sim.terms.step_kernel import Motion, Step, World, observe
-from drone_rl.sim.terms.terms import Term
+from drone_rl.sim.tasks.step_kernel import Motion, Step, World, observe
 from drone_rl.utils.errors import InputError
 
 _OPTIONS = {"enable_backward": False, "fuse_fp": False}

@@ -10,7 +10,7 @@ from drone_rl.sim.dynamics.control import Moves
 from drone_rl.sim.dynamics.moves_kernel import make_fleet
 from drone_rl.sim.dynamics.state import LEVEL, NUMBERS
 from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, PoseArrays
-from drone_rl.sim.terms.rules_kernel import Episodes, place
+from drone_rl.sim.tasks.rules_kernel import Episodes, place
 from drone_rl.utils.batch import Batch
 
 
