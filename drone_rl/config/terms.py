@@ -11,9 +11,12 @@ weights included, are arrays there, so that other numbers compile nothing.
 """
 
 import dataclasses
+import importlib
 import inspect
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, TypeVar
+
+from pydantic import BeforeValidator
 
 from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.plugins import place_of
@@ -22,6 +25,8 @@ from drone_rl.utils.settings import Settings, about
 
 MOST_PARAMETERS = 4
 """Largest number of parameters of a term."""
+SHIPPED = "drone_rl.sim.tasks.shipped_terms_kernel"
+"""Module that registers the shipped terms; it is imported when a term is looked up."""
 F = TypeVar("F", bound=Callable[..., Any])
 Number = Annotated[float, Real(-1e6, 1e6)]
 
@@ -40,6 +45,31 @@ class Term:
     settings: type[TermSettings]
     parameters: tuple[str, ...]
     """Names of the parameters, in order."""
+    is_exact: bool
+    """Whether the parameters are `wp.float64` and not `float`."""
+
+    @classmethod
+    def of(cls, name: str, function: Callable[..., Any], **own: float) -> "Term":
+        """Return a function as a term; see `Terms.register`."""
+        _, *rest = inspect.signature(function).parameters.values()
+        if len(rest) > MOST_PARAMETERS:
+            raise InputError(
+                f"{place_of(function)} has {len(rest)} parameters besides the step; give at "
+                f"most {MOST_PARAMETERS}"
+            )
+        for parameter in rest:
+            if not isinstance(parameter.default, int | float):
+                raise InputError(
+                    f"{place_of(function)}: the parameter {parameter.name} has no number as "
+                    f"default; write {parameter.name}: float = 1.0"
+                )
+        numbers = {**own, **{p.name: float(p.default) for p in rest}}
+        hints = dict.fromkeys(numbers, Number)
+        members = {"__annotations__": hints, "__module__": __name__, **numbers}
+        settings: Any = type(f"{name}_settings", (TermSettings,), members)
+        names = tuple(p.name for p in rest)
+        is_exact = any("float64" in str(p.annotation) for p in rest)
+        return cls(name, function, settings, names, is_exact)
 
     @property
     def meaning(self) -> str:
@@ -62,24 +92,7 @@ class Terms:
         """
 
         def decorate(function: F) -> F:
-            _, *rest = inspect.signature(function).parameters.values()
-            if len(rest) > MOST_PARAMETERS:
-                raise InputError(
-                    f"{place_of(function)} has {len(rest)} parameters besides the step; give at "
-                    f"most {MOST_PARAMETERS}"
-                )
-            for parameter in rest:
-                if not isinstance(parameter.default, int | float):
-                    raise InputError(
-                        f"{place_of(function)}: the parameter {parameter.name} has no number as "
-                        f"default; write {parameter.name}: float = 1.0"
-                    )
-            numbers = {**own, **{p.name: float(p.default) for p in rest}}
-            hints = dict.fromkeys(numbers, Number)
-            members = {"__annotations__": hints, "__module__": __name__, **numbers}
-            settings: Any = type(f"{name}_settings", (TermSettings,), members)
-            names = tuple(p.name for p in rest)
-            self.by_name[name] = Term(name, function, settings, names)
+            self.by_name[name] = Term.of(name, function, **own)
             return function
 
         return decorate
@@ -97,6 +110,7 @@ class Terms:
         return {name: self._settings(name, of) for name, of in given.items() if of is not None}
 
     def _settings(self, name: Any, given: Any) -> TermSettings:
+        importlib.import_module(SHIPPED)
         if name not in self.by_name:
             raise InputError(
                 f"{name} is unknown; choose from {', '.join(self.by_name)}, or register a "
@@ -110,6 +124,12 @@ class Terms:
 
 
 REWARDS, ENDS, SUCCESSES = Terms("reward"), Terms("end"), Terms("success")
+Rewards = Annotated[dict[str, TermSettings], BeforeValidator(REWARDS.read)]
+"""Terms of a reward by name, each with a weight and parameters of its own."""
+Ends = Annotated[dict[str, TermSettings], BeforeValidator(ENDS.read)]
+"""Reasons to end an episode, by name."""
+Success = Annotated[dict[str, TermSettings], BeforeValidator(SUCCESSES.read)]
+"""A meaning of success, by name."""
 
 
 def reward(name: str, weight: float = 1.0) -> Callable[[F], F]:

@@ -193,7 +193,7 @@ class Worlds:
         """Return states a step later, and rewards; the environments stay as they are."""
         around = [self.task.obstacles(state)] if self.dynamics.needs_obstacles else []
         body = self.dynamics.step(state.body, action, *around)
-        outcome: Any = self.task.advance(state, body, self.dynamics.actions.speeds_of(action))
+        outcome: Any = self.task.advance(state, body, action, self.dynamics)
         reward: Any = outcome[1] if isinstance(outcome, tuple) and len(outcome) == 2 else None
         if getattr(reward, "shape", None) != action.shape[:1]:
             raise InputError(

@@ -7,9 +7,9 @@ from drone_rl.sim.tasks.step_kernel import Step
 
 
 @reward("progress")
-def progress(step: Step) -> float:
-    """Metres by which the drone has come nearer to its goal."""
-    return step.distance_before - step.distance
+def progress(step: Step) -> wp.float64:
+    """Metres by which the drone has come nearer to its goal; in `pillars` a fraction of the way."""
+    return step.exact_progress
 
 
 @reward("reached")

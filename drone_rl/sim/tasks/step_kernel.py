@@ -1,7 +1,8 @@
-"""One step of one environment, as terms see it, and the rules that all tasks of terms share."""
+"""One step of one environment, as terms see it, and the rules of tasks whose goals are objects."""
 
 import warp as wp
 
+from drone_rl.sim.dynamics.rigid_body_kernel import Axes
 from drone_rl.sim.rendering.raytrace.structs_kernel import struct
 from drone_rl.sim.tasks.geometry_kernel import GOAL, NOTHING, OBSTACLE, Objects, nearest, sweep
 
@@ -33,7 +34,7 @@ class Step:
     reached: int
     """Number of goals that it reached in this step."""
     remaining: int
-    """Number of goals that are left."""
+    """Number of goals that it has not reached."""
     out_of_bounds: bool
     """Whether it is outside the task's bounds."""
     action: wp.vec4
@@ -42,6 +43,10 @@ class Step:
     """That of the step before; zero in the first one."""
     time: float
     """Seconds since the start of the episode."""
+    exact_position: wp.vec3d
+    """`position` in double precision."""
+    exact_progress: wp.float64
+    """`distance_before` minus `distance` in double precision, or what the task counts instead."""
 
 
 @wp.struct
@@ -56,15 +61,23 @@ class World:
     """Of the drone."""
     seconds: float
     """Duration of a step."""
+    moves_at_once: bool
+    """Whether drones have no velocity of their own."""
     step_limit: int
     weights: wp.array[wp.float64]
     """Of the reward terms."""
-    parameters: wp.array[float]
+    parameters: wp.array[wp.float64]
     """Of all terms, one after the other."""
+    numbers: wp.array[wp.float64]
+    """Constants of the task's own rules."""
     goal: wp.array[int]
-    """Number of the goal ahead, or `NOTHING`. Shape: (N,)."""
+    """Number of the object ahead: the goal, or what must be passed; or `NOTHING`. Shape: (N,)."""
+    reached: wp.array2d[wp.bool]
+    """Whether each of G goals is reached. Shape: (N, G), as of what follows."""
     sides: wp.array2d[int]
-    """`Side` of each object when it became the goal ahead; -1 before that. Shape: (N, P)."""
+    """`Side` of each goal when it became the one ahead; -1 before that."""
+    noted: wp.array2d[wp.float64]
+    """What the task notes about it then; NaN before that."""
     actions: wp.array[wp.vec4]
     """See `Step.action`; before a step, those of the step before. Shape: (N,)."""
     paid: wp.array2d[wp.float64]
@@ -85,49 +98,17 @@ class Motion:
     """Quaternion (w, x, y, z)."""
     is_lost: bool
     """Whether its motion has diverged."""
+    thing: int
+    """Number of the obstacle that it last hit in flight; negative for none."""
     action: wp.vec4
     """See `Step.action`."""
 
 
-@wp.func
-def left_of(attitude: wp.vec4) -> wp.vec3:
-    """Return the drone's leftward axis of a quaternion (w, x, y, z), world frame."""
-    w = attitude[0]
-    x = attitude[1]
-    y = attitude[2]
-    z = attitude[3]
-    return wp.vec3(2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x))
+# The rules of a task whose goals are objects: what is touched, and which goal is ahead
 
 
 @wp.func
-def up_of(attitude: wp.vec4) -> wp.vec3:
-    """Return the drone's upward axis of a quaternion (w, x, y, z), world frame."""
-    w = attitude[0]
-    x = attitude[1]
-    y = attitude[2]
-    z = attitude[3]
-    return wp.vec3(2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y))
-
-
-@wp.func
-def choose_goal(world: World, env: int, drone: wp.vec3d, left: wp.vec3) -> None:
-    """Let the nearest present goal be the one ahead, and note on which side of the drone it is."""
-    found = nearest(world.objects, env, drone, GOAL)
-    world.goal[env] = found.thing
-    if found.thing != NOTHING and world.sides[env, found.thing] < 0:
-        away = wp.vec3(world.objects.places[env, found.thing] - drone)
-        aside = wp.dot(away, left)
-        reach = float(world.objects.sizes[found.thing][1] + world.radius)
-        side = int(1)
-        if aside > reach:
-            side = 0
-        if aside < -reach:
-            side = 2
-        world.sides[env, found.thing] = side
-
-
-@wp.func
-def touch_all(world: World, env: int, motion: Motion) -> Step:
+def touch_solid(world: World, env: int, motion: Motion) -> Step:
     """Apply the rules of contact after a motion, and return the step with what was touched.
 
     A goal that the drone touches on its way is reached and vanishes; an obstacle stays.
@@ -144,52 +125,87 @@ def touch_all(world: World, env: int, motion: Motion) -> Step:
                     step.contact = True
                 else:
                     objects.present[env, i] = False
+                    world.reached[env, i] = True
                     step.reached += 1
-            elif not is_solid:
-                step.remaining += 1
-    around = nearest(objects, env, motion.now, OBSTACLE)
-    step.clearance = float(wp.min(motion.now[2], around.distance) - world.radius)
+        if objects.roles[i] == GOAL and not world.reached[env, i]:
+            step.remaining += 1
     if motion.now[2] < world.radius:
         step.contact = True
     return step
 
 
 @wp.func
-def observe(world: World, env: int, motion: Motion) -> Step:
-    """Apply the rules of contact after a motion, and return the step for the terms."""
-    objects = world.objects
-    step = touch_all(world, env, motion)
-    left = left_of(motion.attitude)
-    up = up_of(motion.attitude)
-    forward = wp.cross(left, up)
+def side_of(aside: wp.float64, tolerance: wp.float64) -> int:
+    """Return the `Side` of metres to the left."""
+    side = int(1)
+    if aside > tolerance:
+        side = 0
+    if aside < -tolerance:
+        side = 2
+    return side
+
+
+@wp.func
+def approach(world: World, env: int, motion: Motion, step: Step) -> Step:
+    """Return the step with its distances to the goal that was ahead."""
+    seen = step
     ahead = world.goal[env]
     if ahead != NOTHING:
-        place = objects.places[env, ahead]
-        step.distance = float(wp.length(place - motion.now))
-        step.distance_before = float(wp.length(place - motion.before))
-        if not objects.present[env, ahead]:
-            choose_goal(world, env, motion.now, left)
-            ahead = world.goal[env]
+        place = world.objects.places[env, ahead]
+        now = wp.length(place - motion.now)
+        before = wp.length(place - motion.before)
+        seen.distance = float(now)
+        seen.distance_before = float(before)
+        seen.exact_progress = before - now
+    return seen
+
+
+@wp.func
+def choose_nearest(world: World, env: int, motion: Motion, axes: Axes, step: Step) -> Step:
+    """Let the nearest goal be the one ahead once the last one is gone, and note its side."""
+    seen = approach(world, env, motion, step)
+    ahead = world.goal[env]
+    is_gone = ahead == NOTHING
+    if not is_gone:
+        is_gone = not world.objects.present[env, ahead]
+    if is_gone:
+        found = nearest(world.objects, env, motion.now, GOAL)
+        ahead = found.thing
+        world.goal[env] = ahead
+        if ahead != NOTHING and world.sides[env, ahead] < 0:
+            aside = wp.dot(world.objects.places[env, ahead] - motion.now, wp.vec3d(axes.left))
+            reach = world.objects.sizes[ahead][1] + world.radius
+            world.sides[env, ahead] = side_of(aside, reach)
+            world.noted[env, ahead] = aside
+    return seen
+
+
+@wp.func
+def see(world: World, env: int, motion: Motion, axes: Axes, step: Step) -> Step:
+    """Return the step with the drone's pose, clearance and action; count it."""
+    seen = step
+    objects = world.objects
+    ahead = world.goal[env]
     if ahead != NOTHING:
         away = wp.vec3(objects.places[env, ahead] - motion.now)
-        step.goal = wp.vec3(wp.dot(away, forward), wp.dot(away, left), wp.dot(away, up))
-    step.position = wp.vec3(motion.now)
-    step.velocity = motion.velocity
-    step.up = up
-    step.heading = wp.atan2(forward[1], forward[0])
+        seen.goal = wp.vec3(
+            wp.dot(away, axes.forward), wp.dot(away, axes.left), wp.dot(away, axes.up)
+        )
+    around = nearest(objects, env, motion.now, OBSTACLE)
+    seen.clearance = float(wp.min(motion.now[2], around.distance) - world.radius)
+    seen.exact_position = motion.now
+    seen.position = wp.vec3(motion.now)
+    seen.velocity = motion.velocity
+    if world.moves_at_once:
+        seen.velocity = wp.vec3(motion.now - motion.before) / world.seconds
+    seen.up = axes.up
+    seen.heading = wp.atan2(axes.forward[1], axes.forward[0])
     for axis in range(3):
         outside = motion.now[axis] < world.low[axis] or motion.now[axis] > world.high[axis]
-        step.out_of_bounds = step.out_of_bounds or outside
-    step.action = motion.action
-    step.last_action = world.actions[env]
+        seen.out_of_bounds = seen.out_of_bounds or outside
+    seen.action = motion.action
+    seen.last_action = world.actions[env]
     world.actions[env] = motion.action
     world.steps[env] = world.steps[env] + 1
-    step.time = float(world.steps[env]) * world.seconds
-    return step
-
-
-@wp.kernel
-def begin(world: World, drones: wp.array[wp.vec3d], attitudes: wp.array[wp.vec4]) -> None:
-    """Choose the first goal of episodes, a thread for each environment."""
-    env = wp.tid()
-    choose_goal(world, env, drones[env], left_of(attitudes[env]))
+    seen.time = float(world.steps[env]) * world.seconds
+    return seen
