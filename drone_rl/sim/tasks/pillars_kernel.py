@@ -86,7 +86,7 @@ class Way:
     aside: wp.float64
     """Metres to the left of the drone."""
     gap: wp.float64
-    """Width of the gap that it is in, metres."""
+    """Width of the gap that it is in, metres; negative if no lane is open."""
 
 
 @wp.func
@@ -98,48 +98,61 @@ def _y_of(world: World, env: int, pillar: int) -> wp.float64:
 
 
 @wp.func
+def _is_open(world: World, env: int, row: int, y: wp.float64) -> bool:
+    """Return whether a lane within the field passes a row without a touch."""
+    size = world.objects.shapes.shape[0] // world.reached.shape[1]
+    touch = world.radius + world.objects.sizes[0][0]
+    for i in range(row * size, row * size + size):
+        if wp.abs(_y_of(world, env, i) - y) <= touch:
+            return False
+    return y <= world.numbers[EDGE]
+
+
+@wp.func
+def _gap_at(world: World, env: int, row: int, y: wp.float64) -> wp.vec2d:
+    """Return the y of the pillars, or of the field's ends, to the left and right of a lane."""
+    size = world.objects.shapes.shape[0] // world.reached.shape[1]
+    left = world.numbers[SPREAD] + world.objects.sizes[0][0]
+    right = -left
+    for i in range(row * size, row * size + size):
+        there = _y_of(world, env, i)
+        if there >= y:
+            left = wp.min(left, there)
+        else:
+            right = wp.max(right, there)
+    return wp.vec2d(left, right)
+
+
+@wp.func
+def _way_from(world: World, env: int, row: int, y: wp.float64, at: wp.float64) -> Way:
+    """Find the nearest of the open lanes that are whole moves from `at`; see `nearest_way`."""
+    step = world.numbers[STEP_LENGTH]
+    edge = world.numbers[EDGE]
+    first = step * wp.ceil((-edge - at) / step)
+    least = wp.float64(wp.inf)
+    way = Way(wp.float64(0.0), wp.float64(-1.0))
+    for lane in range(int(wp.float64(2.0) * edge / step) + 1):
+        offset = first + step * wp.float64(lane)
+        if _is_open(world, env, row, at + offset):
+            offset = offset + (at - y)
+            sides = _gap_at(world, env, row, y + offset)
+            off_centre = wp.abs(wp.float64(0.5) * (sides[0] + sides[1]) - y)
+            spread = world.numbers[SPREAD]
+            cost = wp.abs(offset) + wp.float64(1.0e-3) * off_centre / spread
+            if cost < least:
+                least = cost
+                way.aside = offset
+                way.gap = sides[0] - sides[1] - wp.float64(2.0) * world.objects.sizes[0][0]
+    return way
+
+
+@wp.func
 def nearest_way(world: World, env: int, row: int, y: wp.float64) -> Way:
     """Find the nearest open lane of a row; of two, that whose gap's middle is nearer."""
-    objects = world.objects
-    size = objects.shapes.shape[0] // world.reached.shape[1]
-    step = world.numbers[STEP_LENGTH]
-    spread = world.numbers[SPREAD]
-    edge = world.numbers[EDGE]
-    half = objects.sizes[0][0]
-    touch = world.radius + half
-    count = int(wp.float64(2.0) * edge / step) + 1
-    way = Way()
-    for attempt in range(2):
-        at = y
-        if attempt == 1:  # in flight, between lanes: take those of the field
-            at = step * wp.rint(y / step)
-        first = step * wp.ceil((-edge - at) / step)
-        best = wp.float64(wp.inf)
-        for lane in range(count):
-            offset = first + step * wp.float64(lane)
-            place = at + offset
-            away = wp.float64(wp.inf)
-            for k in range(size):
-                away = wp.min(away, wp.abs(_y_of(world, env, row * size + k) - place))
-            if away > touch and place <= edge:
-                offset = offset + (at - y)
-                place = y + offset
-                left = spread + half
-                right = -(spread + half)
-                for k in range(size):
-                    there = _y_of(world, env, row * size + k)
-                    if there >= place:
-                        left = wp.min(left, there)
-                    else:
-                        right = wp.max(right, there)
-                off_centre = wp.abs(wp.float64(0.5) * (left + right) - y)
-                cost = wp.abs(offset) + wp.float64(1.0e-3) * off_centre / spread
-                if cost < best:
-                    best = cost
-                    way.aside = offset
-                    way.gap = left - right - wp.float64(2.0) * half
-        if best < wp.float64(wp.inf):
-            return way
+    way = _way_from(world, env, row, y, y)
+    if way.gap < wp.float64(0.0):  # in flight, between lanes: take those of the field
+        step = world.numbers[STEP_LENGTH]
+        way = _way_from(world, env, row, y, step * wp.rint(y / step))
     return way
 
 
