@@ -11,7 +11,6 @@ weights included, are arrays there, so that other numbers compile nothing.
 """
 
 import dataclasses
-import importlib
 import inspect
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, TypeVar
@@ -25,8 +24,6 @@ from drone_rl.utils.settings import Settings, about
 
 MOST_PARAMETERS = 4
 """Largest number of parameters of a term."""
-SHIPPED = "drone_rl.sim.tasks.shipped_terms_kernel"
-"""Module that registers the shipped terms; it is imported when a term is looked up."""
 F = TypeVar("F", bound=Callable[..., Any])
 Number = Annotated[float, Real(-1e6, 1e6)]
 
@@ -40,8 +37,11 @@ class Term:
     """A registered term."""
 
     name: str
-    function: Callable[..., Any]
-    """Maps a `Step` and the parameters to a number, or to whether an episode ends."""
+    function: Callable[..., Any] | None
+    """Maps a `Step` and the parameters to a number, or to whether an episode ends.
+
+    None until the module of a shipped term is imported, so that settings need no simulator.
+    """
     settings: type[TermSettings]
     parameters: tuple[str, ...]
     """Names of the parameters, in order."""
@@ -63,18 +63,20 @@ class Term:
                     f"{place_of(function)}: the parameter {parameter.name} has no number as "
                     f"default; write {parameter.name}: float = 1.0"
                 )
-        numbers = {**own, **{p.name: float(p.default) for p in rest}}
-        hints = dict.fromkeys(numbers, Number)
-        members = {"__annotations__": hints, "__module__": __name__, **numbers}
-        settings: Any = type(f"{name}_settings", (TermSettings,), members)
-        names = tuple(p.name for p in rest)
+        settings = _settings_class(name, {**own, **{p.name: float(p.default) for p in rest}})
         is_exact = any("float64" in str(p.annotation) for p in rest)
-        return cls(name, function, settings, names, is_exact)
+        return cls(name, function, settings, tuple(p.name for p in rest), is_exact)
 
     @property
     def meaning(self) -> str:
         """First paragraph of the function's docstring."""
         return about(self.function)  # pyright: ignore[reportArgumentType] (of any object)
+
+
+def _settings_class(name: str, numbers: Mapping[str, float]) -> type[TermSettings]:
+    hints = dict.fromkeys(numbers, Number)
+    members = {"__annotations__": hints, "__module__": __name__, **numbers}
+    return type(f"{name}_settings", (TermSettings,), members)
 
 
 class Terms:
@@ -97,6 +99,20 @@ class Terms:
 
         return decorate
 
+    def declare(self, name: str, weight: float, **parameters: float) -> None:
+        """Register a shipped term whose function `implement` adds."""
+        settings = _settings_class(name, {"weight": weight, **parameters})
+        self.by_name[name] = Term(name, None, settings, tuple(parameters), is_exact=False)
+
+    def implement(self, name: str) -> Callable[[F], F]:
+        """Return a decorator that adds the function of a declared term."""
+
+        def decorate(function: F) -> F:
+            self.by_name[name] = dataclasses.replace(self.by_name[name], function=function)
+            return function
+
+        return decorate
+
     def read(self, given: Any) -> Any:
         """Return settings by name from a mapping or a list of names; None leaves a term out.
 
@@ -110,7 +126,6 @@ class Terms:
         return {name: self._settings(name, of) for name, of in given.items() if of is not None}
 
     def _settings(self, name: Any, given: Any) -> TermSettings:
-        importlib.import_module(SHIPPED)
         if name not in self.by_name:
             raise InputError(
                 f"{name} is unknown; choose from {', '.join(self.by_name)}, or register a "
@@ -124,6 +139,17 @@ class Terms:
 
 
 REWARDS, ENDS, SUCCESSES = Terms("reward"), Terms("end"), Terms("success")
+for _name, _weight in {
+    "progress": 1.0,
+    "reached": 1.0,
+    "contact": -1.0,
+    "time": -0.01,
+    "control": -0.01,
+    "smoothness": -0.01,
+    "facing": 0.01,
+}.items():
+    REWARDS.declare(_name, _weight)
+REWARDS.declare("altitude", -0.01, height=2.5)
 Rewards = Annotated[dict[str, TermSettings], BeforeValidator(REWARDS.read)]
 """Terms of a reward by name, each with a weight and parameters of its own."""
 Ends = Annotated[dict[str, TermSettings], BeforeValidator(ENDS.read)]

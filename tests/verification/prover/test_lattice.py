@@ -143,7 +143,7 @@ def test_random_walks_on_the_graph(settings):
     for _ in range(settings.step_limit - 1):
         shown = every[node]
         assert torch.allclose(shown.drone, state.drone, atol=1e-12, rtol=0)
-        for name in ("cubes", "collected", "passed", "next_cube", "end_reason"):
+        for name in ("places", "reached", "present", "end_reason"):
             assert torch.equal(getattr(shown, name), getattr(state, name)), name
         action = torch.from_numpy(random.choice(3, len(state), p=[0.4, 0.35, 0.25]))
         state, _ = CollectCubes(settings).step(state, dynamics.step(state.body, action))
