@@ -60,8 +60,8 @@ class Judgement(Result, Verdict, Provenance):
         """Return the exit code of `drone-rl verdict`.
 
         Args:
-            require: "proved" for a proof of every placement that was computed here (see `judge`), in
-                addition to the verdict's own code; a required domain has to be covered, too.
+            require: "proved" also requires a proof of every placement that was computed here (see
+                `judge`), as a required domain has to be covered.
         """
         if require == "proved" and not self.is_proved:
             return PROOF_MISSING

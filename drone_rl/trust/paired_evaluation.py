@@ -21,7 +21,7 @@ from drone_rl.config import (
 )
 from drone_rl.envs import Observer, base_env, worlds_of
 from drone_rl.envs.rollout import Agent, DelayedAgent, steps
-from drone_rl.policies import ImageNetwork
+from drone_rl.policies import ImageNetwork, greedy_agent
 from drone_rl.policies.baselines import make_baseline
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.dynamics import draw_seeds, make_dynamics
@@ -29,7 +29,6 @@ from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import as_task
 from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.sim.worlds import Worlds
-from drone_rl.trust.agents import PolicyAgent
 from drone_rl.trust.perturbations import (
     ONSET_STEP,
     Condition,
@@ -162,7 +161,7 @@ class PairedEvaluator:
 
         The perturbations of the condition are active as the mode says.
         """
-        agent = PolicyAgent(self.subject.network) if agent is None else agent
+        agent = agent or greedy_agent(self.subject.network)
         delayed, observer = DelayedAgent(agent), None
         stages: list[tuple[Condition, int | None]] = [(condition, None)]
         if mode is PerturbationMode.ONSET:
