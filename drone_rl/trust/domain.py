@@ -46,6 +46,8 @@ def run_across(
 ) -> RangeTest:
     """Run episodes at strengths drawn uniformly and jointly from ranges, one each.
 
+    Each episode runs alone, as a drone flies, so a policy counts by what it does alone.
+
     Args:
         subject: The policy.
         spans: The ranges by axis.
@@ -54,20 +56,21 @@ def run_across(
         required: Success rate to exceed.
     """
     rng, successes, failed = np.random.default_rng(seed), 0, []
-    for root in rng.integers(2**32, size=episodes).tolist():
-        strengths = {axis: axis.sample(*span, rng) for axis, span in spans.items()}
-        condition = Condition()
-        for axis, strength in strengths.items():
-            if axis.position(strength):
-                condition |= axis.make(strength, subject)
-        with closing(PairedEvaluator(subject, 1, root)) as evaluator:
+    with closing(PairedEvaluator(subject, 1)) as evaluator:
+        for root in rng.integers(2**32, size=episodes).tolist():
+            evaluator.sample(root)
+            strengths = {axis: axis.sample(*span, rng) for axis, span in spans.items()}
+            condition = Condition()
+            for axis, strength in strengths.items():
+                if axis.position(strength):
+                    condition |= axis.make(strength, subject)
             try:
                 is_success = bool(evaluator.run(condition).episodes.success)
             except InputError as error:
                 return RangeTest(success=proportion(0, 0), required=required, refused=str(error))
-        successes += is_success
-        if not is_success and len(failed) < EXAMPLES:
-            failed.append({a.name: finite(a.value(s, subject)) for a, s in strengths.items()})
+            successes += is_success
+            if not is_success and len(failed) < EXAMPLES:
+                failed.append({a.name: finite(a.value(s, subject)) for a, s in strengths.items()})
     success = proportion(successes, episodes)
     return RangeTest(success=success, required=required, failed=tuple(failed))
 
