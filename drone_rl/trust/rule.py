@@ -141,8 +141,8 @@ one-sided: more than {100 * self.side_share:g}% of the goals of the first or las
 more than {100 * self.other_share:g}% of the other one, both offered. poor: neither, and no \
 farther than {self.poor_margin:.0%} of the way from luck to the oracle, in goals; luck is the best \
 of random actions and of each action always, in the same environments. none of these: anything \
-else. Without an oracle that succeeds in more than {USABLE:.0%} of episodes, thresholds are absolute: \
-success in every episode takes its place. Every episode counts once: a share is a mean over \
+else. Without an oracle that succeeds in more than {USABLE:.0%} of episodes, thresholds are \
+absolute: success in every episode takes its place. Every episode counts once: a share is a mean over \
 episodes. The verdict is certain if the kind is the same wherever the quantities lie within their \
 intervals. The procedure that gives them errs in at most {100 * self.error_rate:g}% of cases, that \
 is, an interval misses its quantity, whatever depends on what within an episode."""
