@@ -22,13 +22,14 @@ from drone_rl.config import (
 from drone_rl.envs import Observer, base_env, worlds_of
 from drone_rl.envs.rollout import Agent, DelayedAgent, steps
 from drone_rl.policies import ImageNetwork, greedy_agent
-from drone_rl.policies.baselines import make_baseline
+from drone_rl.policies.baselines import OracleAgent, baseline_names, make_baseline
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.dynamics import draw_seeds, make_dynamics
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import as_task
 from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.sim.worlds import Worlds
+from drone_rl.trust.baselines import reference
 from drone_rl.trust.perturbations import (
     ONSET_STEP,
     Condition,
@@ -243,6 +244,13 @@ class PairedEvaluator:
             agent = make_baseline(name, worlds.task, actions, generator)
             episodes[name] = self.run(condition, agent=agent).episodes
         return episodes
+
+    def run_oracle(self) -> CompleteEpisodes | None:
+        """Return the oracle's episodes without perturbation; None without a usable oracle."""
+        worlds = self.worlds(Condition())
+        if "oracle" not in baseline_names(worlds.task, worlds.dynamics.actions):
+            return None
+        return reference({"oracle": self.run(Condition(), agent=OracleAgent()).episodes})
 
     def distractor_places(self) -> Tensor:
         """Return positions of distractors, see `perturbations.sample_distractors`."""

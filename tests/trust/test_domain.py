@@ -210,6 +210,7 @@ def test_a_range_is_tested_one_environment_at_a_time(make_prober):
 def test_required_success_is_relative_to_the_oracle(make_prober):
     oracle = make_prober(subject(), 50)._oracle
     assert required_success(oracle, 0.8) == pytest.approx(0.8)
+    assert required_success(None, 0.8) == 0.8
 
 
 def test_blind_policy_in_an_easy_task_has_no_range(make_prober):
