@@ -15,12 +15,12 @@ import inspect
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BeforeValidator
+from pydantic import AfterValidator, BeforeValidator
 
 from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.plugins import place_of
 from drone_rl.utils.schema import Real, shown
-from drone_rl.utils.settings import Settings, about
+from drone_rl.utils.settings import ByName, Settings, about
 
 MOST_PARAMETERS = 4
 """Largest number of parameters of a term."""
@@ -150,11 +150,12 @@ for _name, _weight in {
 }.items():
     REWARDS.declare(_name, _weight)
 REWARDS.declare("altitude", -0.01, height=2.5)
-Rewards = Annotated[dict[str, TermSettings], BeforeValidator(REWARDS.read)]
+_Read = dict[str, TermSettings]
+Rewards = Annotated[_Read, BeforeValidator(REWARDS.read), AfterValidator(ByName)]
 """Terms of a reward by name, each with a weight and parameters of its own."""
-Ends = Annotated[dict[str, TermSettings], BeforeValidator(ENDS.read)]
+Ends = Annotated[_Read, BeforeValidator(ENDS.read), AfterValidator(ByName)]
 """Reasons to end an episode, by name."""
-Success = Annotated[dict[str, TermSettings], BeforeValidator(SUCCESSES.read)]
+Success = Annotated[_Read, BeforeValidator(SUCCESSES.read), AfterValidator(ByName)]
 """A meaning of success, by name."""
 
 

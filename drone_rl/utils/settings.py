@@ -84,6 +84,13 @@ class Settings(Model):
         return self.values()
 
 
+class ByName(dict[str, Any]):
+    """Settings by name, which have a hash as other settings do."""
+
+    def __hash__(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return hash(frozenset(self.items()))
+
+
 def plain(value: Any) -> Any:
     """Return a setting's value as plain data: settings as mappings, tuples as lists.
 
