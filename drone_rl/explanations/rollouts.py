@@ -22,12 +22,11 @@ from drone_rl.envs import worlds_of
 from drone_rl.envs.rollout import ActorAgent, Recording, Step, steps
 from drone_rl.explanations.hooks import features, probabilities
 from drone_rl.explanations.scenes import Scenes, has_objects
-from drone_rl.policies import ImageNetwork, RecurrentNetwork
+from drone_rl.policies import ImageNetwork, RecurrentNetwork, greedy_agent
 from drone_rl.sim.dynamics.state import heading_of
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import Goals, State, Task
 from drone_rl.sim.worlds import Worlds
-from drone_rl.trust.agents import PolicyAgent
 
 _POSE = ("drone", "attitude")
 _STATE = "state/"
@@ -214,7 +213,7 @@ def run_from(
     see `steps`. The appearance is the task's by default. Return the last states.
     """
     ends = state[torch.arange(len(state), device=state.end_reason.device)]
-    agent, observer = PolicyAgent(network), scenes.observer(appearance)
+    agent, observer = greedy_agent(network), scenes.observer(appearance)
     for step in steps(agent, observer, state, goes_on=goes_on):
         ends[step.rows] = step.after
     return ends

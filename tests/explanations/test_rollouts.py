@@ -12,7 +12,7 @@ from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
 from drone_rl.explanations.rollouts import collect, run_to_end, select_frames, spread_frames
 from drone_rl.explanations.scenes import Region, Scenes, place_target
-from drone_rl.policies import ExternalNetwork, make_actor
+from drone_rl.policies import ExternalNetwork, ImageNetwork, make_actor
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.dynamics import FlightState
 from drone_rl.sim.tasks import CollectCubes
@@ -116,16 +116,16 @@ def always_forward(observations):
 F, L, R = Move.FORWARD, Move.LEFT, Move.RIGHT
 
 
-class Always(nn.Module):
+class Always(ImageNetwork):
     """Takes given actions one after the other, the last of them for ever; the same everywhere."""
 
     def __init__(self, *actions):
         super().__init__()
-        self.actions, self.seen = list(actions), []
+        self.moves, self.seen = list(actions), []
 
     def forward(self, pictures):
         self.seen.append(pictures)
-        action = self.actions[min(len(self.seen), len(self.actions)) - 1]
+        action = self.moves[min(len(self.seen), len(self.moves)) - 1]
         return 9.0 * nn.functional.one_hot(torch.full((len(pictures),), int(action)), 3).float()
 
 

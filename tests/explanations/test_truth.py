@@ -18,6 +18,7 @@ from drone_rl.explanations.truth import (
     run_to_target,
     to_the_middle,
 )
+from drone_rl.policies import ImageNetwork
 from drone_rl.sim.actions import Move
 
 
@@ -64,7 +65,7 @@ def test_a_cube_is_moved_to_the_middle_and_never_away_from_it(scenes, lateral, m
     assert state.cubes[0, 0, 1] == 7.0 + lateral
 
 
-class Follower(nn.Module):
+class Follower(ImageNetwork):
     """Turns to where the picture differs from the empty scene, and flies on when in the middle."""
 
     def __init__(self, absent):
@@ -80,7 +81,7 @@ class Follower(nn.Module):
         return logits
 
 
-class Always(nn.Module):
+class Always(ImageNetwork):
     """Takes one action."""
 
     def __init__(self, action):
