@@ -12,7 +12,7 @@ from drone_rl.explanations.context import Context, needs, objects
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.results import Outcomes, Truth
 from drone_rl.explanations.rollouts import Step, run_from, spread_frames
-from drone_rl.explanations.scenes import DARK_GROUND, Region, Scenes, has_objects
+from drone_rl.explanations.scenes import DARK_GROUND, Region, Scenes
 from drone_rl.policies import ImageNetwork
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
@@ -28,7 +28,7 @@ def section(context: Context) -> Truth:
     state = data.state(scenes.worlds)
     trial = trust.make_trial(context)
     changes, outcomes = [], None
-    if has_objects(scenes.task):
+    if scenes.task.edits is not None:
         changes = intervene(scenes, network, state, data.tensor("regions"), seed=seed)
         outcomes = measure_outcomes(scenes, network, state, episode)
     shown_frame = clear_frame(changes[0]) if changes else 0

@@ -26,15 +26,15 @@ def test_indexed_and_whole_batches_step_alike():
 def test_a_task_whose_step_returns_no_pair_is_named(monkeypatch):
     worlds = Worlds(2, TaskSettings(num_cubes=1))
     worlds.reset(torch.arange(2), [world_random_state(0, i) for i in range(2)])
-    step = worlds.task.advance
-    monkeypatch.setattr(worlds.task, "advance", lambda *given: step(*given)[1])
+    step = worlds.task.step
+    monkeypatch.setattr(worlds.task, "step", lambda *given: step(*given)[1])
     ahead = (torch.arange(2), torch.zeros(2, dtype=torch.int64))
     with pytest.raises(InputError, match=r"CollectCubes\.step must return two things: the states"):
         worlds.step(*ahead)
     for spoiled in (lambda r: r[:, None], lambda r: r.mean(), lambda r: 0.5):
         monkeypatch.setattr(
             worlds.task,
-            "advance",
+            "step",
             lambda *given, of=spoiled: (step(*given)[0], of(step(*given)[1])),
         )
         with pytest.raises(InputError, match="a tensor with one number for each environment"):
@@ -45,8 +45,8 @@ def test_a_task_whose_step_returns_no_pair_is_named(monkeypatch):
 def test_a_reward_whose_sums_may_overflow_is_named(monkeypatch, reward):
     worlds = Worlds(2, TaskSettings(num_cubes=1))
     worlds.reset(torch.arange(2), [world_random_state(0, i) for i in range(2)])
-    step, rewards = worlds.task.advance, torch.tensor([0.0, reward])
-    monkeypatch.setattr(worlds.task, "advance", lambda *given: (step(*given)[0], rewards))
+    step, rewards = worlds.task.step, torch.tensor([0.0, reward])
+    monkeypatch.setattr(worlds.task, "step", lambda *given: (step(*given)[0], rewards))
     with pytest.raises(InputError, match=re.escape(f"returns a reward of {reward:g}; ")):
         worlds.step(torch.arange(2), torch.zeros(2, dtype=torch.int64))
 

@@ -10,8 +10,9 @@ from torch import Tensor
 
 from drone_rl.config import TaskSettings
 from drone_rl.config.term_task import ObjectSettings
-from drone_rl.sim.actions import DOWN, MOVES, MOVES_3D, UP, Actions, Entry, Move
+from drone_rl.sim.actions import DOWN, MOVES, MOVES_3D, UP, Entry, Move
 from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.tasks.applied_rules import AppliedRules, reward_terms
 from drone_rl.sim.tasks.collect_cubes_kernel import (
     ALL_CUBES,
     ENDS,
@@ -26,12 +27,11 @@ from drone_rl.sim.tasks.common import (
     number_classes,
     side_of,
 )
-from drone_rl.sim.tasks.objects import ObjectState, ObjectTask, reward_terms
+from drone_rl.sim.tasks.objects import ObjectState, ObjectTask
 from drone_rl.sim.tasks.rules_kernel import make_rules
 from drone_rl.sim.tasks.scene_edits import Range, SceneEdits
 from drone_rl.sim.tasks.task import Goals, OracleRule, register_task
 from drone_rl.sim.vocabulary import CUBES
-from drone_rl.utils.errors import InputError
 
 
 @dataclasses.dataclass
@@ -58,22 +58,28 @@ class CollectCubes(ObjectTask):
     def __init__(self, settings: TaskSettings | None = None) -> None:
         s = settings or TaskSettings()
         cube = ObjectSettings(shape="box", role="goal", size=(s.cube_size,) * 3, color=s.cube_color)
+        rules = make_rules(
+            reward_terms(s.reward),
+            ENDS,
+            ALL_CUBES,
+            touch=touch_cubes,
+            choose=choose_first,
+            success_first=True,
+        )
+        bounds = (s.front_bound, s.side_bound, s.altitude, s.height_bound)
         super().__init__(
             s,
             {f"cube_{i}": cube for i in range(s.num_cubes)},
-            make_rules(
-                reward_terms(s.reward),
-                ENDS,
-                ALL_CUBES,
-                touch=touch_cubes,
-                choose=choose_first,
-                success_first=True,
-            ),
-            rewards=s.reward,
-            parameters=(s.front_bound, s.side_bound, s.altitude, s.height_bound),
+            AppliedRules(rules, rewards=s.reward, parameters=bounds),
         )
         self.largest_reward = float(s.num_cubes)
         self.origin = (0.0, 0.0, s.altitude)
+        if s.must_climb:
+            self.needed_actions = {
+                "up": f"task.vertical_bound={s.vertical_bound} puts cubes where a drone that "
+                f"keeps its altitude never touches them; give at most {s.touch_distance} (half of "
+                "cube_size + drone_size), or actions=moves_3d"
+            }
         self.vocabulary = CUBES.replace(tested=_some_cubes(s))
         actions = MOVES_3D if s.must_climb else MOVES
         self.oracle = OracleRule(("drone", "cube_positions", "next_cube"), self.line_up, actions)
@@ -104,16 +110,6 @@ class CollectCubes(ObjectTask):
             "end_reason": Entry((1,), torch.int64, 0, len(CubesEnd) - 1),
             "cube_positions": Entry((cubes, 3), torch.float32),
         }
-
-    def check_actions(self, actions: Actions) -> None:
-        """Refuse cubes that drones without moves up and down never touch."""
-        if self.settings.must_climb and not {"up", "down"} <= {*actions.names}:
-            raise InputError(
-                f"task.vertical_bound={self.settings.vertical_bound} puts cubes where a drone that "
-                f"keeps its altitude never touches them; give at most "
-                f"{self.settings.touch_distance} (half of cube_size + drone_size), or "
-                "actions=moves_3d"
-            )
 
     def sample(self, random_state: np.random.RandomState) -> Tensor:
         """Sample the positions of the cubes (Algorithm 2). Shape: (C, 3), metres."""

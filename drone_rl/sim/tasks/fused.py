@@ -10,6 +10,7 @@ from drone_rl.sim.dynamics.control import Moves
 from drone_rl.sim.dynamics.moves_kernel import make_fleet
 from drone_rl.sim.dynamics.state import NUMBERS
 from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, PoseArrays
+from drone_rl.sim.tasks.geometry_kernel import OBSTACLE
 from drone_rl.sim.tasks.objects import ObjectTask
 from drone_rl.sim.tasks.rules_kernel import Episodes, place
 from drone_rl.sim.tasks.task import State, Task
@@ -20,7 +21,9 @@ def fused_rules(task: Task[Any], dynamics: Dynamics, state: State) -> "FusedObje
     if not isinstance(task, ObjectTask) or not task.has_own_rules:
         return None
     is_flown = type(dynamics) is Quadrotor and isinstance(dynamics.steering, Moves)
-    if type(dynamics) is not ComputerVision and (not is_flown or task.is_solid):
+    if type(dynamics) is not ComputerVision and (
+        not is_flown or bool((task.roles == OBSTACLE).any())
+    ):
         return None
     return FusedObjects(task, dynamics, state)
 
@@ -30,7 +33,7 @@ class FusedObjects:
 
     def __init__(self, task: ObjectTask, dynamics: Dynamics, state: State) -> None:
         """Allocate the arrays of as many environments as states; see `fused_rules`."""
-        self.functions = (Episodes, place, task.rules.move)
+        self.functions = (Episodes, place, task.rules.compiled.move)
         """Warp structure of the states; functions that write poses and that step an environment."""
         self._state: Any = state[torch.arange(len(state))]
         count = len(state)
@@ -39,7 +42,7 @@ class FusedObjects:
         self._drones = torch.zeros(count, 3, dtype=torch.float64)
         self._attitudes = torch.zeros(count, 4)
         self.arrays: Any = Episodes()
-        self.arrays.world = task.world(self._state, self.steps, self.end_reasons, dynamics)
+        self.arrays.world = task.rules.world(self._state, self.steps, self.end_reasons, dynamics)
         self.arrays.drones = wp.from_torch(self._drones, dtype=wp.vec3d)
         self.arrays.attitudes = wp.from_torch(self._attitudes, dtype=wp.vec4)
         self.arrays.steps = wp.from_torch(self.steps)

@@ -11,8 +11,9 @@ from drone_rl.config import PillarsSettings
 from drone_rl.config.term_task import ObjectSettings
 from drone_rl.sim.actions import MOVES, Entry
 from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.tasks.applied_rules import AppliedRules, reward_terms
 from drone_rl.sim.tasks.common import Side, interval_classes, number_classes
-from drone_rl.sim.tasks.objects import ObjectState, ObjectTask, reward_terms
+from drone_rl.sim.tasks.objects import ObjectState, ObjectTask
 from drone_rl.sim.tasks.pillars_kernel import (
     ENDS,
     FINISH_LINE,
@@ -55,13 +56,16 @@ class Pillars(ObjectTask):
         size = (s.width, s.width, s.height)
         pillar = ObjectSettings(shape="box", role="obstacle", size=size, color=s.pillar_color)
         terms = (reward_terms(s.reward), ENDS, FINISH_LINE)
-        super().__init__(
-            s,
-            {f"pillar_{i}": pillar for i in range(s.num_pillars)},
+        rules = AppliedRules(
             make_rules(*terms, touch=touch_pillars, choose=choose_pillar),
             rewards=s.reward,
             parameters=(s.spread + EDGE, s.finish),
             numbers=(s.finish, s.step_length, s.spread, s.spread + EDGE, *lines.tolist()),
+        )
+        super().__init__(
+            s,
+            {f"pillar_{i}": pillar for i in range(s.num_pillars)},
+            rules,
             num_goals=s.num_rows,
         )
         self.lanes = Lanes(s)

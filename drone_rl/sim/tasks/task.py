@@ -144,6 +144,8 @@ class Task(abc.ABC, Generic[S]):
     """Entries of an episode's last information that `score` reads."""
     oracle: OracleRule | None = None
     """The best action given the true state; None if it is unknown."""
+    needed_actions: Mapping[str, str] = {}
+    """Names of actions without which no policy can do the task, and what to say then."""
     edits: Any = None
     """How explanations change its scenes, `SceneEdits`; None if they can't."""
 
@@ -159,9 +161,6 @@ class Task(abc.ABC, Generic[S]):
     def make_dynamics(self) -> Dynamics:
         """Return the default dynamics of the drone: moves of a metre."""
         return ComputerVision()
-
-    def check_actions(self, actions: Actions) -> None:
-        """Raise an `InputError` if no policy could do the task by these actions."""
 
     def make_props(self) -> Sequence[Prop]:
         """Return new entities besides field and drone, positioned by `places`."""
@@ -185,26 +184,6 @@ class Task(abc.ABC, Generic[S]):
         """Return the state after a step, and the reward: float64, shape (N,).
 
         `state` is that before the step and stays as it is; `body` are the drones after it.
-        """
-
-    def advance(
-        self, state: S, body: BodyState, action: Tensor, dynamics: Dynamics
-    ) -> tuple[S, Tensor]:
-        """Return `step`; a task whose rules depend on the action overrides this.
-
-        `action` is what the dynamics took. Shape: (N, *).
-        """
-        return self.step(state, body)
-
-    def touch(self, state: S, position: Tensor, before: Tensor | None = None) -> Tensor | None:
-        """Apply the rules of contact in place, without a step or reward; by default there are none.
-
-        `position` is that of each drone, metres, and `before` where it comes from, if it touches
-        what is on the straight path. Shapes: (num_envs, 3).
-
-        Returns:
-            Fraction of the path before each prop was touched; inf without contact, (N, P). Without
-            any contact it may be None.
         """
 
     def places(self, state: S) -> Tensor:
@@ -232,6 +211,13 @@ class Task(abc.ABC, Generic[S]):
         """
         for number, stratum in enumerate(self.strata):
             yield "side", stratum, goals.stratum == number
+
+
+def check_actions(task: Task[Any], actions: Actions) -> None:
+    """Raise an `InputError` if no policy could do a task by these actions."""
+    for name, problem in task.needed_actions.items():
+        if name not in actions.names:
+            raise InputError(problem)
 
 
 MAKERS: dict[type[BaseTaskSettings], Callable[[Any], Task[Any]]] = {}

@@ -13,9 +13,10 @@ from drone_rl.config.term_task import ObjectSettings, TermTaskSettings
 from drone_rl.config.terms import ENDS, SUCCESSES
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.tasks.applied_rules import AppliedRules, reward_terms
 from drone_rl.sim.tasks.common import Side
 from drone_rl.sim.tasks.geometry_kernel import GOAL
-from drone_rl.sim.tasks.objects import ObjectState, ObjectTask, reward_terms
+from drone_rl.sim.tasks.objects import ObjectState, ObjectTask
 from drone_rl.sim.tasks.rules_kernel import SUCCESS, make_rules
 from drone_rl.sim.tasks.scene_edits import Range, SceneEdits
 from drone_rl.sim.tasks.task import Goals, register_task
@@ -46,14 +47,14 @@ class TermTask(ObjectTask):
         ends = tuple(ENDS.by_name[name] for name in s.end)
         (success,) = (SUCCESSES.by_name[name] for name in s.success)
         named = zip((*ends, success), (*s.end.values(), *s.success.values()), strict=True)
-        super().__init__(
-            s,
-            objects,
+        rules = AppliedRules(
             make_rules(reward_terms(s.reward), ends, success),
             rewards=s.reward,
             parameters=[getattr(of, name) for term, of in named for name in term.parameters],
+            low=s.low,
+            high=s.high,
         )
-        self.low, self.high = s.low, s.high
+        super().__init__(s, objects, rules)
         x, y, z = (sum(s.start.range_of(axis)) / 2 for axis in "xyz")
         self.origin = (x, y, z)
         own = [term.name.upper() for term in ends]
@@ -79,7 +80,7 @@ class TermTask(ObjectTask):
             "present": Entry((objects,), torch.bool),
             "touched": Entry((objects,), torch.bool),
             "goal": Entry((1,), torch.int64, 0, objects),
-            "paid": Entry((len(self.rules.rewards),), torch.float32),
+            "paid": Entry((len(self.rules.compiled.rewards),), torch.float32),
             "end_reason": Entry((1,), torch.int64, 0, len(self.ends) - 1),
         }
 

@@ -19,7 +19,7 @@ start_warp("cpu")
 
 
 WORLDS = 60
-move = CollectCubes().rules.move
+move = CollectCubes().rules.compiled.move
 
 
 @wp.kernel(enable_backward=False)
