@@ -19,6 +19,7 @@ from drone_rl.config import (
     CameraSettings,
     DynamicsSettings,
 )
+from drone_rl.config.commands import Mode
 from drone_rl.envs import Observer, base_env, worlds_of
 from drone_rl.envs.rollout import Agent, DelayedAgent, steps
 from drone_rl.policies import ImageNetwork, greedy_agent
@@ -33,7 +34,6 @@ from drone_rl.trust.baselines import reference
 from drone_rl.trust.perturbations import (
     ONSET_STEP,
     Condition,
-    PerturbationMode,
     clutter,
     make_faults,
     sample_distractors,
@@ -163,7 +163,7 @@ class PairedEvaluator:
     def run(
         self,
         condition: Condition,
-        mode: PerturbationMode = PerturbationMode.CONSTANT,
+        mode: Mode = "constant",
         agent: Agent | None = None,
         num_steps: int | None = None,
     ) -> ConditionResult:
@@ -174,7 +174,7 @@ class PairedEvaluator:
         agent = agent or greedy_agent(self.subject.network)
         delayed, observer = DelayedAgent(agent), None
         stages = [(condition, num_steps)]
-        if mode is PerturbationMode.ONSET:
+        if mode == "onset":
             stages.insert(0, (Condition(), ONSET_STEP))
         state = self.worlds(stages[0][0]).start(self._drawn, self._seeds)
         rows = torch.arange(len(state), device=state.end_reason.device)
@@ -201,7 +201,7 @@ class PairedEvaluator:
         return ConditionResult(episodes, trace.cpu())
 
     def _observer(
-        self, condition: Condition, mode: PerturbationMode, agent: Agent, earlier: Observer | None
+        self, condition: Condition, mode: Mode, agent: Agent, earlier: Observer | None
     ) -> Observer:
         """Return what observes the environments under a condition; memory goes on from `earlier`.
 

@@ -10,7 +10,7 @@ import numpy as np
 import pydantic
 from numpy.typing import NDArray
 
-from drone_rl.config.commands import ShiftSettings
+from drone_rl.config.commands import Mode, ShiftSettings
 from drone_rl.config.transforms import Fault
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.trust.axes_table import NAMES, TABLE
@@ -24,9 +24,6 @@ from drone_rl.utils.provenance import Provenance
 from drone_rl.utils.text import at_most, listed, percent, render
 
 FORMAT_VERSION = 2
-Mode = Literal["constant", "drifting", "onset"]
-"""How a perturbation changes within an episode."""
-MODES: tuple[Mode, ...] = ("constant", "drifting", "onset")
 MAX_NAMED = 6
 """Largest number of axes that a sentence names."""
 

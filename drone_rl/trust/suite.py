@@ -12,11 +12,12 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from drone_rl.config.commands import Mode
 from drone_rl.envs.rollout import Act, StepContext
 from drone_rl.policies.baselines import OracleAgent, has_visible_oracle
 from drone_rl.trust.axes import TOGETHER, Axis
 from drone_rl.trust.paired_evaluation import ConditionResult, PairedEvaluator
-from drone_rl.trust.perturbations import Condition, PerturbationMode
+from drone_rl.trust.perturbations import Condition
 from drone_rl.trust.shifts_results import AlongAxis, ConditionFigures, Level, ModeFigures, Plain
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import Share, mean_bounds, proportion
@@ -30,7 +31,7 @@ class Suite:
     """Run a policy and the oracle under all conditions."""
 
     def __init__(
-        self, evaluator: PairedEvaluator, modes: Sequence[PerturbationMode], possible_share: float
+        self, evaluator: PairedEvaluator, modes: Sequence[Mode], possible_share: float
     ) -> None:
         """Run both without perturbation.
 
@@ -73,7 +74,7 @@ class Suite:
             group=axis.group,
             unit=axis.unit,
             neutral=finite(axis.value(axis.neutral, subject)),
-            areas={mode.value: success_area(levels, plain, mode) for mode in self._modes},
+            areas={mode: success_area(levels, plain, mode) for mode in self._modes},
             levels=tuple(levels),
         )
 
@@ -85,10 +86,10 @@ class Suite:
             return ConditionFigures(refused=str(error))
         oracle = _success(self._fly_oracle(condition) if self._knows else None)
         drifts = sum(condition.dimensions) > 0
-        modes: Any = {
-            mode.value: self._figures(self._evaluator.run(condition, mode))
+        modes = {
+            mode: self._figures(self._evaluator.run(condition, mode))
             for mode in self._modes
-            if drifts or mode is not PerturbationMode.DRIFTING
+            if drifts or mode != "drifting"
         }
         impossible = None if oracle is None else oracle.upper95 < self._possible
         return ConditionFigures(oracle=oracle, impossible=impossible, modes=modes)
@@ -161,12 +162,12 @@ def area(positions: Sequence[float], shares: Sequence[float]) -> float:
     return float(np.trapezoid(shares, positions)) / width if width else float(shares[0])
 
 
-def success_area(levels: Iterable[Level], plain: float, mode: PerturbationMode) -> float | None:
+def success_area(levels: Iterable[Level], plain: float, mode: Mode) -> float | None:
     """Return the mean height of the curve of success rate against strength; None without levels."""
     points = [(0.0, plain)] + [
-        (level.position, level.modes[mode.value].success.share or 0.0)
+        (level.position, level.modes[mode].success.share or 0.0)
         for level in levels
-        if mode.value in level.modes
+        if mode in level.modes
     ]
     if len(points) == 1:
         return None

@@ -10,7 +10,6 @@ from drone_rl.policies.zoo import fingerprint
 from drone_rl.sim.tasks import as_task
 from drone_rl.trust.axes import AXES
 from drone_rl.trust.domain import range_of, walk
-from drone_rl.trust.perturbations import PerturbationMode
 from drone_rl.trust.shifts_results import (
     AlongAxis,
     ConditionFigures,
@@ -53,7 +52,7 @@ def along(axis, of, last):
         group=axis.group,
         unit=axis.unit,
         neutral=finite(axis.value(axis.neutral, of)),
-        areas={"constant": success_area(levels, 1.0, PerturbationMode.CONSTANT)},
+        areas={"constant": success_area(levels, 1.0, "constant")},
         levels=levels,
     )
 
