@@ -194,8 +194,9 @@ class Worlds:
         around = [self.task.obstacles(state)] if self.dynamics.needs_obstacles else []
         body = self.dynamics.step(state.body, action, *around)
         reads_actions = isinstance(self.task, ObjectTask) and self.task.has_own_rules
-        more = (action, self.dynamics) if reads_actions else ()
-        outcome: Any = self.task.step(state, body, *more)
+        more: Any = (action, self.dynamics) if reads_actions else ()
+        step: Any = self.task.step
+        outcome = step(state, body, *more)
         reward: Any = outcome[1] if isinstance(outcome, tuple) and len(outcome) == 2 else None
         if getattr(reward, "shape", None) != action.shape[:1]:
             raise InputError(

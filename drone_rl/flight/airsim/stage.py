@@ -119,7 +119,8 @@ class Stage:
         start = None if before is None else before[None]
         contacts = None
         if isinstance(self.task, ObjectTask):
-            contacts = self.task.touch(self.worlds.state, position[None], start)
+            state: Any = self.worlds.state
+            contacts = self.task.touch(state, position[None], start)
         if contacts is None:
             return []
         touches, ways = [], contacts[0].tolist()

@@ -188,7 +188,8 @@ class World:
         self._forget()
         self._place(body)
         if isinstance(self.task, ObjectTask):
-            self.task.touch(self.worlds.state, body.position)
+            state: Any = self.worlds.state
+            self.task.touch(state, body.position)
 
     def set_light(self, light: float) -> None:
         """Set the factor by which cameras multiply all colors."""

@@ -88,12 +88,12 @@ class AppliedRules:
         device = state.places.device
         start_warp(str(device))
         count = len(state)
-        counts = [state.steps.int(), state.end_reason.int()]
+        steps, end_reasons = state.steps.int(), state.end_reason.int()
         rewards = torch.empty(count, dtype=torch.float64, device=device)
         flown = isinstance(body, FlightState)
         thing = body.contact.thing if flown else torch.full_like(state.steps, NOTHING)
         inputs = [
-            self.world(state, *counts, dynamics),
+            self.world(state, steps, end_reasons, dynamics),
             is_start,
             _warp(before.double(), wp.vec3d),
             _warp(body.position.double(), wp.vec3d),
@@ -106,7 +106,7 @@ class AppliedRules:
         ]
         with on_torch_stream(device):
             wp.launch(self.compiled.step_all, count, inputs=inputs, device=str(device))
-        state.steps[:], state.end_reason[:] = counts[0], counts[1]
+        state.steps[:], state.end_reason[:] = steps, end_reasons
         return rewards
 
     def _name_unusable(self, paid: Tensor) -> NoReturn:
