@@ -14,6 +14,7 @@ from drone_rl.trust.evaluate import Evaluation
 from drone_rl.trust.judge import Judgement
 from drone_rl.trust.shifts import Shifts
 from drone_rl.utils.models import Model
+from drone_rl.utils.run_result import RunResult
 from drone_rl.utils.settings import meanings
 from drone_rl.verification.chances import Chances
 from drone_rl.verification.checker.certificate import Certificate
@@ -23,6 +24,7 @@ RESULTS: dict[str, type[Model]] = {
     "certificate": Certificate,
     "chances": Chances,
     "evaluation": Evaluation,
+    "result": RunResult,
     "shifts": Shifts,
     "summary": Summary,
     "sweep": Sweep,
