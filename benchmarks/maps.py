@@ -15,7 +15,7 @@ from benchmarks.benchmark import Setup
 from benchmarks.known_map_policies import make_policies, path_weights
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.patches import has_effect, make_grid, patch_effects, placebo_maps
-from drone_rl.explanations.scenes import Scenes, alternatives, empty_scene
+from drone_rl.explanations.scenes import Scenes, alternatives
 from drone_rl.explanations.trust import Trial, check_maps
 from drone_rl.policies import ImageNetwork, SmallCNN
 from drone_rl.policies.environment import make_env
@@ -39,7 +39,7 @@ def bench_maps(setup: Setup) -> dict[str, Any]:
     env = make_env(64)
     scenes = Scenes(env)
     state, episode = imagined(scenes, 14 if setup.quick else 40, 4 if setup.quick else 6)
-    seen, absent = scenes.observe(state), scenes.observe(empty_scene(scenes))[0]
+    seen, absent = scenes.observe(state), scenes.absent
     others = list(alternatives(scenes, state).values())
 
     grid = make_grid(*seen.shape[-2:])

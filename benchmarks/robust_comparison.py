@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs.rollout import Agent
+from drone_rl.policies import greedy_agent
 from drone_rl.policies.baselines import OracleAgent
-from drone_rl.trust.agents import PolicyAgent
 from drone_rl.trust.axes import AXES, GROUPS, Axis
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
 from drone_rl.trust.perturbations import Condition
@@ -112,7 +112,7 @@ def compare(
         For each policy, by axis the mean success rate over possible strengths, and by `PLAIN` that
         without perturbation. An axis without possible strengths is left out.
     """
-    makers = {name: lambda s=s: PolicyAgent(s.network) for name, s in subjects.items()}
+    makers = {name: lambda s=s: greedy_agent(s.network) for name, s in subjects.items()}
     rates = {name: {PLAIN: _share(evaluator, Condition(), make())} for name, make in makers.items()}
     for axis in axes:
         conditions = [axis.make(strength, evaluator.subject) for strength in axis.strengths]

@@ -17,13 +17,17 @@ from drone_rl.utils.models import Model
 from drone_rl.utils.run_result import RunResult
 from drone_rl.utils.settings import meanings
 from drone_rl.verification.chances import Chances
+from drone_rl.verification.check import Check
 from drone_rl.verification.checker.certificate import Certificate
+from drone_rl.verification.places import Places
 
 RESULTS: dict[str, type[Model]] = {
     "bodies": Bodies,
     "certificate": Certificate,
     "chances": Chances,
+    "check": Check,
     "evaluation": Evaluation,
+    "places": Places,
     "result": RunResult,
     "shifts": Shifts,
     "summary": Summary,

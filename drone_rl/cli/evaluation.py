@@ -127,8 +127,8 @@ class VerdictCommand(AppearanceCommandSettings, JudgeSettings):
     certificate.json in the folder of a run, NAME.certificate.json next to NAME.safetensors."""
     require: Literal["good", "proved"] | None = None
     """good or null: exit status 0 only if the policy is certainly good, otherwise one per kind.
-    proved: 0 only if there is a certificate of success from every placement, episodes do not refute
-    it, and the proof is computed again (minutes), otherwise 16."""
+    proved: in addition there must be a certificate of success from every placement that episodes
+    do not refute and a new proof confirms (minutes), otherwise 16."""
     shifts: str | None = None
     """File shifts.json to quote; null takes the one next to the policy, otherwise the newest under
     outputs/shifts of this network and task."""

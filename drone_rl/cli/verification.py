@@ -38,7 +38,7 @@ class ProveCommand(PolicyCommandSettings, ProveSettings):
 class CheckCommand(CommandSettings, CheckSettings):
     """Check a certificate independently of the prover.
 
-    Exit status: 0 it holds, 14 it does not.
+    Exit status: 0 no sum and no simulated episode refutes it, 14 it is refused.
     """
 
     certificate: str = "latest"

@@ -1,7 +1,7 @@
 """Run complete episodes with a policy."""
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 import torch
@@ -120,7 +120,6 @@ def rollout(
     compiled: bool = False,
     exact: bool = False,
     keep: Sequence[str] | None = ("action",),
-    info: Iterable[str] = (),
 ) -> CompleteEpisodes:
     """Run complete episodes, `env.batch_size[0]` at a time; return them, on the CPU.
 
@@ -137,7 +136,6 @@ def rollout(
         exact: Whether the last batch runs no surplus episodes, which are dropped otherwise.
         keep: Entries of steps to keep, of those that the agent reads and writes; None for all,
             with those after each step.
-        info: Entries of ("next", "info") besides those that the task's score needs.
     """
     setting = f"episodes={num_episodes}"
     require_memory(num_episodes * EPISODE_BYTES, setting, "give fewer episodes")
@@ -145,7 +143,7 @@ def rollout(
     collector = EpisodeCollector(
         env,
         agent,
-        info=(*task.scored, *info),
+        info=task.scored,
         keep_actor_entries=keep is None,
         actor_keys=keep or (),
         compiled=compiled,

@@ -203,7 +203,7 @@ class DroneEnv(EnvBase):
         info = Composite(entries, shape=(n,))
         observed = {"pixels": self._pixel_spec(), "info": info} if self.pixels else {"info": info}
         self.observation_spec = Composite(observed, shape=(n,)).to(self.device)
-        self.action_spec = _action_spec(self.worlds.dynamics.actions.entry, n).to(self.device)
+        self.action_spec = make_action_spec(self.worlds.dynamics.actions.entry, n).to(self.device)
         self.reward_spec = Unbounded(torch.Size((n, 1))).to(self.device)
         done = {name: Binary(1, torch.Size((n, 1)), dtype=torch.bool) for name in _DONE_KEYS}
         self.full_done_spec = Composite(done, shape=(n,)).to(self.device)
@@ -346,7 +346,7 @@ def worlds_of(env: EnvBase) -> Worlds:
     return base_env(env).worlds
 
 
-def _action_spec(entry: Entry, num_envs: int) -> TensorSpec:
+def make_action_spec(entry: Entry, num_envs: int = 1) -> TensorSpec:
     """Return the batched spec of an action; whole numbers are indices of discrete actions."""
     if entry.dtype == torch.int64 and entry.high is not None:
         shape = torch.Size((num_envs, *entry.shape))

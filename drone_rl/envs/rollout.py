@@ -257,12 +257,20 @@ class DelayedAgent:
 class Recording:
     """An agent whose acts have "pixels" and ground truth among their entries, too."""
 
-    def __init__(self, agent: Agent, info: Iterable[str] = ()) -> None:
-        """Take the agent and the names of the ground truth; see `Worlds.entries`."""
-        self._agent, self._info = agent, tuple(info)
+    def __init__(self, agent: Agent, info: Iterable[str] = (), *, states: bool = False) -> None:
+        """Take the agent and the names of the ground truth; see `Worlds.entries`.
+
+        With `states`, the fields of the environments' states are recorded, too, such as
+        ("state", "body/position").
+        """
+        self._agent, self._info, self._states = agent, tuple(info), states
 
     def act(self, context: StepContext) -> Act:
         """See `Agent`."""
         act = self._agent.act(context)
-        truth = {("info", name): context.info[name] for name in self._info}
-        return act._replace(entries={**act.entries, "pixels": context.observe(), **truth})
+        entries = {**act.entries, "pixels": context.observe()}
+        entries |= {("info", name): context.info[name] for name in self._info}
+        if self._states:
+            state = TensorDict(context.state.tensors(), [len(context.rows)]).flatten_keys("/")
+            entries |= {("state", name): value for name, value in state.items()}
+        return act._replace(entries=entries)

@@ -60,7 +60,7 @@ def flaws_section(context: Context) -> Flaws:
     loops = find_loops(flights, scenes.actions)
     looping = len({int(flights.episode[loop.first]) for loop in loops})
     return Flaws(
-        pairs=tuple(find_pairs(data, alike, scenes.actions, data.offset(scenes.task))),
+        pairs=tuple(find_pairs(data, alike, scenes.actions, data.offset(scenes.worlds))),
         alike_metres=ALIKE_METRES,
         loops=tuple(loops),
         looping_steps=sum(loop.length for loop in loops) / len(flights),

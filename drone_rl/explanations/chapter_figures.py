@@ -23,7 +23,7 @@ from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.hooks import feature_layer
 from drone_rl.explanations.report.embedding import thumbnail_map
 from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frames, select_frames
-from drone_rl.explanations.scenes import Scenes, empty_scene
+from drone_rl.explanations.scenes import Scenes
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.training.three_state import sample_gradients, train_three_state
 from drone_rl.trust.plots import images
@@ -205,7 +205,7 @@ def _pair(settings: FigureSettings, policy: Policy) -> _Drawn:
     row, column = np.unravel_index(distance.argmin(), distance.shape)
     pair = [int(left[row]), int(right[column])]
     tiles = [images.frame_with_probabilities(data.arrays, one, f"frame {one}") for one in pair]
-    metres = float(np.abs(np.diff(data.offset(scenes.task)[pair], axis=0)).max())
+    metres = float(np.abs(np.diff(data.offset(scenes.worlds)[pair], axis=0)).max())
     has_both = not np.isnan(metres)
     where = f"the next cube is {metres:.1f} m from its place in the other one"
     caption = (
@@ -236,8 +236,8 @@ def _attributions(settings: FigureSettings, policy: Policy) -> _Drawn:
     """Figs. 13 to 15: Grad-CAM of the sampled action in six frames."""
     data, network, scenes = _record(policy, settings, None, 20)
     task: Any = scenes.task
-    rows = _spread_by_side(data.offset(task)[:, 1], task.settings.touch_distance)
-    explainer = Explainer(network, scenes.observe(empty_scene(scenes))[0])
+    rows = _spread_by_side(data.offset(scenes.worlds)[:, 1], task.settings.touch_distance)
+    explainer = Explainer(network, scenes.absent)
     heat = explainer.grad_cam(data.tensor("observations")[rows], data.tensor("actions")[rows])
     tiles = []
     for letter, row, one in zip("abcdef", rows, scenes.to_frame(heat).numpy(), strict=False):

@@ -14,7 +14,7 @@ from drone_rl.envs import base_env
 from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.hooks import feature_layer, features
 from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frames, select_frames
-from drone_rl.explanations.scenes import Scenes, empty_scene
+from drone_rl.explanations.scenes import Scenes
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import ImageNetwork, make_actor
 from drone_rl.trust.results import Proof
@@ -61,11 +61,9 @@ class Context:
         self.scenes = Scenes(env)
         self.layer = settings.layer or feature_layer(network)
         """Layer whose features are embedded; None if the policy's layers are unknown."""
-        self.absent = self.scenes.observe(empty_scene(self.scenes))[0]
-        """Observation of the scene without targets. Shape: (C, h, w)."""
-        self.explainer = Explainer(network, self.absent, settings.grad_cam_layer)
+        self.explainer = Explainer(network, self.scenes.absent, settings.grad_cam_layer)
         if self.layer is not None:
-            features(network, self.absent[None], self.layer)  # refuse an unknown layer now
+            features(network, self.scenes.absent[None], self.layer)  # refuse an unknown layer now
         self._start = base_env(env).state_dict()
 
     def restart(self) -> TensorDictModuleBase:

@@ -27,7 +27,7 @@ class Explainer:
     """Heat maps of one policy by several methods, all of the size of its observations."""
 
     network: ImageNetwork
-    absent: Tensor  # baseline: the observation of the scene without targets. Shape: (C, H, W).
+    absent: Tensor  # baseline: the observation of the scene without objects. Shape: (C, H, W).
     layer: str | None = None  # layer of Grad-CAM; the last convolution's nonlinearity by default
 
     def __post_init__(self) -> None:

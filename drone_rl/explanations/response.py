@@ -18,7 +18,7 @@ from drone_rl.explanations.results import (
     ResponseRow,
 )
 from drone_rl.explanations.rollouts import run_to_end
-from drone_rl.explanations.scenes import Scenes, empty_scene, place_target
+from drone_rl.explanations.scenes import Scenes, place_target
 from drone_rl.policies import ImageNetwork
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.tasks import Grid, State
@@ -68,7 +68,7 @@ def response_map(
         (seed, _RESPONSE),
         lambda state: probabilities(network, scenes.observe(state)),
     )
-    alone = probabilities(network, scenes.observe(empty_scene(scenes)))[0]
+    alone = probabilities(network, scenes.absent[None])[0]
     needed = torch.from_numpy(fields["oracle"]).to(probs.device)
     return ResponseMap(
         **fields,

@@ -5,13 +5,14 @@ counts no more than a short one.
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from tensordict import TensorDict
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import EnvBase
@@ -20,15 +21,16 @@ from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.envs import worlds_of
 from drone_rl.envs.rollout import ActorAgent, Recording, Step, steps
 from drone_rl.explanations.hooks import features, probabilities
-from drone_rl.explanations.scenes import Scenes
-from drone_rl.policies import ImageNetwork, RecurrentNetwork
-from drone_rl.sim.dynamics import BodyState, Dynamics
+from drone_rl.explanations.scenes import Scenes, has_objects
+from drone_rl.policies import ImageNetwork, RecurrentNetwork, greedy_agent
 from drone_rl.sim.dynamics.state import heading_of
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.tasks import State, Task
-from drone_rl.trust.agents import PolicyAgent
+from drone_rl.sim.tasks import Goals, State, Task
+from drone_rl.sim.worlds import Worlds
 
 _POSE = ("drone", "attitude")
+_STATE = "state/"
+"""Begin of the names of the arrays that hold the environments' states."""
 _SAME = 1e-9  # poses (metres, quaternion) that differ by less are equal up to rounding
 
 
@@ -53,26 +55,24 @@ class RolloutDataset:
         """Return an array as a tensor."""
         return torch.from_numpy(self.arrays[name])
 
-    def offset(self, task: Task[Any]) -> NDArray:
+    def offset(self, worlds: Worlds) -> NDArray:
         """Return how far ahead of the drone and to its left the next target stands. (T, 2).
 
         Metres; NaN if there is none.
         """
-        state = self.state(task)
-        x, y, _ = task.next_offset(state).unbind(-1)
+        if not has_objects(worlds.task):
+            return np.full((len(self), 2), np.nan)
+        state = self.state(worlds)
+        x, y, _ = worlds.task.next_offset(state).unbind(-1)
         heading = heading_of(state.body.attitude)
         cos, sin = heading.cos(), heading.sin()
-        return torch.stack([cos * x + sin * y, cos * y - sin * x], -1).numpy()
+        return torch.stack([cos * x + sin * y, cos * y - sin * x], -1).cpu().numpy()
 
-    def state(self, task: Task[Any], dynamics: Dynamics | None = None) -> State:
-        """Return the environments' states, drones at rest and rotors as at an episode's start."""
-        kept = {name: self.tensor(name) for name in (*task.remembered, "step")}
-        attitude, place = self.tensor("attitude").double(), self.tensor("drone").double()
-        body = BodyState.at_rest(place, attitude)
-        begun = body if dynamics is None else dynamics.start(place)
-        if type(begun) is not BodyState:
-            body = begun.moved(place, attitude)
-        return task.recall(kept, body)
+    def state(self, worlds: Worlds) -> State:
+        """Return the recorded states (T) of environments like those of `worlds`."""
+        names = [name for name in self.arrays if name.startswith(_STATE)]
+        kept = TensorDict({name.removeprefix(_STATE): self.tensor(name) for name in names})
+        return worlds.state.with_tensors(kept.unflatten_keys("/").to_dict())
 
     def save(self, path: str | Path, flights: "RolloutDataset") -> None:
         """Write the file, with all steps of the episodes as "flights/..."."""
@@ -95,7 +95,8 @@ def collect(
     """
     worlds = worlds_of(env)
     task, actions = worlds.task, worlds.dynamics.actions
-    agent = Recording(ActorAgent(actor), (*task.entries, *_POSE))
+    truth = (*task.scored, "end_reason", *_POSE)
+    agent = Recording(ActorAgent(actor), truth, states=True)
     episodes = rollout(
         agent,
         env,
@@ -104,7 +105,6 @@ def collect(
         greedy=False,
         exact=True,
         keep=None,
-        info=task.entries,
     )
     batch: Any = episodes.steps
     info, after = batch["info"], batch["next", "info"]
@@ -112,14 +112,41 @@ def collect(
         "observations": batch["pixels"],
         **actions.kept(batch["action"]),
         "rewards": batch["next", "reward"][:, 0],
-        "event": _events(task, info, after),
         **{name: info[name] for name in _POSE},
-        **task.remember(info),
+        **{f"{_STATE}{name}": value for name, value in batch["state"].items()},
         "episode": torch.arange(len(episodes)).repeat_interleave(episodes.length),
         "step": torch.cat([torch.arange(length) for length in episodes.length.tolist()]),
         "end_reason": after["end_reason"][:, 0],
     }
-    return RolloutDataset({name: value.cpu().numpy() for name, value in arrays.items()})
+    dataset = RolloutDataset({name: value.cpu().numpy() for name, value in arrays.items()})
+    if has_objects(task):
+        dataset.arrays["next_target"] = task.next_target(dataset.state(worlds)).cpu().numpy()
+    before, now = (
+        task.score({name: of[name].cpu() for name in task.scored}) for of in (info, after)
+    )
+    dataset.arrays["event"] = _events(dataset, task, before, now).to(torch.int8).numpy()
+    return dataset
+
+
+def _events(dataset: RolloutDataset, task: Task[Any], before: Goals, after: Goals) -> Tensor:
+    """Return 1 where an action reaches a goal, -1 where it misses one, else 0. Shape: (T,).
+
+    `before` and `after` are the goals before and after each step.
+    """
+    ends, is_last = dataset.tensor("end_reason"), torch.ones(len(dataset), dtype=torch.bool)
+    is_last[:-1] = dataset.tensor("episode").diff() != 0
+    has_next = torch.ones_like(is_last)
+    if "next_target" in dataset.arrays:
+        has_next = dataset.tensor("next_target") < len(task.make_props())
+    has_next_after = torch.where(is_last, ends != task.expected_end, has_next.roll(-1))
+    is_missed = _num_missed(after, has_next_after) > _num_missed(before, has_next)
+    is_reached = after.reached.sum(-1) > before.reached.sum(-1)
+    return torch.where(is_reached | (ends == task.success_end), 1, -is_missed.long())
+
+
+def _num_missed(goals: Goals, has_next: Tensor) -> Tensor:
+    """Return how many goals came up, are not reached, and are not the next one. Shape: (T,)."""
+    return ((goals.stratum >= 0) & ~goals.reached).sum(-1) - has_next.long()
 
 
 def select_frames(episode: NDArray, num_frames: int) -> NDArray:
@@ -162,7 +189,7 @@ def render_frames(
     arrays = {name: value[rows] for name, value in flights.arrays.items()}
     dataset = RolloutDataset(arrays)
     worlds = scenes.worlds
-    state = dataset.state(worlds.task, worlds.dynamics).to(worlds.device)
+    state = dataset.state(worlds)
     observations = dataset.tensor("observations")
     arrays["frames"] = scenes.frames(state).cpu().numpy()
     arrays["regions"] = scenes.regions(state).cpu().numpy()
@@ -171,14 +198,6 @@ def render_frames(
     for layer in layers:
         arrays[f"features/{layer}"] = features(network, observations, layer).cpu().numpy()
     return dataset
-
-
-def _events(task: Task[Any], before: Mapping[str, Tensor], after: Mapping[str, Tensor]) -> Tensor:
-    """Return 1 where an action reaches a goal, -1 where it misses one, else 0. Shape: (T,)."""
-    counts = zip(task.tally(before), task.tally(after), strict=True)
-    reached, missed = (then - now for now, then in counts)
-    is_reached = (reached > 0) | (after["end_reason"][:, 0] == task.success_end)
-    return torch.where(is_reached, 1, -(missed > 0).long()).to(torch.int8)
 
 
 def run_from(
@@ -194,7 +213,7 @@ def run_from(
     see `steps`. The appearance is the task's by default. Return the last states.
     """
     ends = state[torch.arange(len(state), device=state.end_reason.device)]
-    agent, observer = PolicyAgent(network), scenes.observer(appearance)
+    agent, observer = greedy_agent(network), scenes.observer(appearance)
     for step in steps(agent, observer, state, goes_on=goes_on):
         ends[step.rows] = step.after
     return ends

@@ -1,7 +1,11 @@
 """Render any state as the policy observes it, and label the region of each pixel."""
 
+import dataclasses
 import enum
+import functools
+from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional
@@ -18,7 +22,8 @@ from drone_rl.envs import (
 )
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
-from drone_rl.sim.tasks import State
+from drone_rl.sim.tasks import State, Task
+from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.utils.seeding import plain_generator
 
 DARK_GROUND = Appearance(colors={SemanticClass.GROUND: (0.25, 0.25, 0.22)})
@@ -37,6 +42,11 @@ class Region(enum.IntEnum):
     HORIZON = 2
     GROUND = 3
     SKY = 4
+
+
+def has_objects(task: Task[Any]) -> bool:
+    """Return whether a task has objects that can be removed, moved and added."""
+    return type(task).one_target is not Task.one_target
 
 
 class Scenes:
@@ -71,6 +81,25 @@ class Scenes:
     def observe(self, state: State) -> Tensor:
         """Return the observations of scenes. Shape: (T, C, h, w)."""
         return self.transform(self.frames(state))
+
+    def observe_empty(self, state: State) -> Tensor:
+        """Return the observations of scenes without the task's objects. Shape: (T, C, h, w)."""
+        worlds = self.worlds
+        poses = worlds.poses(state, worlds.appearance)
+        count = poses.props.shape[1] - worlds.distractors
+        props = poses.props.clone()  # tasks may return their own tensors
+        props[:, :count, 2] = -HIDDEN_DEPTH
+        poses = dataclasses.replace(poses, props=props)
+        frames = worlds.renderer.render(worlds.policy_view, poses, worlds.appearance)
+        return self.transform(frames["rgb"][:, 0])
+
+    @functools.cached_property
+    def absent(self) -> Tensor:
+        """Observation of the scene without objects, where episodes start. Shape: (C, h, w)."""
+        worlds = self.worlds
+        state = worlds.start(worlds.task.sample(np.random.RandomState(0))[None])
+        state.body = worlds.bodies(1).to(worlds.device)
+        return self.observe_empty(state)[0]
 
     def transform(self, frames: Tensor) -> Tensor:
         """Apply the transforms to RGB frames. Shape: (T, H, W, 3) to (T, C, h, w)."""
@@ -125,7 +154,6 @@ class Scenes:
         clutter = [kind is SemanticClass.DISTRACTOR for kind in scene.semantic_classes]
         is_clutter = torch.tensor([*clutter, False], device=geoms.device)[geoms]
         target = torch.where(is_clutter, -1, props[geoms])  # geom -1 (the sky) reads the last entry
-        next_target = self.task.next_target(state)[:, None, None]
         sky, is_target = geoms < 0, target >= 0
         meets = sky[:, :-1] & ~(sky | is_target | is_clutter)[:, 1:]
         border = functional.pad(meets, (0, 0, 0, 1)) | functional.pad(meets, (0, 0, 1, 0))
@@ -133,7 +161,9 @@ class Scenes:
         regions[sky] = Region.SKY
         regions[border] = Region.HORIZON
         regions[is_target] = Region.OTHER_TARGET
-        regions[is_target & (target == next_target)] = Region.NEXT_TARGET
+        if has_objects(self.task):
+            next_target = self.task.next_target(state)[:, None, None]
+            regions[is_target & (target == next_target)] = Region.NEXT_TARGET
         return regions.to(torch.uint8)
 
 
@@ -148,22 +178,21 @@ def place_target(scenes: Scenes, forward: Tensor, lateral: Tensor, height: float
     return worlds.task.one_target(worlds.bodies(len(offset)), offset).to(worlds.device)
 
 
-def empty_scene(scenes: Scenes) -> State:
-    """Return one scene without targets."""
-    return scenes.task.without_targets(place_target(scenes, torch.ones(1), torch.zeros(1)))
-
-
 def alternatives(scenes: Scenes, state: State, seed: int = 0) -> dict[str, Tensor]:
     """Return observations (T, C, h, w) from the same places with other contents, by name.
 
-    These are: no targets; targets at random places, `PLACEMENTS` times; ground and sky darker, and
-    brighter. Unlike a gray box, they are similar to observations that the policy was trained on.
+    These are: no objects; objects at random places, `PLACEMENTS` times, or if the task can't move
+    any, the observations of other states; ground and sky darker, and brighter. Unlike a gray box,
+    they are similar to observations that the policy was trained on.
     """
     generator = plain_generator(seed)
-    observations = {"no targets": scenes.observe(scenes.task.without_targets(state))}
+    observations = {"no objects": scenes.observe_empty(state)}
     for i in range(PLACEMENTS):
-        other = scenes.task.elsewhere(state, scenes.worlds.camera, generator)
-        observations[f"targets elsewhere {i}"] = scenes.observe(other)
+        if has_objects(scenes.task):
+            other = scenes.task.elsewhere(state, scenes.worlds.camera, generator)
+        else:
+            other = state[torch.randperm(len(state), generator=generator).to(state.steps.device)]
+        observations[f"objects elsewhere {i}"] = scenes.observe(other)
     for name, appearance in (("darker", DARK), ("brighter", BRIGHT)):
         observations[name] = scenes.transform(scenes.frames(state, appearance))
     return observations

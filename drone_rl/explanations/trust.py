@@ -104,11 +104,11 @@ def make_trial(context: Context) -> Trial:
     data, scenes = context.dataset, context.scenes
     rows, seed = spread_frames(data.episode, FRAMES_AN_EPISODE), context.seed.value
     index = torch.from_numpy(rows)
-    state = data.state(scenes.task, scenes.worlds.dynamics)[index].to(scenes.worlds.device)
+    state = data.state(scenes.worlds)[index]
     others = list(alternatives(scenes, state, seed).values())
     actions, seen = data.tensor("actions")[index], scenes.observe(state)
     episode = data.episode[rows]
-    return measure(context.network, actions, seen, others, context.absent, episode, seed)
+    return measure(context.network, actions, seen, others, scenes.absent, episode, seed)
 
 
 def measure(
@@ -127,7 +127,7 @@ def measure(
         actions: Actions to explain. Shape: (T,).
         observations: Shape: (T, C, h, w).
         others: Observations with other contents, see `alternatives`. Shapes as above.
-        absent: Observation of the scene without targets. Shape: (C, h, w).
+        absent: Observation of the scene without objects. Shape: (C, h, w).
         episode: Number of each frame's episode. Shape: (T,).
         seed: Of noise and shuffled weights.
     """

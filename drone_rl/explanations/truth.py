@@ -24,7 +24,7 @@ def section(context: Context) -> Truth:
     """Test the heat maps, none if the weights are unknown; measure effects of changes."""
     data, scenes, network = context.dataset, context.scenes, context.network
     episode, seed = data.episode, context.seed.value
-    state = data.state(scenes.task, scenes.worlds.dynamics).to(str(context.env.device))
+    state = data.state(scenes.worlds)
     trial = trust.make_trial(context)
     changes = intervene(scenes, network, state, data.tensor("regions"), seed=seed)
     shown_frame = clear_frame(changes[0])

@@ -1,5 +1,6 @@
 """Networks, actors and policies: from camera images to actions."""
 
+from drone_rl.policies.actor import greedy_agent as greedy_agent
 from drone_rl.policies.actor import make_actor as make_actor
 from drone_rl.policies.critic import ActorCritic as ActorCritic
 from drone_rl.policies.external_network import ExternalNetwork as ExternalNetwork

@@ -18,7 +18,8 @@ from torchrl.data import TensorSpec
 from torchrl.envs.utils import ExplorationType, exploration_type
 from torchrl.modules import ProbabilisticActor
 
-from drone_rl.envs.rollout import Act, Agent, StepContext
+from drone_rl.envs.drone_env import make_action_spec
+from drone_rl.envs.rollout import Act, ActorAgent, Agent, StepContext
 from drone_rl.policies.networks import ImageNetwork
 from drone_rl.policies.recurrent import WHOLE_EPISODES
 from drone_rl.sim.continuous_actions import normal_of
@@ -259,3 +260,9 @@ def make_actor(
         distribution_class=kind,
         distribution_kwargs={"source": None if generator is None else RandomSource(generator)},
     )
+
+
+def greedy_agent(network: ImageNetwork) -> Agent:
+    """Return an agent that takes the most probable actions of a network."""
+    spec = make_action_spec(network.actions.entry)
+    return Exploring(ActorAgent(make_actor(network, spec)), greedy=True)

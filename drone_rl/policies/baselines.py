@@ -101,9 +101,15 @@ def make_baseline(
     return ConstantAgent(actions.always(name))
 
 
+def baseline_names(task: Task[Any], actions: Actions) -> tuple[str, ...]:
+    """Return the random and constant baselines of a task, and "oracle" if these drones have one."""
+    has_oracle = task.oracle is not None and task.oracle.can_fly(actions)
+    return (*task.blind_baselines, "oracle") if has_oracle else task.blind_baselines
+
+
 def check_baselines(task: Task[Any], actions: Actions) -> None:
-    """Raise an `InputError` if these actions lack what a baseline or the oracle of a task needs."""
-    for name in (*task.blind_baselines, "oracle"):
+    """Raise an `InputError` if these actions lack what a baseline of a task needs."""
+    for name in task.blind_baselines:
         make_baseline(name, task, actions, torch.Generator())
 
 

@@ -5,14 +5,12 @@ from pathlib import Path
 from typing import Any
 
 from drone_rl.config.commands import JudgeSettings
-from drone_rl.policies.baselines import OracleAgent
 from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.zoo import shifts_path
 from drone_rl.trust.axes import AXES, Axis, find_axes
 from drone_rl.trust.axes_table import NAMES
 from drone_rl.trust.domain import Span, required_success, run_across
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
-from drone_rl.trust.perturbations import Condition
 from drone_rl.trust.shifts_file import read_shifts
 from drone_rl.trust.shifts_results import Coverage, Need, SavedShifts
 from drone_rl.utils.errors import InputError
@@ -130,7 +128,7 @@ def check_required(
     if not episodes:
         return coverage
     with closing(PairedEvaluator(subject, episodes, seed.value)) as evaluator:
-        oracle = evaluator.run(Condition(), agent=OracleAgent()).episodes
+        oracle = evaluator.run_oracle()
     required = required_success(oracle, settings.good_share)
     return coverage.replace(test=run_across(subject, spans, episodes, seed.value, required))
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.policies.baselines import OracleAgent, has_visible_oracle
+from drone_rl.sim.tasks import as_task
 from drone_rl.trust.axes import Axis
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
 from drone_rl.trust.perturbations import Condition
@@ -46,6 +47,8 @@ def run_across(
 ) -> RangeTest:
     """Run episodes at strengths drawn uniformly and jointly from ranges, one each.
 
+    Each episode runs alone, as a drone flies, so a policy counts by what it does alone.
+
     Args:
         subject: The policy.
         spans: The ranges by axis.
@@ -54,26 +57,29 @@ def run_across(
         required: Success rate to exceed.
     """
     rng, successes, failed = np.random.default_rng(seed), 0, []
-    for root in rng.integers(2**32, size=episodes).tolist():
-        strengths = {axis: axis.sample(*span, rng) for axis, span in spans.items()}
-        condition = Condition()
-        for axis, strength in strengths.items():
-            if axis.position(strength):
-                condition |= axis.make(strength, subject)
-        with closing(PairedEvaluator(subject, 1, root)) as evaluator:
+    with closing(PairedEvaluator(subject, 1)) as evaluator:
+        for root in rng.integers(2**32, size=episodes).tolist():
+            evaluator.sample(root)
+            strengths = {axis: axis.sample(*span, rng) for axis, span in spans.items()}
+            condition = Condition()
+            for axis, strength in strengths.items():
+                if axis.position(strength):
+                    condition |= axis.make(strength, subject)
             try:
                 is_success = bool(evaluator.run(condition).episodes.success)
             except InputError as error:
                 return RangeTest(success=proportion(0, 0), required=required, refused=str(error))
-        successes += is_success
-        if not is_success and len(failed) < EXAMPLES:
-            failed.append({a.name: finite(a.value(s, subject)) for a, s in strengths.items()})
+            successes += is_success
+            if not is_success and len(failed) < EXAMPLES:
+                failed.append({a.name: finite(a.value(s, subject)) for a, s in strengths.items()})
     success = proportion(successes, episodes)
     return RangeTest(success=success, required=required, failed=tuple(failed))
 
 
-def required_success(oracle: CompleteEpisodes, good_share: float) -> float:
-    """Return the success rate that a good policy exceeds, given the oracle's episodes."""
+def required_success(oracle: CompleteEpisodes | None, good_share: float) -> float:
+    """Return the success rate that a good policy exceeds, given a usable oracle's episodes."""
+    if oracle is None:
+        return good_share
     return good_share * proportion(int(oracle.success.sum()), len(oracle)).upper95
 
 
@@ -158,16 +164,16 @@ class Prober:
     def __init__(
         self,
         evaluator: PairedEvaluator,
-        oracle: CompleteEpisodes,
+        oracle: CompleteEpisodes | None,
         good_share: float,
         possible_share: float = 0.9,
     ) -> None:
         """Test the policy without perturbation.
 
-        `oracle` are episodes of the task's oracle without perturbation; see `Rule` for `good_share`
-        and `Suite` for `possible_share`.
+        `oracle` is from `PairedEvaluator.run_oracle`; see `Rule` for `good_share` and `Suite` for
+        `possible_share`.
         """
-        task = oracle.task
+        task = as_task(evaluator.subject.task)
         self._evaluator, self._oracle, self._possible = evaluator, oracle, possible_share
         self._rule = Rule(
             good_share=good_share, strata=task.strata, blind_baselines=task.blind_baselines
@@ -188,7 +194,9 @@ class Prober:
         greedy = self._evaluator.run(condition).episodes
         if key not in self._baselines:  # of task and camera, nearly
             self._baselines[key] = self._evaluator.run_baselines(condition)
-        rule, baselines = self._rule, {**self._baselines[key], "oracle": self._oracle}
+        rule, baselines = self._rule, self._baselines[key]
+        if self._oracle is not None:
+            baselines = {**baselines, "oracle": self._oracle}
         quantities = dict(zip(rule.quantities, measure(greedy, baselines, rule), strict=True))
         return Probe(
             good=is_surely_good(quantities, rule),
@@ -220,7 +228,8 @@ class Prober:
     def _explain(self, axis: Axis, end: Any, strength: float, probed: Probe) -> FailedEnd:
         value = finite(axis.value(strength, self._evaluator.subject))
         failed = FailedEnd(**dict(probed), end=end, value=value)
-        if probed.refused is not None or not has_visible_oracle(self._oracle.task):
+        task = as_task(self._evaluator.subject.task)
+        if probed.refused is not None or not has_visible_oracle(task):
             return failed
         condition = axis.make(strength, self._evaluator.subject)
         seeing = OracleAgent(only_visible=True)

@@ -25,7 +25,6 @@ from drone_rl.trust.metrics import summarise
 from drone_rl.trust.repetition import require_repeatable
 from drone_rl.trust.results import Difference, Figures
 from drone_rl.utils.display import TableResult
-from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import Mean, Share
 from drone_rl.utils.models import Seeded
 from drone_rl.utils.progress import Progress, as_progress
@@ -127,13 +126,11 @@ def evaluate(
         changes: Changed settings, as in `evaluate("good", episodes=200)`.
 
     Raises:
-        InputError: The policy or a setting is unusable, or the baselines lack an oracle.
+        InputError: The policy or a setting is unusable, or the drones lack a baseline's action.
     """
     settings, seed = with_seed(from_arguments(EvaluateSettings, settings, changes, evaluate))
     progress = as_progress(progress)
     policy = as_policy(policy, outputs, task=task, dynamics=dynamics, appearance=appearance)
-    if settings.baselines and (judged := as_task(policy.task)).oracle is None:
-        raise InputError(f"task={judged.name} has no oracle to compare with; give baselines=false")
     require_repeatable(policy, seed=seed.value, device=settings.device, renderer=settings.renderer)
     episodes, steps = settings.episodes, 3 if settings.baselines else 2
     with held_out_environments(policy, settings, seed) as (env, actor):

@@ -171,7 +171,7 @@ class Card:
             f"best random or constant actions ({verdict.best_baseline})": (
                 verdict.baselines[verdict.best_baseline]
             ),
-            "oracle": verdict.baselines["oracle"],
+            "oracle": verdict.baselines.get("oracle"),
         }
         return render(
             "drone_rl.trust",

@@ -60,14 +60,14 @@ class Judgement(Result, Verdict, Provenance):
         """Return the exit code of `drone-rl verdict`.
 
         Args:
-            require: "proved" for a proof of every placement that was computed here (see `judge`),
-                "good" or None for the verdict's own code; a required domain has to be covered, too.
+            require: "proved" also requires a proof of every placement that was computed here (see
+                `judge`), as a required domain has to be covered.
         """
         if require == "proved" and not self.is_proved:
             return PROOF_MISSING
         if self.required_domain is not None and not self.required_domain.is_covered:
             return NOT_COVERED
-        return 0 if require == "proved" and self.required_domain is None else self.exit_code
+        return self.exit_code
 
     def save(self, path: Path) -> None:
         """Write `verdict.json`."""

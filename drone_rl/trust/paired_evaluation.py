@@ -21,15 +21,15 @@ from drone_rl.config import (
 )
 from drone_rl.envs import Observer, base_env, worlds_of
 from drone_rl.envs.rollout import Agent, DelayedAgent, steps
-from drone_rl.policies import ImageNetwork
-from drone_rl.policies.baselines import make_baseline
+from drone_rl.policies import ImageNetwork, greedy_agent
+from drone_rl.policies.baselines import OracleAgent, baseline_names, make_baseline
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.dynamics import draw_seeds, make_dynamics
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import as_task
 from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.sim.worlds import Worlds
-from drone_rl.trust.agents import PolicyAgent
+from drone_rl.trust.baselines import reference
 from drone_rl.trust.perturbations import (
     ONSET_STEP,
     Condition,
@@ -45,6 +45,8 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream, torch_generator, world_random_state
 from drone_rl.utils.settings import prefixed_errors
 
+MAX_WORLDS = 20
+"""Largest number of simulated environments to keep, of different tasks and cameras."""
 _CLUTTER = 1000
 """Number of the distractors' random stream; those of faults begin at 1."""
 
@@ -109,18 +111,22 @@ class PairedEvaluator:
 
     def __init__(self, subject: EvaluatedPolicy, episodes: int, seed: int = 0) -> None:
         """Sample the initial states of so many environments, one episode each."""
-        self.subject, self.episodes, self.seed = subject, episodes, seed
-        task = as_task(subject.task)
-        streams = [world_random_state(seed, i, Stream.SHIFTED) for i in range(episodes)]
+        self.subject, self.episodes = subject, episodes
+        self._task = as_task(subject.task)
         self.appearances = AppearanceSampler(
-            subject.appearance, episodes, subject.device, task=task, camera=subject.camera
+            subject.appearance, episodes, subject.device, task=self._task, camera=subject.camera
         )
-        self.appearances.reset(torch.arange(episodes), streams)
-        self._drawn = torch.stack([task.sample(stream) for stream in streams])
-        dynamics = make_dynamics(task.make_dynamics, subject.dynamics, subject.actions)
-        self._actions = dynamics.actions
-        self._seeds = draw_seeds(streams) if dynamics.is_random else None
+        self._dynamics = make_dynamics(self._task.make_dynamics, subject.dynamics, subject.actions)
         self._built: dict[tuple[Any, ...], Worlds] = {}
+        self.sample(seed)
+
+    def sample(self, seed: int) -> None:
+        """Sample other initial states."""
+        self.seed, count = seed, self.episodes
+        streams = [world_random_state(seed, i, Stream.SHIFTED) for i in range(count)]
+        self.appearances.reset(torch.arange(count), streams)
+        self._drawn = torch.stack([self._task.sample(stream) for stream in streams])
+        self._seeds = draw_seeds(streams) if self._dynamics.is_random else None
 
     def settings(self, condition: Condition) -> tuple[BaseTaskSettings, CameraSettings]:
         """Return task and camera under a condition.
@@ -131,7 +137,7 @@ class PairedEvaluator:
             task = self.subject.task.replace(**condition.task)
         with prefixed_errors("camera"):
             camera = self.subject.camera.replace(**condition.camera)
-        as_task(task).check_actions(self._actions)
+        as_task(task).check_actions(self._dynamics.actions)
         return task, camera
 
     def worlds(self, condition: Condition) -> Worlds:
@@ -139,6 +145,8 @@ class PairedEvaluator:
         task, camera = self.settings(condition)
         key = (task, camera, condition.clutter)
         if key not in self._built:
+            if len(self._built) == MAX_WORLDS:
+                self.close()
             self._built[key] = Worlds(
                 self.episodes,
                 task,
@@ -157,14 +165,15 @@ class PairedEvaluator:
         condition: Condition,
         mode: PerturbationMode = PerturbationMode.CONSTANT,
         agent: Agent | None = None,
+        num_steps: int | None = None,
     ) -> ConditionResult:
         """Run one episode of an agent, by default the policy, in every environment.
 
-        The perturbations of the condition are active as the mode says.
+        The perturbations of the condition are active as the mode says. `num_steps` ends it early.
         """
-        agent = PolicyAgent(self.subject.network) if agent is None else agent
+        agent = agent or greedy_agent(self.subject.network)
         delayed, observer = DelayedAgent(agent), None
-        stages: list[tuple[Condition, int | None]] = [(condition, None)]
+        stages = [(condition, num_steps)]
         if mode is PerturbationMode.ONSET:
             stages.insert(0, (Condition(), ONSET_STEP))
         state = self.worlds(stages[0][0]).start(self._drawn, self._seeds)
@@ -172,13 +181,13 @@ class PairedEvaluator:
         final = state[rows]
         trace = torch.zeros(len(state), dtype=torch.float64, device=rows.device)
         number = 0
-        for stage, num_steps in stages:
+        for stage, most in stages:
             if not len(rows):
                 break
             starts = observer is None
             observer = self._observer(stage, mode, agent, observer)
             delayed.delay = stage.delay
-            for step in steps(delayed, observer, state, rows, starts=starts, num_steps=num_steps):
+            for step in steps(delayed, observer, state, rows, starts=starts, num_steps=most):
                 number += 1
                 if step.act.distribution is not None:
                     seen = observer.images.flatten(1).double().sum(-1)
@@ -236,6 +245,13 @@ class PairedEvaluator:
             episodes[name] = self.run(condition, agent=agent).episodes
         return episodes
 
+    def run_oracle(self) -> CompleteEpisodes | None:
+        """Return the oracle's episodes without perturbation; None without a usable oracle."""
+        worlds = self.worlds(Condition())
+        if "oracle" not in baseline_names(worlds.task, worlds.dynamics.actions):
+            return None
+        return reference({"oracle": self.run(Condition(), agent=OracleAgent()).episodes})
+
     def distractor_places(self) -> Tensor:
         """Return positions of distractors, see `perturbations.sample_distractors`."""
         generator = torch_generator(self.seed, Stream.SHIFTS, number=_CLUTTER)
@@ -244,5 +260,5 @@ class PairedEvaluator:
 
     def close(self) -> None:
         """Close the renderers."""
-        for worlds in self._built.values():
-            worlds.close()
+        while self._built:
+            self._built.popitem()[1].close()

@@ -19,10 +19,8 @@ from torchrl.envs import EnvBase
 from drone_rl.collectors.complete_episodes import CompleteEpisodes, rollout
 from drone_rl.envs import base_env
 from drone_rl.envs.observer import with_rows
-from drone_rl.envs.rollout import Act, ActorAgent, Agent, StepContext
-from drone_rl.policies import ImageNetwork
+from drone_rl.envs.rollout import Act, Agent, StepContext, as_agent
 from drone_rl.policies.policy import BasePolicy
-from drone_rl.trust.agents import PolicyAgent
 from drone_rl.trust.results import NEEDED_EPISODES, CameraUse, Repeated, Repetition
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds
@@ -92,7 +90,7 @@ def repeat(
     runs = []
     for size in sorted({1, min(FEW, count, env.batch_size[0])}):
         how = "one environment at a time" if size == 1 else f"{size} environments at a time"
-        again = _again(InGroups(_as_agent(actor), size), env, drawn, flushes=size == 1)
+        again = _again(InGroups(as_agent(actor), size), env, drawn, flushes=size == 1)
         is_other = (again.end_reason != greedy.end_reason[drawn]) | (
             again.goals.reached != greedy.goals.reached[drawn]
         ).any(-1)
@@ -119,7 +117,7 @@ def exchange_images(
     if not count:
         return CameraUse(own=own, exchanged=None, success=mean_bounds([], -1.0, 1.0), strata={})
     greedy = greedy.first(count)
-    exchanged = _again(WithOtherImages(_as_agent(actor)), env, torch.arange(count))
+    exchanged = _again(WithOtherImages(as_agent(actor)), env, torch.arange(count))
     strata = {}
     confidence = 1.0 - 0.05 / len(greedy.task.strata)
     for i, name in enumerate(greedy.task.strata):
@@ -160,14 +158,6 @@ def require_repeatable(
             f"{found.worst.different} of {found.episodes} episodes end otherwise; give a policy "
             "whose actions depend on no other environment, no other episode and no order of sums"
         )
-
-
-def _as_agent(actor: TensorDictModuleBase | Agent) -> Agent:
-    """Return an agent that acts like an actor, without memory of earlier episodes."""
-    network = getattr(actor, "network", None)
-    if isinstance(network, ImageNetwork):
-        return PolicyAgent(network)
-    return ActorAgent(actor) if isinstance(actor, TensorDictModuleBase) else actor
 
 
 def _again(agent: Agent, env: EnvBase, which: Tensor, *, flushes: bool = False) -> CompleteEpisodes:

@@ -6,7 +6,7 @@ import pydantic
 
 from drone_rl.sim.vocabulary import CUBES, TaskVocabulary
 from drone_rl.trust.findings import Finding
-from drone_rl.trust.rule import Quantity, VerdictKind
+from drone_rl.trust.rule import USABLE, Quantity, VerdictKind
 from drone_rl.utils.intervals import Mean, Share
 from drone_rl.utils.models import Seeded, Stored
 from drone_rl.utils.text import render
@@ -210,7 +210,7 @@ class Verdict(Seeded):
     error_rate: float
     """Largest fraction of cases in which the rule gives a certain and wrong verdict."""
     good_share: float
-    """Fraction of the oracle's success rate that a good policy exceeds."""
+    """See `Rule.good_share`."""
     terms: TaskVocabulary = CUBES
     num_cubes: int = 0
     """Goals of an episode."""
@@ -225,7 +225,7 @@ class Verdict(Seeded):
     sampled: Figures | None = None
     """Of episodes with sampled actions."""
     baselines: dict[str, Figures]
-    """Of the task's random and constant baselines, and of the oracle."""
+    """Of the task's random and constant baselines, and of the oracle if there is one."""
     skill: dict[str, Mean] = {}
     """By baseline, the difference of the fractions of goals reached, paired."""
     drawing: Mean | None = None
@@ -273,7 +273,8 @@ class Verdict(Seeded):
     @property
     def failing_side(self) -> str | None:
         """Stratum in which a one-sided policy fails."""
-        first, *_, last = self.greedy.strata or ("", "")
+        strata = [*self.greedy.strata] or [""]
+        first, last = strata[0], strata[-1]
         ends = {VerdictKind.ONE_SIDED_LEFT: last, VerdictKind.ONE_SIDED_RIGHT: first}
         return ends.get(self.kind)
 
@@ -290,9 +291,15 @@ class Verdict(Seeded):
     @property
     def is_trivial(self) -> bool:
         """Whether that baseline is as good as a good policy has to be."""
-        best, oracle = self.baselines[self.most_successful], self.baselines["oracle"]
-        share = best.success.share or 0.0
-        return share > 0 and share >= self.good_share * (oracle.success.share or 0.0)
+        name = f"unsolved by {self.most_successful}"
+        return name in self.quantities and self.quantities[name].level == 0
+
+    @property
+    def has_usable_oracle(self) -> bool:
+        """Whether thresholds are relative to the oracle; without a usable one they are absolute."""
+        return "oracle" in self.baselines and (
+            (self.baselines["oracle"].success.share or 0.0) > USABLE
+        )
 
     @property
     def _blind(self) -> dict[str, Figures]:

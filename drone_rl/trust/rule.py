@@ -58,13 +58,16 @@ BLIND_BASELINES = ("random", "forward", "left", "right")
 """Random and constant baselines of cube collection."""
 TOLERANCE = 1e-9
 """Rounding of a mean: a value that exceeds a threshold by less counts as equal to it."""
+USABLE = 0.5
+"""Success rate that an oracle must exceed; without such an oracle, thresholds are absolute."""
 
 
 class Rule(Model):
     """Thresholds."""
 
     good_share: Fraction = 0.9
-    """Fraction of the oracle's success rate that a good policy exceeds."""
+    """Fraction of the oracle's success rate that a good policy exceeds; without an oracle that
+    succeeds in more than `USABLE` of the episodes, the success rate itself."""
     side_share: Fraction = 0.7
     """Fraction of goals that a good policy exceeds on each side, a one-sided one on its side."""
     other_share: Fraction = 0.3
@@ -127,20 +130,22 @@ class Rule(Model):
     @property
     def text(self) -> str:
         """The rule as text."""
+        strata = ", ".join(self.strata)
         return f"""\
-good: the share of episodes in which every cube is collected is more than \
-{100 * self.good_share:g}% of the oracle's, and more than {100 * self.side_share:g}% of the cubes \
-to the left, ahead and to the right are collected, wherever more than \
-{100 * self.offered_share:g}% of episodes offer one. good, but trivial: the same, but random \
-actions or one action always succeed in at least {100 * self.good_share:g}% of the oracle's \
-episodes, too. one-sided: more than {100 * self.side_share:g}% of the cubes on one side and no \
-more than {100 * self.other_share:g}% on the other, both offered. poor: neither, and no farther \
-than {self.poor_margin:.0%} of the way from luck to the oracle, in cubes; luck is the best of \
-random actions and of each action always, flown in the same worlds. none of these: anything else. \
-Every episode counts once: a share is a mean over episodes. The verdict is certain if the kind is \
-the same wherever the quantities lie within their intervals. The procedure that gives them errs in \
-at most {100 * self.error_rate:g}% of cases, that is, an interval misses its quantity, whatever \
-depends on what within an episode."""
+good: the share of episodes in which every goal is reached is more than \
+{100 * self.good_share:g}% of the oracle's, and so are more than {100 * self.side_share:g}% of the \
+goals of each stratum ({strata}), wherever more than {100 * self.offered_share:g}% of episodes \
+offer one. good, but trivial: the same, but random actions or one action always succeed in at \
+least {100 * self.good_share:g}% of the episodes that the policy or the oracle solves, too. \
+one-sided: more than {100 * self.side_share:g}% of the goals of the first or last stratum and no \
+more than {100 * self.other_share:g}% of the other one, both offered. poor: neither, and no \
+farther than {self.poor_margin:.0%} of the way from luck to the oracle, in goals; luck is the best \
+of random actions and of each action always, in the same environments. none of these: anything \
+else. Without an oracle that succeeds in more than {USABLE:.0%} of episodes, thresholds are \
+absolute: success in every episode takes its place. Every episode counts once: a share is a mean over \
+episodes. The verdict is certain if the kind is the same wherever the quantities lie within their \
+intervals. The procedure that gives them errs in at most {100 * self.error_rate:g}% of cases, that \
+is, an interval misses its quantity, whatever depends on what within an episode."""
 
 
 class Quantity(Stored):

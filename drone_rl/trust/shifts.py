@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from drone_rl.config.commands import ShiftSettings
 from drone_rl.config.configuration import from_arguments
-from drone_rl.policies.baselines import OracleAgent, check_baselines
+from drone_rl.policies.baselines import check_baselines
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy, Policy
@@ -22,12 +22,11 @@ from drone_rl.trust.axes import Axis, check_axes, find_axes
 from drone_rl.trust.charts import chart, strips
 from drone_rl.trust.domain import Prober, required_success, run_across
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
-from drone_rl.trust.perturbations import Condition, PerturbationMode
+from drone_rl.trust.perturbations import PerturbationMode
 from drone_rl.trust.repetition import require_repeatable
 from drone_rl.trust.shifts_results import Domain, NetworkIdentity, Range, Robustness, packed
 from drone_rl.trust.suite import Suite, make_strip
 from drone_rl.utils.display import TableResult
-from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
@@ -96,9 +95,7 @@ def shifts(
     require_repeatable(loaded, seed=seed.value, device=settings.device, renderer=settings.renderer)
     subject = EvaluatedPolicy.of(loaded, device=settings.device, renderer=settings.renderer)
     if settings.domain:
-        if (judged := as_task(subject.task)).oracle is None:
-            raise InputError(f"task={judged.name} has no oracle to compare with; give domain=false")
-        check_baselines(judged, subject.network.actions)
+        check_baselines(as_task(subject.task), subject.network.actions)
     axes = find_axes(settings.axes, subject)
     total = len(axes) * (len(settings.strengths) + settings.domain) + 1
     done = itertools.count()
@@ -148,7 +145,7 @@ def _domain(
     """Search the operating domain."""
     episodes, ranges = settings.domain_episodes, dict[str, Range]()
     with closing(PairedEvaluator(subject, episodes, seed.value)) as evaluator:
-        oracle = evaluator.run(Condition(), agent=OracleAgent()).episodes
+        oracle = evaluator.run_oracle()
         prober = Prober(evaluator, oracle, settings.good_share, settings.possible_share)
         required = required_success(oracle, settings.good_share)
         for axis in axes:
@@ -157,4 +154,4 @@ def _domain(
                 axis,
                 lambda spans: run_across(subject, spans, CONFIRMING, seed.value, required),
             )
-    return Domain(plain=prober.plain, ranges=ranges)
+    return Domain(plain=prober.plain, ranges=ranges, is_absolute=oracle is None)

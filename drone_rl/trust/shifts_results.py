@@ -156,7 +156,7 @@ class RangeTest(Stored):
     success: Share
     """Success rate over the ranges."""
     required: float
-    """The success rate that a good policy exceeds: `good_share` of the oracle's."""
+    """The success rate that a good policy exceeds, see `Rule.good_share`."""
     failed: tuple[dict[AxisName, float | None], ...] = ()
     """Values of the axes in the first episodes that failed; None if infinite."""
     refused: str | None = None
@@ -214,6 +214,8 @@ class Domain(Stored):
     plain: Probe
     """Without perturbation."""
     ranges: dict[AxisName, Range]
+    is_absolute: bool = False
+    """Whether thresholds are absolute, since there is no usable oracle."""
 
 
 class NetworkIdentity(Stored):

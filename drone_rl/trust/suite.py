@@ -122,19 +122,15 @@ class Suite:
 
 
 class FrameRecorder:
-    """Fly straight on and record the color image of one step."""
+    """Fly straight on and record the color image of the last step."""
 
-    def __init__(self) -> None:
-        self._step = 0
-        self.image: Tensor | None = None
+    image: Tensor | None = None
 
     def act(self, context: StepContext) -> Act:
         """See `Agent`."""
         images = context.render("rgb").movedim(-1, 1).float() / 255.0
         images = context.observer.faults(images, context.rows, context.starts)
-        if self._step <= STEP:  # some episodes end earlier
-            self.image = (images[0] * 255).round().to(torch.uint8).movedim(0, -1)
-        self._step += 1
+        self.image = (images[0] * 255).round().to(torch.uint8).movedim(0, -1)
         ahead = context.actions.always(context.actions.names[0])
         return Act(ahead.expand(len(context.rows), *ahead.shape).to(context.rows.device))
 
@@ -149,7 +145,7 @@ def make_strip(evaluator: PairedEvaluator, axis: Axis) -> list[NDArray | None]:
     for condition in (Condition(), *conditions):
         agent = FrameRecorder()
         with contextlib.suppress(InputError):
-            evaluator.run(condition, agent=agent)
+            evaluator.run(condition, agent=agent, num_steps=STEP + 1)
         strip.append(None if agent.image is None else agent.image.cpu().numpy())
     return strip
 

@@ -21,11 +21,11 @@ from drone_rl.policies.policy import BasePolicy, load_policy
 from drone_rl.policies.zoo import TrainingProgress
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.tasks import Task
-from drone_rl.trust.baselines import run_baselines
+from drone_rl.trust.baselines import reference, run_baselines
 from drone_rl.trust.metrics import failure_table, summarise
 from drone_rl.trust.repetition import exchange_images, repeat
 from drone_rl.trust.results import NEEDED_EPISODES, CameraUse, Proof, Repetition, Verdict
-from drone_rl.trust.rule import Quantity, Rule, VerdictKind, decide, kinds_within
+from drone_rl.trust.rule import USABLE, Quantity, Rule, VerdictKind, decide, kinds_within
 from drone_rl.utils.exit_codes import NOT_CERTAIN
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.utils.progress import Progress
@@ -72,7 +72,7 @@ def judge_policy(
     `drone_rl.trust.repetition`.
 
     Raises:
-        InputError: The task has no oracle, baselines or strata, or an output is not finite.
+        InputError: The task has no baselines or strata, or an output is not finite.
     """
     base, worlds = base_env(env), worlds_of(env)
     check_judged(worlds.task, worlds.dynamics.actions)  # before its episodes
@@ -170,7 +170,7 @@ def apply_rule(
             raise ValueError("policy and baselines have different initial states; use the same")
     quantities = measure(greedy, baselines, rule)
     kind = decide([quantity.level for quantity in quantities], len(rule.strata))
-    is_enough = _is_certain(quantities, rule)
+    is_enough = _is_certain(quantities, rule) and _is_oracle_clear(baselines, rule)
     certain = is_enough and (repetition is None or repetition.is_enough)
     if kind is VerdictKind.GOOD and camera is not None:
         certain &= camera.is_used is not None
@@ -254,19 +254,23 @@ def observe_each(
     greedy: CompleteEpisodes, baselines: Mapping[str, CompleteEpisodes], rule: Rule
 ) -> list[NDArray]:
     """Return the values of `observe` for all episodes, NaN if undefined. Shapes: (n,), float64."""
-    oracle = baselines["oracle"]
-    observed = [greedy.success - rule.good_share * oracle.success]
+    every = torch.ones_like(greedy.success)
+    success = share = solved = every
+    if (oracle := reference(baselines)) is not None:
+        success, share = oracle.success, oracle.share
+        solved = torch.maximum(oracle.success, greedy.success)
+    observed = [greedy.success - rule.good_share * success]
     offered = [greedy.offered(stratum) for stratum in range(len(rule.strata))]
     observed += [there.double() for there in offered]
     for stratum, there in enumerate(offered):
-        share = torch.full_like(there, torch.nan, dtype=torch.float64)
-        share[there] = greedy.stratum_share(stratum)
-        observed.append(share)
+        reached = torch.full_like(there, torch.nan, dtype=torch.float64)
+        reached[there] = greedy.stratum_share(stratum)
+        observed.append(reached)
     for name in rule.blind_baselines:
         blind = (1 - rule.poor_margin) * baselines[name].share
-        observed.append(greedy.share - blind - rule.poor_margin * oracle.share)
+        observed.append(greedy.share - blind - rule.poor_margin * share)
     for name in rule.blind_baselines:
-        observed.append(rule.good_share * oracle.success - baselines[name].success)
+        observed.append(rule.good_share * solved - baselines[name].success)
     return [values.numpy() for values in observed]
 
 
@@ -275,11 +279,21 @@ def _is_certain(quantities: tuple[Quantity, ...], rule: Rule) -> bool:
     return len(kinds_within(box, len(rule.strata))) == 1
 
 
+def _is_oracle_clear(baselines: Mapping[str, CompleteEpisodes], rule: Rule, times: int = 1) -> bool:
+    """Return whether the episodes determine if the oracle succeeds often enough to be usable."""
+    if (oracle := baselines.get("oracle")) is None:
+        return True
+    successes = times * int(oracle.success.sum())
+    of = proportion(successes, times * len(oracle), rule.confidence)
+    return not of.lower95 <= USABLE <= of.upper95
+
+
 def _enough(
     greedy: CompleteEpisodes, baselines: Mapping[str, CompleteEpisodes], rule: Rule
 ) -> int | None:
     """Return about how many episodes certainty needs; None if more than `MANY` covers."""
     for times in (1, *MANY):
-        if _is_certain(measure(greedy, baselines, rule, times), rule):
+        quantities = measure(greedy, baselines, rule, times)
+        if _is_certain(quantities, rule) and _is_oracle_clear(baselines, rule, times):
             return max(NEEDED_EPISODES, times * len(greedy))
     return None

@@ -42,7 +42,7 @@ def good():
 def test_a_proof_can_be_required(in_process, tmp_path, good, undecided, status, words):
     made = of_every_place(good, undecided=undecided)
     (tmp_path / "c.json").write_text(json.dumps(made))
-    checked = [*ONE, "certificate=c.json", "certificate_flights=100"]
+    checked = [*ONE, "episodes=150", "certificate=c.json", "certificate_flights=100"]
     done = in_process(*checked, "require=proved", "hydra.run.dir=v")
     assert done.returncode == status, done.stderr
     assert words in done.stdout

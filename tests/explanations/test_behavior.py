@@ -148,8 +148,8 @@ def test_episodes_with_a_loop_are_counted_once():
     data = fake(np.zeros((10, 1)), [LEFT] * 10, [[5, 1]] * 10)
     data.arrays["actions"][:] = [L, R, L, F, L, R, L, F, F, F]
     data.arrays["episode"][8:] = 1
-    data.offset = lambda task: data.offsets
-    scenes = SimpleNamespace(actions=MOVES, task=None)
+    data.offset = lambda worlds: data.offsets
+    scenes = SimpleNamespace(actions=MOVES, worlds=None)
     found = flaws_section(SimpleNamespace(dataset=data, flights=data, scenes=scenes))
     assert len(found.loops) == 2 and found.looping_steps == pytest.approx(0.6)
     assert (found.looping_episodes.successes, found.looping_episodes.trials) == (1, 2)

@@ -5,7 +5,6 @@ import functools
 import numpy as np
 import pytest
 import torch
-from torch import nn
 
 from drone_rl.config import TaskSettings
 from drone_rl.explanations import response
@@ -21,7 +20,7 @@ from drone_rl.explanations.response import (
 )
 from drone_rl.explanations.results import OutcomeMap, ResponseMap
 from drone_rl.explanations.scenes import Scenes, place_target
-from drone_rl.policies import MLP
+from drone_rl.policies import MLP, ImageNetwork
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.continuous_actions import ContinuousActions
 from tests.continuous import SETTINGS
@@ -29,9 +28,7 @@ from tests.continuous import SETTINGS
 IDLE, LEFT = [1.0, 0.0, 0.0], [0.1, 0.9, 0.0]
 
 
-class Forward(nn.Module):
-    actions = MOVES
-
+class Forward(ImageNetwork):
     def forward(self, pictures):
         return torch.tensor([9.0, 0.0, 0.0]).expand(len(pictures), 3)
 

@@ -12,9 +12,9 @@ from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
 from drone_rl.explanations.rollouts import collect, run_to_end, select_frames, spread_frames
 from drone_rl.explanations.scenes import Region, Scenes, place_target
-from drone_rl.policies import ExternalNetwork, make_actor
+from drone_rl.policies import ExternalNetwork, ImageNetwork, make_actor
 from drone_rl.sim.actions import MOVES, Move
-from drone_rl.sim.dynamics import BodyState, ComputerVision, FlightState, Quadrotor
+from drone_rl.sim.dynamics import FlightState
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes import CubesEnd
 
@@ -29,42 +29,39 @@ def test_the_file_holds_every_step_of_the_flights(dataset, world, tmp_path):
     dataset.save(tmp_path / "data.npz", flights)
     with np.load(tmp_path / "data.npz") as file:
         np.testing.assert_array_equal(file["flights/actions"], flights.actions)
-        assert {"frames", "features/relu1", "flights/cubes"} < set(file.files)
+        assert {"frames", "features/relu1", "flights/state/cubes"} < set(file.files)
 
 
-def test_offset_is_seen_from_the_drone(dataset):
+def test_offset_is_seen_from_the_drone(dataset, scenes):
     t = int(np.flatnonzero(dataset.next_target == 0)[0])
-    expected = dataset.cubes[t, 0, :2] - dataset.drone[t, :2]
-    np.testing.assert_allclose(dataset.offset(CollectCubes())[t], expected)
+    expected = dataset.arrays["state/cubes"][t, 0, :2] - dataset.drone[t, :2]
+    np.testing.assert_allclose(dataset.offset(scenes.worlds)[t], expected)
     near = np.flatnonzero((dataset.next_target == 0) & (dataset.step < 5))
     assert (dataset.regions == Region.NEXT_TARGET).any((1, 2))[near].all()
 
 
-def test_without_a_next_cube_there_is_no_offset(dataset):
-    dataset.arrays["present"] = np.zeros_like(dataset.present)
-    assert np.isnan(dataset.offset(CollectCubes())).all()
+def test_without_a_next_cube_there_is_no_offset(dataset, scenes):
+    dataset.arrays["state/passed"][:] = True
+    assert np.isnan(dataset.offset(scenes.worlds)).all()
 
 
-def test_a_recorded_attitude_is_that_of_the_recalled_world(dataset):
-    dataset.arrays["attitude"][3] = [0.6, 0.0, 0.0, 0.8]
-    attitude = dataset.state(CollectCubes()).body.attitude
-    torch.testing.assert_close(attitude[3], torch.tensor([0.6, 0.0, 0.0, 0.8]).double())
+def test_recorded_states_go_on_as_the_episodes_did(world):
+    """Also a drone in flight: its velocity, rotors and controller are part of the state."""
+    env = DroneEnv(2, dynamics=DynamicsSettings(mode="simple_flight"), transforms=[GrayPixels()])
+    flights = collect(env, world[1], num_episodes=2)
+    state, t = flights.state(env.worlds), 20  # of the first episode
+    assert isinstance(state.body, FlightState) and state.body.velocity[t].norm() > 1.0
+    action = flights.tensor("actions")[t : t + 1]
+    after, _ = env.worlds.advance(state[torch.tensor([t])], action)
+    env.close()
+    assert torch.equal(after.body.numbers[0], state.body.numbers[t + 1])
 
 
-def test_recalled_states_fit_the_dynamics(dataset):
-    flight = Quadrotor(DynamicsSettings(mode="simple_flight"))
-    body, plain = (dataset.state(CollectCubes(), of).body for of in (flight, ComputerVision()))
-    assert isinstance(body, FlightState) and type(plain) is BodyState
-    for name in ("position", "attitude", "velocity"):
-        torch.testing.assert_close(getattr(body, name), getattr(plain, name))
-    assert flight.step(body, torch.zeros(len(body), dtype=torch.int64)).velocity.any()
-
-
-def test_offset_follows_the_heading_of_a_turned_drone(dataset):
+def test_offset_follows_the_heading_of_a_turned_drone(dataset, scenes):
     t = int(np.flatnonzero(dataset.next_target == 0)[0])
-    x, y = (dataset.cubes[t, 0] - dataset.drone[t])[:2]
-    dataset.arrays["attitude"][t] = [0.5**0.5, 0.0, 0.0, 0.5**0.5]  # it looks to the left
-    np.testing.assert_allclose(dataset.offset(CollectCubes())[t], (y, -x), atol=1e-5)
+    x, y = (dataset.arrays["state/cubes"][t, 0] - dataset.drone[t])[:2]
+    dataset.arrays["state/body/attitude"][t] = [0.5**0.5, 0.0, 0.0, 0.5**0.5]  # it looks left
+    np.testing.assert_allclose(dataset.offset(scenes.worlds)[t], (y, -x), atol=1e-5)
 
 
 @pytest.fixture
@@ -119,16 +116,16 @@ def always_forward(observations):
 F, L, R = Move.FORWARD, Move.LEFT, Move.RIGHT
 
 
-class Always(nn.Module):
+class Always(ImageNetwork):
     """Takes given actions one after the other, the last of them for ever; the same everywhere."""
 
     def __init__(self, *actions):
         super().__init__()
-        self.actions, self.seen = list(actions), []
+        self.moves, self.seen = list(actions), []
 
     def forward(self, pictures):
         self.seen.append(pictures)
-        action = self.actions[min(len(self.seen), len(self.actions)) - 1]
+        action = self.moves[min(len(self.seen), len(self.moves)) - 1]
         return 9.0 * nn.functional.one_hot(torch.full((len(pictures),), int(action)), 3).float()
 
 

@@ -15,7 +15,6 @@ from drone_rl.explanations.scenes import (
     Region,
     Scenes,
     alternatives,
-    empty_scene,
     place_target,
 )
 from tests.second_dynamics import Turning
@@ -81,15 +80,15 @@ def test_alternatives_of_a_scene(scenes, world):
     before = state.passed.clone()
     found = alternatives(scenes, state)
     assert list(found) == [
-        "no targets", "targets elsewhere 0", "targets elsewhere 1", "targets elsewhere 2",
+        "no objects", "objects elsewhere 0", "objects elsewhere 1", "objects elsewhere 2",
         "darker", "brighter",
     ]  # fmt: skip
-    x, empty = scenes.observe(state), scenes.observe(empty_scene(scenes))
-    torch.testing.assert_close(found["no targets"], empty.expand_as(x))
+    x = scenes.observe(state)
+    torch.testing.assert_close(found["no objects"], scenes.absent.expand_as(x))
     assert (found["darker"][:, 0, -1] < x[:, 0, -1]).all()  # the ground
     assert (found["darker"][:, 0, 0] < x[:, 0, 0]).all()  # the sky
     assert (found["brighter"][:, 0, -1] > x[:, 0, -1]).all()
-    assert not torch.equal(found["targets elsewhere 0"], found["targets elsewhere 1"])
+    assert not torch.equal(found["objects elsewhere 0"], found["objects elsewhere 1"])
     assert torch.equal(state.passed, before)
     torch.testing.assert_close(scenes.observe(state), x)  # the worlds are as they were
     again = alternatives(scenes, state)

@@ -12,7 +12,6 @@ from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.patches import PatchGrid, placebo_maps
 from drone_rl.explanations.results import Likeness
 from drone_rl.explanations.rollouts import spread_frames
-from drone_rl.explanations.scenes import empty_scene
 from drone_rl.explanations.trust import (
     Trial,
     check_maps,
@@ -147,14 +146,8 @@ def test_methods_use_the_network_of_the_call(trial):
 
 
 def test_a_trial_of_a_policy_in_the_simulator(world, scenes, dataset):
-    network, absent = world[2], scenes.observe(empty_scene(scenes))[0]
-    context = SimpleNamespace(
-        dataset=dataset,
-        scenes=scenes,
-        network=network,
-        absent=absent,
-        seed=SimpleNamespace(value=0),
-    )
+    seed = SimpleNamespace(value=0)
+    context = SimpleNamespace(dataset=dataset, scenes=scenes, network=world[2], seed=seed)
     made = trust.make_trial(context)
     assert made.effects.shape == (len(made.episode), 40) == (len(made.observations), 40)
     rows = spread_frames(dataset.episode, trust.FRAMES_AN_EPISODE)
@@ -164,8 +157,8 @@ def test_a_trial_of_a_policy_in_the_simulator(world, scenes, dataset):
     )
     assert "mean difference to re-rendered patches" in made.placebos
     with torch.no_grad():
-        network.layers.logits.weight.zero_()
+        world[2].layers.logits.weight.zero_()
     blind = trust.make_trial(context)
     assert len(blind.episode) == 0 and blind.frames_without_effect == len(rows)
-    found = check_maps(blind, method_maps(Explainer(network, torch.zeros(1, 25, 64))))
+    found = check_maps(blind, method_maps(Explainer(world[2], torch.zeros(1, 25, 64))))
     assert found.trusted is None

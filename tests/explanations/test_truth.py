@@ -6,7 +6,7 @@ import torch
 from torch import nn
 
 from drone_rl.explanations.hooks import probabilities
-from drone_rl.explanations.scenes import Region, empty_scene, place_target
+from drone_rl.explanations.scenes import Region, place_target
 from drone_rl.explanations.truth import (
     PATIENCE,
     Intervention,
@@ -18,6 +18,7 @@ from drone_rl.explanations.truth import (
     run_to_target,
     to_the_middle,
 )
+from drone_rl.policies import ImageNetwork
 from drone_rl.sim.actions import Move
 
 
@@ -27,7 +28,8 @@ def test_only_what_was_changed_changes(scenes, world):
     changes = {c.name: c for c in intervene(scenes, world[2], state, regions)}
     cube = regions == Region.NEXT_TARGET
     away = changes["target taken away"]
-    torch.testing.assert_close(away.frames, scenes.frames(empty_scene(scenes)).expand_as(before))
+    empty = scenes.absent.expand(len(before), *scenes.absent.shape)
+    torch.testing.assert_close(scenes.transform(away.frames), empty)
     for name in ("target recolored", "ground patch changed"):
         changed = (changes[name].frames != before).any(-1)
         assert torch.equal(changed, changes[name].area), name
@@ -63,7 +65,7 @@ def test_a_cube_is_moved_to_the_middle_and_never_away_from_it(scenes, lateral, m
     assert state.cubes[0, 0, 1] == 7.0 + lateral
 
 
-class Follower(nn.Module):
+class Follower(ImageNetwork):
     """Turns to where the picture differs from the empty scene, and flies on when in the middle."""
 
     def __init__(self, absent):
@@ -79,7 +81,7 @@ class Follower(nn.Module):
         return logits
 
 
-class Always(nn.Module):
+class Always(ImageNetwork):
     """Takes one action."""
 
     def __init__(self, action):
@@ -97,7 +99,7 @@ def starts(scenes):
 
 @pytest.fixture
 def follower(scenes):
-    return Follower(scenes.observe(empty_scene(scenes))[0])
+    return Follower(scenes.absent)
 
 
 def test_a_policy_that_follows_the_target_reaches_it(scenes, starts, follower):

@@ -53,11 +53,11 @@ def test_a_task_of_costs_has_no_target():
 
 def test_a_task_that_no_verdict_accepts_is_refused_before_the_training(tmp_path):
     class Unknown(Posts):
-        name, oracle = "unknown", None
+        name, blind_baselines = "unknown", ("up",)
 
     with patch.dict(TASKS), patch.dict(MAKERS):
         settings = TrainSettings(task=as_settings(Unknown()), evaluate_after=10)
-        with pytest.raises(InputError, match="evaluate_after=10: task=unknown has no oracle"):
+        with pytest.raises(InputError, match="evaluate_after=10: baseline=up of task=unknown"):
             drone_rl.train(settings, folder=tmp_path / "run")
         assert not (tmp_path / "run").exists()
         with pytest.raises(InputError, match="evaluate_after=10 needs a judge"):

@@ -18,7 +18,7 @@ from drone_rl.trust.rule import Quantity, Rule
 from drone_rl.trust.shifts_results import FailedEnd, Probe, RangeTest
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import proportion
-from tests.trust.subjects import Blind, subject
+from tests.trust.subjects import Blind, Steering, subject
 
 
 @pytest.fixture
@@ -115,7 +115,10 @@ def across(monkeypatch):
     def test(succeeds, *axes, seed=0, episodes=200, required=0.9):
         class Evaluator:
             def __init__(self, *args):
-                assert args[1] == 1
+                pass
+
+            def sample(self, seed):
+                pass
 
             def run(self, condition):
                 is_success = succeeds(**condition.task)
@@ -191,9 +194,23 @@ def test_ranges_are_tested_by_episodes_of_the_policy():
     assert blind.success.successes == 0 and [*blind.failed[0]] == ["noise"]
 
 
+class OnlyInBatches(Steering):
+    """Turns away from the target if it is called with one environment alone."""
+
+    def forward(self, pixels):
+        return (-1 if len(pixels) == 1 else 1) * super().forward(pixels)
+
+
+def test_a_range_is_tested_one_environment_at_a_time(make_prober):
+    of = subject(OnlyInBatches())
+    assert make_prober(of).plain.success == 1.0
+    assert run_across(of, {AXES["noise"]: (0.0, 2.0)}, 6, 1, 0.1).success.successes == 0
+
+
 def test_required_success_is_relative_to_the_oracle(make_prober):
     oracle = make_prober(subject(), 50)._oracle
     assert required_success(oracle, 0.8) == pytest.approx(0.8)
+    assert required_success(None, 0.8) == 0.8
 
 
 def test_blind_policy_in_an_easy_task_has_no_range(make_prober):

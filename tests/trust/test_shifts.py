@@ -77,16 +77,16 @@ def test_wrong_settings_are_refused_before_rendering(change, message, monkeypatc
         drone_rl.shifts("good", **{**FEW, **change})
 
 
-def test_task_without_an_oracle_has_no_range(monkeypatch):
-
+def test_task_without_an_oracle_has_absolute_thresholds(monkeypatch):
     none = property(lambda _: None, lambda _, value: None)
     monkeypatch.setattr(CollectCubes, "oracle", none)
-    told = {**FEW, "axes": ["noise"], "modes": ["constant"]}
-    with pytest.raises(InputError, match="has no oracle to compare with; give domain=false"):
-        drone_rl.shifts("good", **told)
-    found = drone_rl.shifts("good", domain=False, **told)
-    assert found.plain.oracle is None and found.domain is None
-    assert found.axes["noise"].levels[0].impossible is None
+    found = drone_rl.shifts("good", **{**FEW, "axes": ["noise"], "modes": ["constant"]})
+    assert found.plain.oracle is None and found.axes["noise"].levels[0].impossible is None
+    assert found.domain.is_absolute and "no usable oracle" in found.sentence
+    assert (
+        found.domain.ranges["noise"].test is None
+        or found.domain.ranges["noise"].test.required == 0.9
+    )
 
 
 def test_derived_task_is_refused():

@@ -18,7 +18,12 @@ KINDS = {
     "line": (lambda result: SavedShifts.read(result).finding(GOOD).text, SAVED_SHIFTS),
 }
 GOOD = Verdict.read({**VERDICT, "kind": "good"})
-TRIVIAL = {"baselines.forward.success.share": 0.95}
+SOLVED = {"value": -0.05, "lower": -0.1, "upper": 0.0, "thresholds": [0.0]}
+TRIVIAL = {
+    "baselines.forward.success.share": 0.95,
+    "quantities": {"unsolved by forward": SOLVED},
+}
+BLIND = {k: v for k, v in VERDICT["baselines"].items() if k != "oracle"}
 WIND = {"unlike": {"wind": {"own": [0.0, 0.0, 0.0], "flown": [5.0, 0.0, 0.0]}}}
 NEVER_FAILED = {"failures.largest": None, "failures.bound.successes": 0}
 PROVED = {"proof": PROOF}
@@ -66,7 +71,13 @@ CLAIMS = [
     ("verdict", 'the best baseline ("always forward") 33.3% and', {},
      {"baselines.forward.shares.all.mean": 0.0}),
     ("verdict", 'This task is trivial: the baseline "always forward" collects', TRIVIAL,
-     {"baselines.forward.success.share": 0.89}),
+     {"quantities.unsolved by forward.value": 0.01}),
+    ("verdict", "33.3% and the oracle 100%. 30 of 50", {}, {"baselines": BLIND}),
+    ("verdict", "There is no oracle to compare with. So thresholds are absolute: a good policy "
+     "collects every cube in more than 90.0% of episodes", {"baselines": BLIND},
+     {"baselines": VERDICT["baselines"]}),
+    ("verdict", "The oracle is unusable: it collects every cube in 2.0% of episodes. So thresholds",
+     {"baselines.oracle.success.share": 0.02}, {"baselines.oracle.success.share": 0.6}),
     ("findings", "on its left: in 150 of 300 episodes that offered it (50.0%); 10.0% of all end at",
      {}, {"failures.rows.1.lower95": 0.02}),
     ("findings", "It failed in none of 400 episodes, so it fails in at most 45.0% (95% CI).",
@@ -100,6 +111,8 @@ CLAIMS = [
     ("shifts", "Without the camera faults of its training (noise)",
      {"network": {"weights": "", "description": NOISY}},
      {"network": None}),
+    ("shifts", "no usable oracle, so a good policy succeeds in more than 90.0% of episodes",
+     {"domain.is_absolute": True}, {"domain.is_absolute": False}),
     ("shifts", "Fixed seed 0", {}, {"seed_is_fixed": False}),
     ("line", "With elevation of the sun at 0 degrees it succeeds in 10.0% of episodes, "
      "unperturbed in 100%; good with the sun at", {"shifts.axes.sun.levels.1.impossible": False},

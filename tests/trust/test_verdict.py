@@ -87,11 +87,10 @@ def test_number_of_episodes_that_would_be_enough(judged, number, missed, enough)
 def test_margin_above_baselines(make_episodes, make_baselines):
     episodes = make_episodes([[LEFT, LEFT], [AHEAD, AHEAD]], [[1, 1], [1, 0]])
     baselines = make_baselines(episodes)
-    baselines["oracle"] = make_episodes([[LEFT, LEFT], [AHEAD, AHEAD]], [[1, 0], [0, 0]])
     told = dict(zip(Rule().quantities, observe(episodes, baselines, Rule()), strict=True))
-    assert told["success"].tolist() == [1.0, 0.0]  # the oracle never succeeds
-    assert told["above random"].tolist() == pytest.approx([1 - 1 / 6 * 0.5, 0.5])
-    assert told["above forward"].tolist() == pytest.approx([1 - 1 / 6 * 0.5, 0.5 - 5 / 6])
+    assert told["success"].tolist() == pytest.approx([0.1, -0.9])
+    assert told["above random"].tolist() == pytest.approx([5 / 6, 0.5 - 1 / 6])
+    assert told["above forward"].tolist() == pytest.approx([5 / 6, 0.5 - 5 / 6 - 1 / 6])
 
 
 def test_success_at_the_threshold_is_not_good(judged):
@@ -204,18 +203,43 @@ def test_verdict_on_another_task():
     assert leaving.failures.largest.value in ("left", "right")
 
 
-def test_task_without_an_oracle_is_refused(monkeypatch):
+@pytest.mark.parametrize(
+    ("policy", "oracle", "forward", "kind", "certain"),
+    [
+        (400, None, 12, VerdictKind.GOOD, True),
+        (400, 8, 12, VerdictKind.GOOD, True),  # not trivial, though the oracle is no better
+        (300, 8, 12, VerdictKind.NONE, True),  # absolute: 75% are not 90%
+        (340, 340, 12, VerdictKind.GOOD, True),  # relative: the oracle succeeds in no more
+        (400, 260, 240, VerdictKind.GOOD, True),  # not trivial: the policy solves all episodes
+        (340, 340, 340, VerdictKind.TRIVIAL, True),
+        (400, 210, 12, VerdictKind.GOOD, False),  # 50% lie within the interval of the oracle
+        (400, None, 400, VerdictKind.TRIVIAL, True),
+    ],
+)
+def test_only_an_oracle_that_succeeds_sets_the_thresholds(
+    make_episodes, policy, oracle, forward, kind, certain
+):
+    """Of 400 episodes with one cube ahead, how many each solves."""
+
+    def flown(solved):
+        return make_episodes([[AHEAD]] * 400, [[i < solved] for i in range(400)])
+
+    numbers = {"random": 0, "forward": forward, "left": 0, "right": 0, "oracle": oracle}
+    baselines = {name: flown(number) for name, number in numbers.items() if number is not None}
+    verdict = apply_rule(flown(policy), baselines)
+    assert (verdict.kind, verdict.certain) == (kind, certain)
+    assert verdict.is_trivial == (kind is VerdictKind.TRIVIAL)
+
+
+def test_task_without_an_oracle():
     class Blind(Posts):
         name, oracle = "fog", None
 
-    def refused(*_, **__):
-        raise AssertionError("episodes were flown")
-
-    for module in ("verdict", "baselines"):
-        monkeypatch.setattr(f"drone_rl.trust.{module}.rollout", refused)
-    env = DroneEnv(2, Blind(), pixels=False)
-    with pytest.raises(InputError, match="task=fog has no oracle"):
-        judge_policy(env, ConstantAgent(Move.LEFT), 2)
+    env = DroneEnv(20, Blind(), pixels=False)
+    straight = judge_policy(env, ConstantAgent(Move.FORWARD), 200, sampled=False)
+    assert list(straight.baselines) == ["random", "forward"]
+    assert (straight.kind, straight.certain) == (VerdictKind.TRIVIAL, True)
+    assert straight.failing_side is None
 
 
 def repeated(different, successes=50, episodes=50):

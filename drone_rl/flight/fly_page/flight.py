@@ -23,7 +23,6 @@ from drone_rl.flight.image_types import encode
 from drone_rl.policies.policy import Policy
 from drone_rl.sim.coordinates import Attitude
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.tasks import CollectCubes
 from drone_rl.trust.plots.images import heated, shown_picture
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.models import Model
@@ -341,16 +340,9 @@ class Flight:
         }
 
     def _score(self) -> str:
-        """Return the goals reached, or the return if the task does not count goals."""
-        world, terms = self.world, self.world.task.vocabulary
-        if world.goals is None:
-            return f"return {round(world.reward, 3):g}"
-        reached, missed = world.goals
-        total = len(world.objects) if isinstance(world.task, CollectCubes) else None
-        of = "" if total is None else f" of {total}"
-        plural = "" if (total or reached) == 1 else "s"
-        lost = f", {missed} missed" if missed else ""
-        return f"{reached}{of} {terms.goal}{plural} {terms.reached}{lost}"
+        """Return how many goals are reached."""
+        (reached, total), terms = self.world.goals, self.world.task.vocabulary
+        return f"{reached} of {total} {terms.goal if total == 1 else terms.goals} {terms.reached}"
 
     def _look(self) -> Seen:
         """Return what the policy sees; while a person moves freely, some times a second."""

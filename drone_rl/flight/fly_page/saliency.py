@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from drone_rl.explanations import trust
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.heat_maps import Explainer
-from drone_rl.explanations.scenes import empty_scene
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.flight.fly_page.world import Seen, World
 from drone_rl.policies.policy import Policy
@@ -96,7 +95,7 @@ class LiveSaliency:
         world = self._world
         if self._explainer is None:
             network = world.policy.make_network()
-            self._explainer = Explainer(network, world.scenes.observe(empty_scene(world.scenes))[0])
+            self._explainer = Explainer(network, world.scenes.absent)
         part = torch.tensor(seen.probabilities).argmax()[None]
         maps = self._explainer.methods()[self.method](seen.observation, part)
         return maps[0].numpy()

@@ -21,7 +21,6 @@ from drone_rl.sim.entities import CHASE
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.trust.video import probabilities, render_chase
-from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import Settings
 
 HEIGHT, WIDTH = 144, 256
@@ -111,13 +110,10 @@ class World:
         return self.task.vocabulary.ending(self.task.ends(reason).name.lower()) if reason else None
 
     @property
-    def goals(self) -> tuple[int, int] | None:
-        """Number of goals reached and missed; None if the task does not count them."""
-        try:
-            reached, missed = self.task.tally(self.worlds.info())
-        except InputError:
-            return None
-        return int(reached[0]), int(missed[0])
+    def goals(self) -> tuple[int, int]:
+        """Number of goals reached, and of all goals."""
+        reached = self.task.score(self.worlds.info()).reached[0]
+        return int(reached.sum()), len(reached)
 
     @property
     def objects(self) -> list[tuple[float, float, float] | None]:

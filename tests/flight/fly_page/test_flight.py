@@ -26,7 +26,7 @@ def test_a_frame_has_the_state_and_two_images(make_flight):
     assert state["frame"] == 1 and state["position"] == [0.0, 0.0, 2.5]
     assert state["attitude"] == [0.0, 0.0, 0.0]
     assert (state["pilot"], state["mode"], state["camera"]) == ("person", "actions", "front_center")
-    assert state["goals"] == [0, 0] and state["end"] is None
+    assert state["goals"] == [0, 3] and state["end"] is None
     assert sum(state["probabilities"]) == pytest.approx(1.0, abs=0.01)
     view = Image.open(io.BytesIO(images["view"]))
     assert (view.format, view.size) == ("JPEG", (256, 144))
@@ -45,7 +45,7 @@ def test_the_policy_collects_the_cubes_and_the_next_episode_begins(make_flight):
         ended = state if state["end"] else ended
         if state["episode"] == 2:
             break
-    assert ended["end"] == "with every cube collected" and ended["goals"] == [3, 0]
+    assert ended["end"] == "with every cube collected" and ended["goals"] == [3, 3]
     texts = ended["texts"]
     assert texts["end"] == "Episode over, with every cube collected. The next one begins."
     assert (texts["score"], texts["flyer"]) == ("3 of 3 cubes collected", "The policy good flies")

@@ -28,14 +28,14 @@ def test_an_action_moves_the_drone_by_a_metre(make_world):
     assert [round(place[0]) for place in world.objects] == [15, 24, 33]
     assert world.step(FORWARD) == 0.0
     assert world.body.position[0].tolist() == [1.0, 0.0, 2.5]
-    assert (world.goals, world.end, world.is_over) == ((0, 0), None, False)
+    assert (world.goals, world.end, world.is_over) == ((0, 3), None, False)
 
 
 def test_cubes_vanish_when_a_person_touches_them_and_nothing_ends(make_world):
     world = make_world()
     x, y, z = world.objects[1]
     turned(world, x + 1.6, y, z, 0.0)  # touched: 1.65 m = (2.5 + 0.8) / 2
-    assert world.objects[1] is None and world.goals == (1, 0)  # the first cube is still ahead
+    assert world.objects[1] is None and world.goals == (1, 3)  # the first cube is still ahead
     turned(world, 100.0, 50.0, 30.0, 0.0)  # behind all cubes and beyond every boundary
     assert not world.is_over
     assert world.objects[0] is not None and world.objects[2] is not None

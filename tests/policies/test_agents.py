@@ -5,12 +5,11 @@ from drone_rl.config import CameraSettings, PillarsSettings, TaskSettings
 from drone_rl.envs import GrayPixels, Observer
 from drone_rl.envs.fault_models import dead_rows, noise
 from drone_rl.envs.rollout import StepContext
-from drone_rl.policies import ImageNetwork, RecurrentNetwork
+from drone_rl.policies import ImageNetwork, RecurrentNetwork, greedy_agent
 from drone_rl.policies.baselines import OracleAgent, has_visible_oracle
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.tasks import as_task
 from drone_rl.sim.worlds import Worlds
-from drone_rl.trust.agents import PolicyAgent
 from drone_rl.trust.paired_evaluation import PairedEvaluator
 from drone_rl.trust.perturbations import Condition
 from tests.trust.subjects import TASK, subject
@@ -44,7 +43,7 @@ def sight(worlds, *rows, starts=True, pixels=None):
 
 def test_policy_acts_on_what_is_observed():
     worlds, network = make_env(), Looking()
-    act = PolicyAgent(network).act(sight(worlds, 0, 2))
+    act = greedy_agent(network).act(sight(worlds, 0, 2))
     gray = GrayPixels()._apply_transform(worlds.render(worlds.state[torch.tensor([0, 2])]))
     worlds.close()
     assert act.action.tolist() == [1, 1] and act.distribution.shape == (2, 3)
@@ -55,7 +54,7 @@ def test_recurrent_policies_keep_a_state_of_each_environment():
     """As the same network in one environment at a time, restarted where an episode starts."""
     worlds = make_env()
     network = RecurrentNetwork((1, 12, 16), 3, generator=torch.Generator().manual_seed(0)).eval()
-    network.actions, agent = MOVES, PolicyAgent(network)
+    network.actions, agent = MOVES, greedy_agent(network)
     with torch.no_grad():
         agent.act(sight(worlds, 0, 1, 2, pixels=[0.1, 0.5, 0.9]))
         second = agent.act(sight(worlds, 0, 2, starts=False, pixels=[0.2, 0.3])).distribution
