@@ -15,6 +15,7 @@ def call(
     statuses: tuple[int, ...] = (0,),
     environment: Mapping[str, str] | None = None,
     tree: Path | None = None,
+    folder: Path | None = None,
 ) -> None:
     """Run `drone-rl`.
 
@@ -23,17 +24,19 @@ def call(
         statuses: Exit statuses that count as success.
         environment: Additional environment variables.
         tree: Checkout whose code runs, in its folder; by default that of this program, here.
+        folder: Working folder in which the code of this program runs.
 
     Raises:
         RuntimeError: The exit status is not in `statuses`.
     """
-    python_path = {} if tree is None else {"PYTHONPATH": str(tree)}
+    code = tree if folder is None else Path(__file__).parents[1]
+    python_path = {} if code is None else {"PYTHONPATH": str(code)}
     process = subprocess.run(
         [*PROGRAM, *args],
         capture_output=True,
         text=True,
         check=False,
-        cwd=tree,
+        cwd=folder or tree,
         env={**os.environ, **python_path, **(environment or {})},
     )
     if process.returncode not in statuses:

@@ -9,11 +9,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs.rollout import Agent
 from drone_rl.policies import greedy_agent
-from drone_rl.policies.baselines import OracleAgent
 from drone_rl.trust.axes import AXES, GROUPS, Axis
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
 from drone_rl.trust.perturbations import Condition
-from drone_rl.utils.intervals import proportion
 
 _PARTS = ("task", "appearance", "camera", "transforms")
 """Settings of a training that affect observations and dynamics."""
@@ -143,5 +141,5 @@ def _share(evaluator: PairedEvaluator, condition: Condition, agent: Agent) -> fl
 
 
 def _is_possible(evaluator: PairedEvaluator, condition: Condition, possible_share: float) -> bool:
-    success = evaluator.run(condition, agent=OracleAgent(only_visible=True)).episodes.success
-    return proportion(int(success.sum()), len(success)).upper95 >= possible_share
+    seen = evaluator.rate_of_oracle(condition)
+    return seen is None or seen.upper95 >= possible_share

@@ -208,7 +208,7 @@ def _observe(kind: Type, forward_share: float) -> list[float]:
     baselines = {name: _episode(sides, [0] * len(sides)) for name in BASELINES}
     baselines["oracle"] = _episode(sides, [1] * len(sides))
     baselines["forward"] = _episode(sides, [int(is_solved)] * len(sides))
-    observed = [float(v[0]) if len(v) else np.nan for v in observe(ours, baselines, _RULE)]
+    observed = [float(value) for (value,) in observe(ours, baselines, _RULE)]
     straight = _RULE.quantities.index("above forward")
     observed[straight] -= (1 - _RULE.poor_margin) * forward_share
     return observed

@@ -132,7 +132,7 @@ def _along(group: str, unit: str, neutral: float, *levels: Plain) -> Plain:
 
 
 def _found(low: float, high: float, positions: list[float], **more: Any) -> Plain:
-    ends = {"low_open": None, "high_open": None, "failed": [], "flown": []}
+    ends = {"low_open": None, "high_open": None, "failed": []}
     if low < high:
         ends["test"] = {"success": _share(150, 150, 0.975, 1.0), "required": 0.9}
     return {"low": low, "high": high, "positions": positions, **ends, **more}

@@ -101,13 +101,12 @@ class CompleteEpisodes:
         return (self.goals.stratum == stratum).any(-1)
 
     def stratum_share(self, stratum: int) -> Tensor:
-        """Return the fraction of a stratum's goals that was reached, by episode that offered one.
+        """Return the fraction of a stratum's goals that was reached, NaN without any.
 
-        Shape: (number of such episodes,), float64.
+        Shape: (n,), float64.
         """
-        offered = self.offered(stratum)
-        there = (self.goals.stratum == stratum)[offered]
-        return (there & self.goals.reached[offered]).sum(-1).double() / there.sum(-1)
+        there = self.goals.stratum == stratum
+        return (there & self.goals.reached).sum(-1).double() / there.sum(-1)
 
 
 def rollout(

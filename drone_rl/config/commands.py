@@ -1,6 +1,6 @@
 """Settings of commands: evaluation, verdict, robustness, verification, benchmarks, Gymnasium."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from drone_rl.config import ActionSettings, CameraSettings, DynamicsSettings, RendererName
 from drone_rl.config.camera import DeviceSettings, RendererSettings
@@ -90,7 +90,11 @@ class BodiesSettings(JudgeSettings):
             self.refuse("bodies", "has one twice; give each once")
 
 
-MODES = ("constant", "drifting", "onset")
+Mode = Literal["constant", "drifting", "onset"]
+"""When a perturbation is active: constant, from start to end, in each environment with one of the
+extreme variations; drifting, in each a random walk of the variation that begins at 0; onset, as
+constant, but only from a step on."""
+MODES: tuple[Mode, ...] = get_args(Mode)
 
 
 class ShiftSettings(DeviceSettings):
@@ -100,7 +104,7 @@ class ShiftSettings(DeviceSettings):
     """Axes or groups of axes, as in axes=[sun,fog]; null for all that the task has."""
     strengths: Annotated[tuple[int, ...], Several(Whole(1, 5), 1, 5)] = (1, 2, 3, 4, 5)
     """Strengths to test of the five of each axis, in rising order."""
-    modes: Annotated[tuple[str, ...], Several(OneOf(MODES), 1, 3)] = MODES
+    modes: Annotated[tuple[Mode, ...], Several(OneOf(MODES), 1, 3)] = MODES
     """Time course of a perturbation: constant, drifting, or from an onset."""
     domain: bool = True
     """Search for the widest range of each axis in which the policy stays good."""

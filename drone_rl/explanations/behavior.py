@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from drone_rl.explanations.context import Context
+from drone_rl.explanations.context import Context, needs, objects
 from drone_rl.explanations.results import Dataset, Flaws, Loop, Pair
 from drone_rl.explanations.rollouts import RolloutDataset
 from drone_rl.sim.actions import Actions
@@ -53,6 +53,7 @@ def dataset_section(context: Context) -> Dataset:
     )
 
 
+@needs(contradictions=objects)
 def flaws_section(context: Context) -> Flaws:
     """Find contradictions (Fig. 9) of the analysed frames, and loops of whole episodes."""
     data, flights, scenes = context.dataset, context.flights, context.scenes

@@ -10,7 +10,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from drone_rl.acceleration import with_fused_passes
-from drone_rl.explanations.context import Context, LeftOutError
+from drone_rl.explanations.context import Context, needs
 from drone_rl.explanations.results import BestModels, ClassModel, ImageStatistics
 from drone_rl.explanations.settings import ClassModelSettings
 from drone_rl.policies import ImageNetwork
@@ -24,10 +24,14 @@ NO_GRADIENTS = (
 AS_PROBABLE = 0.01  # of observations whose probabilities differ by less, the smoothest is the best
 
 
+def gradients(context: Context) -> str | None:
+    """Need gradients of the logits."""
+    return None if context.network.is_differentiable else NO_GRADIENTS
+
+
+@needs(gradients)
 def section(context: Context) -> ClassModel:
     """Search the best observation of each action, by probability and by logit."""
-    if not context.network.is_differentiable:
-        raise LeftOutError(NO_GRADIENTS)
     statistics = image_statistics(context.dataset.tensor("observations"))
     network = copy.deepcopy(context.network)  # it accumulates gradients
 

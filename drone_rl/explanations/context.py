@@ -3,8 +3,8 @@
 import copy
 import dataclasses
 import functools
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 from tensordict.nn import TensorDictModuleBase
@@ -14,7 +14,7 @@ from drone_rl.envs import base_env
 from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.hooks import feature_layer, features
 from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frames, select_frames
-from drone_rl.explanations.scenes import Scenes
+from drone_rl.explanations.scenes import Scenes, has_objects
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import ImageNetwork, make_actor
 from drone_rl.trust.results import Proof
@@ -25,8 +25,13 @@ from drone_rl.utils.seeding import RootSeed, Stream, torch_generator, with_seed
 FILMED = 0  # the episode shown as a film: always the first
 
 
+Need = Callable[["Context"], str | None]
+"""Returns why a policy or its task lacks something, as a sentence; None if it has it."""
+Declared = TypeVar("Declared", bound=Callable[..., Any])
+
+
 class LeftOutError(Exception):
-    """A section can't be computed for this policy; the message says why and what to do."""
+    """A section turns out to be impossible while it is computed; the message says why."""
 
 
 class Context:
@@ -108,3 +113,30 @@ class Context:
         most = min(FILM_STEPS, FILM_BYTES // (3 * camera.height * camera.width))
         rows = np.flatnonzero(self.flights.episode == FILMED)[:most]
         return render_frames(self.flights, rows, self.scenes, self.network)
+
+
+def needs(*whole: Need, **parts: Need) -> Callable[[Declared], Declared]:
+    """Declare what a section needs of a policy and its task, or what its parts need, by name."""
+
+    def declare(section: Declared) -> Declared:
+        vars(section)["needs"] = (*((None, need) for need in whole), *parts.items())
+        return section
+
+    return declare
+
+
+def find_lacking(sections: Mapping[str, Any], context: Context) -> dict[str, str]:
+    """Return why sections, and parts of the others, will be left out, by name."""
+    lacking: dict[str, str] = {}
+    for title, section in sections.items():
+        for part, need in getattr(section, "needs", ()):
+            why = need(context)
+            if why and title not in lacking:
+                lacking[part or title] = why
+    return lacking
+
+
+def objects(context: Context) -> str | None:
+    """Need objects that can be removed and moved."""
+    task = context.scenes.task
+    return None if has_objects(task) else f"Task {task.name} has no objects that can be moved."

@@ -7,7 +7,7 @@ import openTSNE
 from numpy.typing import NDArray
 from sklearn.decomposition import PCA
 
-from drone_rl.explanations.context import Context, LeftOutError
+from drone_rl.explanations.context import Context, needs
 from drone_rl.explanations.results import Embedding, Faithfulness, Tsne
 from drone_rl.explanations.settings import check_perplexity
 from drone_rl.utils.errors import InputError
@@ -23,14 +23,20 @@ GAUSSIAN_DOF = 1e4
 FEW = 2000  # up to so many points, exact neighbours and Barnes-Hut on one thread are fastest
 
 
+def layers(context: Context) -> str | None:
+    """Need a layer with features."""
+    if context.layer is not None:
+        return None
+    return (
+        "t-SNE needs the features of a layer, and no layers of this policy are known; give it as a "
+        "torch module made of layers."
+    )
+
+
+@needs(layers)
 def section(context: Context) -> Tsne:
     """Embed the analysed frames by the policy's features, and by their pixels."""
     layer = context.layer
-    if layer is None:
-        raise LeftOutError(
-            "t-SNE needs the features of a layer, and no layers of this policy are known; give it "
-            "as a torch module made of layers."
-        )
     data, settings = context.dataset, context.settings
     originals = {"features": data.arrays[f"features/{layer}"], "pixels": data.observations}
     maps = {}
@@ -71,7 +77,8 @@ def embed(
         raise InputError("features hold a value that is not finite; the policy's weights are bad")
     centred = flat - flat.mean(0)
     pca = PCA(min(COMPONENTS, *flat.shape), svd_solver="full")  # not a random one
-    reduced = pca.fit_transform(flat)
+    with np.errstate(invalid="ignore"):  # equal points have no variance
+        reduced = pca.fit_transform(flat)
     few = len(flat) <= FEW
     model = openTSNE.TSNE(
         perplexity=perplexity,  # pyright: ignore[reportArgumentType] (takes fractions, too)

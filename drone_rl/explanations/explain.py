@@ -1,6 +1,8 @@
 """`drone-rl explain`: compute all sections, write them as files, and make one report."""
 
 import dataclasses
+import itertools
+import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
@@ -10,7 +12,7 @@ from typing import Any
 
 from drone_rl.config.configuration import from_arguments
 from drone_rl.explanations import attribution, behavior, class_models, embedding, response, truth
-from drone_rl.explanations.context import Context, LeftOutError
+from drone_rl.explanations.context import Context, LeftOutError, find_lacking
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.results import Explanation
 from drone_rl.explanations.settings import ExplainSettings
@@ -29,8 +31,10 @@ from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.schema import Whole
 from drone_rl.utils.seeding import RootSeed, with_seed
+from drone_rl.utils.text import listed
 from drone_rl.utils.threads import pool_like_caller, torch_threads
 
+_log = logging.getLogger(__name__)
 Given = str | Path | BasePolicy | Logits  # a policy or something that `as_policy` converts to one
 Section = Callable[[Context], Model | dict[str, Any] | None]
 """Returns the result of a section, None if there is nothing to show; runs at any time."""
@@ -112,6 +116,8 @@ def explain(
     by_name = _named(policies, outputs)
     progress = as_progress(progress)
     folder = new_run_folder("explain", outputs) if folder is None else as_path(folder, "folder")
+    sections = {**SECTIONS, **(more_sections or {})}
+    done, steps = itertools.count(), len(by_name) * len(sections) + 1
     folders = {n: folder / f"{i}_{to_file_name(n)}" for i, n in enumerate(by_name)}
 
     def explain_one(policy: BasePolicy, folder: Path) -> Explanation:
@@ -126,8 +132,8 @@ def explain(
                 folder,
                 name=policy.name,
                 provenance={"policy": policy.source, "trained": policy.trained, **provenance()},
-                progress=lambda title: progress(f"{policy.name}: {title}"),
-                sections={**SECTIONS, **(more_sections or {})},
+                progress=lambda title: progress(f"{policy.name}: {title}", next(done), steps),
+                sections=sections,
             )
 
     with torch_threads(1):  # same results for any number of cores; more would gain nothing
@@ -135,9 +141,9 @@ def explain(
     for name, one in by_name.items():
         if verdict := explained[name].verdict:
             record_verdict(folders[name], one, verdict)
-    progress("report")
+    progress("report", steps - 1, steps)
     report = write_report(list(folders.values()), folder)
-    progress("explained", 1, 1)
+    progress("explained", steps, steps)
     return Explanations(folder, report, explained, seed)
 
 
@@ -169,15 +175,20 @@ def explain_policy(
     their order changes no result. `progress` is called with the title of each.
 
     Returns:
-        The results, also in `explanation.json`; "left_out" gives the reason for each section that
-        can't be computed for this policy.
+        The results, also in `explanation.json`; "left_out" gives the reason for each section, or
+        part of one, that this policy or its task does not allow. It is logged before any section
+        is computed.
 
     Raises:
         InputError: The folder can't be written.
     """
     sections = SECTIONS if sections is None else sections
     results: dict[str, Any] = {}
-    left_out: dict[str, str] = {}
+    left_out = find_lacking(sections, context)
+    for why in dict.fromkeys(left_out.values()):
+        missing = listed([part for part, reason in left_out.items() if reason == why])
+        _log.warning("policy %s is explained without %s: %s", name, missing, why)
+    sections = {title: one for title, one in sections.items() if title not in left_out}
     seconds: dict[str, float] = {}
     for title, (result, duration) in _run(sections, context, progress).items():
         if isinstance(result, LeftOutError):

@@ -7,7 +7,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.explanations.context import Context
+from drone_rl.explanations.context import Context, needs, objects
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.results import (
     Asymmetry,
@@ -30,6 +30,7 @@ SHOWN = 3  # frames that differ most from their mirror images
 _RESPONSE, _OUTCOME = 0, 1  # numbers of the maps' grids
 
 
+@needs(objects)
 def section(context: Context) -> Response:
     """Evaluate the policy with one target at many places."""
     scenes, network, seed = context.scenes, context.network, context.seed.value

@@ -256,7 +256,7 @@ class Truth(MapTests):
     """Tests of the heat maps, and effects of changes to the scene."""
 
     interventions: dict[str, Mean]
-    """Effect of each change on the action probabilities."""
+    """Effect of each change on the action probabilities; none if nothing can be changed."""
     outcomes: Outcomes | None
     """None if no frame has a next target."""
     shown_frame: int
@@ -388,12 +388,6 @@ class ExactMap(ActionShares):
     outlines: Outlines
 
 
-class NoMap(Model):
-    """Why there is no exact map."""
-
-    refused: str
-
-
 class Mirrored(Model):
     """A frame, and how far the policy differs from its mirror image there."""
 
@@ -433,7 +427,7 @@ class Explanation(Seeded):
     """Vocabulary of the task."""
     provenance: dict[str, Any]
     left_out: dict[str, str] = Field({})
-    """Why sections could not be computed."""
+    """Why sections, or parts of them, are left out."""
     verdict: Verdict | None = None
     shifts: SavedShifts | None = None
     dataset: Dataset | None = None
@@ -443,7 +437,7 @@ class Explanation(Seeded):
     attribution: Attribution | None = None
     truth: Truth | None = None
     response: Response | None = None
-    places: ExactMap | NoMap | None = None
+    places: ExactMap | None = None
     asymmetry: Asymmetry | None = None
     data: dict[str, Array] = Field({}, exclude=True)
     """Arrays of `dataset.npz`, with the analysed frames."""

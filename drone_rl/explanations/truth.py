@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.explanations import trust
-from drone_rl.explanations.context import Context
+from drone_rl.explanations.context import Context, needs, objects
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.results import Outcomes, Truth
 from drone_rl.explanations.rollouts import Step, run_from, spread_frames
-from drone_rl.explanations.scenes import DARK_GROUND, Region, Scenes
+from drone_rl.explanations.scenes import DARK_GROUND, Region, Scenes, has_objects
 from drone_rl.policies import ImageNetwork
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
@@ -20,23 +20,26 @@ from drone_rl.sim.tasks import State
 from drone_rl.utils.intervals import mean_interval
 
 
+@needs(interventions=objects)
 def section(context: Context) -> Truth:
     """Test the heat maps, none if the weights are unknown; measure effects of changes."""
     data, scenes, network = context.dataset, context.scenes, context.network
     episode, seed = data.episode, context.seed.value
     state = data.state(scenes.worlds)
     trial = trust.make_trial(context)
-    changes = intervene(scenes, network, state, data.tensor("regions"), seed=seed)
-    shown_frame = clear_frame(changes[0])
+    changes, outcomes = [], None
+    if has_objects(scenes.task):
+        changes = intervene(scenes, network, state, data.tensor("regions"), seed=seed)
+        outcomes = measure_outcomes(scenes, network, state, episode)
+    shown_frame = clear_frame(changes[0]) if changes else 0
     methods = trust.method_maps(context.explainer) if network.has_weights else {}
-    outcomes = measure_outcomes(scenes, network, state, episode)
     effects = trial.effects if len(trial.effects) else np.zeros((1, trial.grid.count))
     return Truth(
         **vars(trust.check_maps(trial, methods)),
         interventions={c.name: mean_interval(c.effect, episode) for c in changes},
-        outcomes=outcomes if outcomes.flights else None,
+        outcomes=outcomes if outcomes and outcomes.flights else None,
         shown_frame=shown_frame,
-        changed=np.stack([c.frames[shown_frame].cpu().numpy() for c in changes]),
+        changed=np.array([c.frames[shown_frame].cpu().numpy() for c in changes]),
         patch_effects=effects.mean(0).reshape(trial.grid.rows, trial.grid.columns),
     )
 

@@ -43,6 +43,8 @@ from drone_rl.utils.run_result import NAME, Cloning, RunResult
 from drone_rl.utils.schema import shown
 
 _log = logging.getLogger(__name__)
+_EPISODES_PER_CONFIRMED = 10
+"""Episodes of training for each of a confirmation, where no running reward calls for one."""
 MAY_CHANGE = (
     "trainer.total_frames",
     "trainer.total_episodes",
@@ -243,19 +245,34 @@ def possible_ends(settings: TrainSettings) -> list[enum.IntEnum]:
 
 
 def target_of(settings: TrainSettings) -> float | None:
-    """Return the running reward at which a run is solved, if any.
+    """Return the running reward at which a run is solved; None if none is known or wanted.
 
     Raises:
         InputError: It is a fraction of a largest reward that is not above 0 and finite, as are all
             figures.
     """
     share, largest = settings.trainer.target_share, as_task(settings.task).largest_reward
+    if largest is None:
+        return None
     if not 0 < largest < math.inf:
         raise InputError(
             f"task={settings.task.name} has largest_reward={largest:g}, of which no fraction is a "
             "target; give a finite one above 0, as by a reward for success"
         )
     return share and share * largest
+
+
+def confirm_interval_of(settings: TrainSettings) -> int | None:
+    """Return the updates between confirmations in a task whose largest reward is unknown.
+
+    Confirmations are then a tenth of all episodes. None if they follow the target, or for none.
+    """
+    trainer = settings.trainer
+    is_known = as_task(settings.task).largest_reward is not None
+    if is_known or trainer.target_share is None or not trainer.confirm_episodes:
+        return None
+    episodes = _EPISODES_PER_CONFIRMED * trainer.confirm_episodes
+    return math.ceil(episodes / settings.collector.num_envs)
 
 
 def result_of(

@@ -122,7 +122,7 @@ def learn(
         if confirmation is not None:
             stack.callback(confirmation.close)
         checkpoints = run.checkpoints(settings)
-        collapse = CollapseCheck(target or as_task(settings.task).largest_reward)
+        collapse = CollapseCheck(target or as_task(settings.task).largest_reward or 0.0)
         first = (CsvCallback(folder / "metrics.csv"), checkpoints, collapse)
         trainer = Trainer(
             collector=parts.collector,
@@ -132,6 +132,7 @@ def learn(
             stream=stream if modules_of(settings) else None,
             target=target,
             confirm=confirmation,
+            confirm_interval=run_folder.confirm_interval_of(settings),
             total_frames=limits.total_frames,
             total_episodes=limits.total_episodes,
             running_decay=limits.running_decay,

@@ -8,10 +8,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from drone_rl.config.commands import MODES
 from drone_rl.trust.axes_table import NAMES
 from drone_rl.trust.plots.images import enlarge, gridded, stacked, titled
 from drone_rl.trust.plots.saving import new_chart
-from drone_rl.trust.shifts_results import MODES, ModeFigures, Robustness, number
+from drone_rl.trust.shifts_results import ModeFigures, Robustness, number
 from drone_rl.utils.palette import BAD, FAINT, GOOD, INK, MUTED, PAPER, css
 from drone_rl.utils.text import percent
 

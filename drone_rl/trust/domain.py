@@ -10,25 +10,24 @@ finds failures in a fraction of the range, or of the combinations, that `good_sh
 smaller ones are allowed.
 """
 
-import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+import functools
+from collections.abc import Callable, Mapping
 from contextlib import closing
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from drone_rl.collectors.complete_episodes import CompleteEpisodes
-from drone_rl.policies.baselines import OracleAgent, has_visible_oracle
 from drone_rl.sim.tasks import as_task
 from drone_rl.trust.axes import Axis
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
 from drone_rl.trust.perturbations import Condition
-from drone_rl.trust.rule import Quantity, Rule, VerdictKind, kinds_within
-from drone_rl.trust.shifts_results import FailedEnd, Probe, Range, RangeTest, Side, TestedStrength
+from drone_rl.trust.rule import Quantity, Rule, VerdictKind
+from drone_rl.trust.shifts_results import FailedEnd, Probe, Range, RangeTest, Side
 from drone_rl.trust.suite import finite
-from drone_rl.trust.verdict import measure
+from drone_rl.trust.verdict import kinds_of, measure
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.intervals import proportion
+from drone_rl.utils.intervals import proportion, rate_of
 
 PARTS = 4
 """Equal parts of the gap at the end of a range; the strengths between them are tested."""
@@ -80,21 +79,20 @@ def required_success(oracle: CompleteEpisodes | None, good_share: float) -> floa
     """Return the success rate that a good policy exceeds, given a usable oracle's episodes."""
     if oracle is None:
         return good_share
-    return good_share * proportion(int(oracle.success.sum()), len(oracle)).upper95
+    return good_share * rate_of(oracle.success).upper95
 
 
-@dataclasses.dataclass
-class End:
-    """One end of a range."""
+class End(NamedTuple):
+    """One end of a range, as strengths; None where there is none."""
 
     limit: float
-    """The last strength at which the policy is certainly good."""
-    failed: float | None = None
-    """The first tested strength at which it is not; None if there is none."""
-    bad: float | None = None
-    """The first at which it is certainly not; None if there is none."""
-    tested: dict[float, Probe] = dataclasses.field(default_factory=dict)
-    """By tested strength, what was found."""
+    """The last one at which the policy is certainly good."""
+    failed: tuple[float, Probe] | None
+    """The first tested one at which it is not, and what was found."""
+    bad: float | None
+    """The first one at which it is certainly not."""
+    is_open: bool | None
+    """Whether none failed; None if the axis has none on this side."""
 
 
 def walk(axis: Axis, sign: int, probe: Callable[[float], Probe]) -> End:
@@ -102,60 +100,61 @@ def walk(axis: Axis, sign: int, probe: Callable[[float], Probe]) -> End:
 
     `sign` is 1 to search above the neutral strength, -1 below it. `probe` tests a strength.
     """
-    end = End(axis.neutral)
+    limit, failed, bad = axis.neutral, None, None
     side = [strength for strength in axis.strengths if sign * axis.position(strength) > 0]
     for strength in sorted(side, key=lambda strength: abs(axis.position(strength))):
-        found = end.tested[strength] = probe(strength)
-        if end.failed is None and found.good:
-            end.limit = strength
+        found = probe(strength)
+        if failed is None and found.good:
+            limit = strength
             continue
-        end.failed = strength if end.failed is None else end.failed
+        failed = failed or (strength, found)
         if found.bad:
-            end.bad = strength
+            bad = strength
             break
-    if end.failed is None:
-        return end
-    parts = (axis.between(end.limit, end.failed, part / PARTS) for part in range(1, PARTS))
+    if failed is None:
+        return End(limit, failed, bad, True if side else None)
+    parts = (axis.between(limit, failed[0], part / PARTS) for part in range(1, PARTS))
     for strength in dict.fromkeys(part for part in parts if part is not None):
-        found = end.tested[strength] = probe(strength)
+        found = probe(strength)
         if not found.good:
-            end.bad = strength if found.bad else end.bad
+            bad = strength if found.bad else bad
             break
-        end.limit = strength
-    return end
+        limit = strength
+    return End(limit, failed, bad, False)
 
 
-def range_of(
+def find_range(
     axis: Axis,
-    ends: Mapping[str, End],
-    failed: Sequence[FailedEnd],
     of: Any,
-    test: RangeTest | None = None,
+    probe: Callable[[float], Probe],
+    explain: Callable[[str, float, Probe], FailedEnd],
+    test: Callable[[Mapping[Axis, Span]], RangeTest],
 ) -> Range:
-    """Return the result of `Prober.search` from the two ends by name."""
+    """Find the widest range of an axis and test it as a whole.
+
+    Args:
+        axis: The axis.
+        of: The policy.
+        probe: Tests a strength.
+        explain: Returns the failure at an end: "low" or "high", the strength, what was found.
+        test: Tests a range, see `run_across`.
+    """
 
     def value(strength: float | None) -> float | None:
         return None if strength is None else finite(axis.value(strength, of))
 
-    tested = sorted(
-        (axis.position(strength), value(strength), probe.good)
-        for end in ends.values()
-        for strength, probe in end.tested.items()
-    )
-    return Range(
-        **{name: value(end.limit) for name, end in ends.items()},
-        **{f"{n}_open": e.failed is None if e.tested else None for n, e in ends.items()},
-        **{f"{name}_bad": value(end.bad) for name, end in ends.items()},
-        positions=_span(axis, ends),
-        failed=tuple(failed),
-        flown=tuple(TestedStrength(position=p, value=v, good=g) for p, v, g in tested),
-        test=test,
-    )
-
-
-def _span(axis: Axis, ends: Mapping[str, End]) -> Span:
+    ends = {name: walk(axis, sign, probe) for name, sign in axis.signs.items()}
+    found: dict[str, Any] = {}
+    for name, end in ends.items():
+        found |= {name: value(end.limit), f"{name}_bad": value(end.bad)}
+        found[f"{name}_open"] = end.is_open
     low, high = sorted(axis.position(end.limit) for end in ends.values())
-    return low, high
+    return Range(
+        **found,
+        positions=(low, high),
+        failed=tuple(explain(name, *end.failed) for name, end in ends.items() if end.failed),
+        test=test({axis: (low, high)}) if low < high else None,
+    )
 
 
 class Prober:
@@ -197,10 +196,10 @@ class Prober:
         rule, baselines = self._rule, self._baselines[key]
         if self._oracle is not None:
             baselines = {**baselines, "oracle": self._oracle}
-        quantities = dict(zip(rule.quantities, measure(greedy, baselines, rule), strict=True))
+        quantities = measure(greedy, baselines, rule)
         return Probe(
             good=is_surely_good(quantities, rule),
-            bad=VerdictKind.GOOD not in _kinds(quantities, rule),
+            bad=VerdictKind.GOOD not in kinds_of(quantities, rule),
             success=float(greedy.success.mean()),
             worst=_worst(quantities, rule),
         )
@@ -210,51 +209,35 @@ class Prober:
         if not self.plain.good:
             return Range()
         subject = self._evaluator.subject
-
-        def probe(strength: float) -> Probe:
-            return self.probe(axis.make(strength, subject))
-
-        ends = {name: walk(axis, sign, probe) for name, sign in axis.signs.items()}
-        failed = [
-            self._explain(axis, name, end.failed, end.tested[end.failed])
-            for name, end in ends.items()
-            if end.failed is not None
-        ]
-        low, high = _span(axis, ends)
-        return range_of(
-            axis, ends, failed, subject, test({axis: (low, high)}) if low < high else None
+        return find_range(
+            axis,
+            subject,
+            lambda strength: self.probe(axis.make(strength, subject)),
+            functools.partial(self._explain, axis),
+            test,
         )
 
     def _explain(self, axis: Axis, end: Any, strength: float, probed: Probe) -> FailedEnd:
-        value = finite(axis.value(strength, self._evaluator.subject))
-        failed = FailedEnd(**dict(probed), end=end, value=value)
-        task = as_task(self._evaluator.subject.task)
-        if probed.refused is not None or not has_visible_oracle(task):
+        subject = self._evaluator.subject
+        failed = FailedEnd(**dict(probed), end=end, value=finite(axis.value(strength, subject)))
+        if probed.refused is not None:
             return failed
-        condition = axis.make(strength, self._evaluator.subject)
-        seeing = OracleAgent(only_visible=True)
-        success = self._evaluator.run(condition, agent=seeing).episodes.success
-        seen = proportion(int(success.sum()), len(success))
-        return failed.replace(oracle=seen, impossible=seen.upper95 < self._possible)
+        seen = self._evaluator.rate_of_oracle(axis.make(strength, subject))
+        is_impossible = seen is not None and seen.upper95 < self._possible
+        return failed.replace(oracle=seen, impossible=is_impossible)
 
 
 def is_surely_good(quantities: Mapping[str, Quantity], rule: Rule) -> bool:
     """Return whether the verdict is certainly good and certainly above all baselines."""
     sees = all(quantities[f"above {name}"].levels[0] > 0 for name in rule.blind_baselines)
-    return sees and _kinds(quantities, rule) == {VerdictKind.GOOD}
-
-
-def _kinds(quantities: Mapping[str, Quantity], rule: Rule) -> frozenset[VerdictKind]:
-    """Return all kinds that the intervals admit."""
-    box = tuple(quantity.levels for quantity in quantities.values())
-    return kinds_within(box, len(rule.strata))
+    return sees and kinds_of(quantities, rule) == {VerdictKind.GOOD}
 
 
 def _worst(quantities: Mapping[str, Quantity], rule: Rule) -> Side | None:
     """Return the stratum with the smallest fraction of goals reached, None if unknown."""
-    shares = {s: quantities[f"collected {s}"].value for s in rule.strata}
-    rates = {stratum: share for stratum, share in shares.items() if share is not None}
-    if not rates:
+    shares = ((quantities[f"collected {name}"].value, name) for name in rule.strata)
+    known = [(share, name) for share, name in shares if share is not None]
+    if not known:
         return None
-    side = min(rates, key=lambda stratum: rates[stratum])
-    return Side(side=side, share=rates[side])
+    share, side = min(known, key=lambda one: one[0])
+    return Side(side=side, share=share)

@@ -7,7 +7,7 @@ import torch
 
 from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.trust.results import Failure, Failures, Figures, GoalShare
-from drone_rl.utils.intervals import mean_bounds, proportion
+from drone_rl.utils.intervals import mean_bounds, proportion, rate_of
 
 
 def summarise(episodes: CompleteEpisodes) -> Figures:
@@ -22,13 +22,13 @@ def summarise(episodes: CompleteEpisodes) -> Figures:
         for name, (share, count) in values.items()
     }
     ends = {
-        reason.name.lower(): proportion(int((episodes.end_reason == reason).sum()), len(episodes))
+        reason.name.lower(): rate_of(episodes.end_reason == reason)
         for reason in task.ends
         if reason != 0
     }
     return Figures(
         episodes=len(episodes),
-        success=proportion(int(episodes.success.sum()), len(episodes)),
+        success=rate_of(episodes.success),
         shares=shares,
         never_reached=mean_bounds((goals.stratum < 0).double().mean(-1)),
         ends=ends,
@@ -65,7 +65,7 @@ def failure_table(episodes: CompleteEpisodes) -> Failures:
     hit = [row for row in rows if row.failed]
     telling = [row for row in hit if (row.by, row.value) != ("end", expected)]
     largest = max(telling or hit, key=lambda row: row.failed * row.lower95, default=None)
-    bound = proportion(int(failed.sum()), len(episodes))
+    bound = rate_of(failed)
     return Failures(rows=tuple(rows), largest=largest, expected_end=expected, bound=bound)
 
 

@@ -19,10 +19,16 @@ from drone_rl.config import (
     CameraSettings,
     DynamicsSettings,
 )
+from drone_rl.config.commands import Mode
 from drone_rl.envs import Observer, base_env, worlds_of
 from drone_rl.envs.rollout import Agent, DelayedAgent, steps
 from drone_rl.policies import ImageNetwork, greedy_agent
-from drone_rl.policies.baselines import OracleAgent, baseline_names, make_baseline
+from drone_rl.policies.baselines import (
+    OracleAgent,
+    baseline_names,
+    has_visible_oracle,
+    make_baseline,
+)
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.dynamics import draw_seeds, make_dynamics
 from drone_rl.sim.rendering import Appearance
@@ -33,7 +39,6 @@ from drone_rl.trust.baselines import reference
 from drone_rl.trust.perturbations import (
     ONSET_STEP,
     Condition,
-    PerturbationMode,
     clutter,
     make_faults,
     sample_distractors,
@@ -42,6 +47,7 @@ from drone_rl.trust.perturbations import (
     variations,
 )
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.intervals import Share, rate_of
 from drone_rl.utils.seeding import Stream, torch_generator, world_random_state
 from drone_rl.utils.settings import prefixed_errors
 
@@ -123,6 +129,7 @@ class PairedEvaluator:
     def sample(self, seed: int) -> None:
         """Sample other initial states."""
         self.seed, count = seed, self.episodes
+        self._oracle: Share | None = None
         streams = [world_random_state(seed, i, Stream.SHIFTED) for i in range(count)]
         self.appearances.reset(torch.arange(count), streams)
         self._drawn = torch.stack([self._task.sample(stream) for stream in streams])
@@ -163,7 +170,7 @@ class PairedEvaluator:
     def run(
         self,
         condition: Condition,
-        mode: PerturbationMode = PerturbationMode.CONSTANT,
+        mode: Mode = "constant",
         agent: Agent | None = None,
         num_steps: int | None = None,
     ) -> ConditionResult:
@@ -174,7 +181,7 @@ class PairedEvaluator:
         agent = agent or greedy_agent(self.subject.network)
         delayed, observer = DelayedAgent(agent), None
         stages = [(condition, num_steps)]
-        if mode is PerturbationMode.ONSET:
+        if mode == "onset":
             stages.insert(0, (Condition(), ONSET_STEP))
         state = self.worlds(stages[0][0]).start(self._drawn, self._seeds)
         rows = torch.arange(len(state), device=state.end_reason.device)
@@ -201,7 +208,7 @@ class PairedEvaluator:
         return ConditionResult(episodes, trace.cpu())
 
     def _observer(
-        self, condition: Condition, mode: PerturbationMode, agent: Agent, earlier: Observer | None
+        self, condition: Condition, mode: Mode, agent: Agent, earlier: Observer | None
     ) -> Observer:
         """Return what observes the environments under a condition; memory goes on from `earlier`.
 
@@ -244,6 +251,22 @@ class PairedEvaluator:
             agent = make_baseline(name, worlds.task, actions, generator)
             episodes[name] = self.run(condition, agent=agent).episodes
         return episodes
+
+    def rate_of_oracle(self, condition: Condition) -> Share | None:
+        """Return the success rate of the oracle that knows only visible cubes; None without one.
+
+        Light, colors and faults that hide nothing do not affect it.
+        """
+        if not has_visible_oracle(self._task):
+            return None
+        faults = tuple(fault for fault in condition.faults if fault.hides)
+        kept = dataclasses.replace(condition, appearance_changes=(), faults=faults)
+        if kept != Condition() or self._oracle is None:
+            success = self.run(kept, agent=OracleAgent(only_visible=True)).episodes.success
+            if kept != Condition():
+                return rate_of(success)
+            self._oracle = rate_of(success)
+        return self._oracle
 
     def run_oracle(self) -> CompleteEpisodes | None:
         """Return the oracle's episodes without perturbation; None without a usable oracle."""

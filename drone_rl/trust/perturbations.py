@@ -1,7 +1,6 @@
 """Perturbations of the robustness evaluation: task, camera, appearance, faults and delays."""
 
 import dataclasses
-import enum
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Self
@@ -10,6 +9,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import BaseTaskSettings
+from drone_rl.config.commands import Mode
 from drone_rl.config.task import ObjectRegion
 from drone_rl.envs import fault_models
 from drone_rl.envs.fault_models import FaultModel, Sample
@@ -31,17 +31,6 @@ MAX_DISTRACTORS = 16
 _BLUE = (0.2, 0.4, 1.0)
 _AWAY = (2.0, 10.0)
 """Distance of distractors from the area of the task, metres, from and to."""
-
-
-class PerturbationMode(enum.StrEnum):
-    """When a perturbation is active."""
-
-    CONSTANT = "constant"
-    """From start to end, in each environment with one of the extreme variations."""
-    DRIFTING = "drifting"
-    """In each environment a random walk of the variation that begins at 0."""
-    ONSET = "onset"
-    """As constant, but only from `ONSET_STEP` on."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,14 +81,14 @@ class Condition:
 
 
 def variations(
-    mode: PerturbationMode, dimensions: Sequence[int], num_envs: int, generator: torch.Generator
+    mode: Mode, dimensions: Sequence[int], num_envs: int, generator: torch.Generator
 ) -> Iterator[list[Tensor]]:
     """Yield the variations of each step, without end, of all environments, active or not.
 
     `dimensions` are those of each part of the condition; one tensor per part is yielded. Shapes:
     (num_envs, dimensions), float64.
     """
-    shape, is_drifting = (num_envs, sum(dimensions)), mode is PerturbationMode.DRIFTING
+    shape, is_drifting = (num_envs, sum(dimensions)), mode == "drifting"
     variation = torch.rand(shape, generator=generator, dtype=torch.float64).round() * 2 - 1
     variation = torch.zeros_like(variation) if is_drifting else variation
     while True:

@@ -121,19 +121,11 @@ def exchange_images(
     strata = {}
     confidence = 1.0 - 0.05 / len(greedy.task.strata)
     for i, name in enumerate(greedy.task.strata):
-        both = greedy.offered(i) & exchanged.offered(i)
-        shares = [_share(episodes, i)[both] for episodes in (greedy, exchanged)]
-        strata[name] = mean_bounds(shares[0] - shares[1], -1.0, 1.0, confidence)
+        difference = greedy.stratum_share(i) - exchanged.stratum_share(i)
+        strata[name] = mean_bounds(difference, -1.0, 1.0, confidence)
     success = mean_bounds(greedy.success - exchanged.success, -1.0, 1.0)
     rates = [float(of.success.mean()) for of in (greedy, exchanged)]
     return CameraUse(own=rates[0], exchanged=rates[1], success=success, strata=strata)
-
-
-def _share(episodes: CompleteEpisodes, stratum: int) -> Tensor:
-    """Return the fraction of a stratum's goals reached, NaN without any. Shape: (n,), float64."""
-    share = torch.full((len(episodes),), torch.nan, dtype=torch.float64)
-    share[episodes.offered(stratum)] = episodes.stratum_share(stratum)
-    return share
 
 
 def require_repeatable(

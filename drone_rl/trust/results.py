@@ -226,8 +226,6 @@ class Verdict(Seeded):
     """Of episodes with sampled actions."""
     baselines: dict[str, Figures]
     """Of the task's random and constant baselines, and of the oracle if there is one."""
-    skill: dict[str, Mean] = {}
-    """By baseline, the difference of the fractions of goals reached, paired."""
     drawing: Mean | None = None
     """Difference of the success rates of sampled and most probable actions, paired."""
     failures: Failures

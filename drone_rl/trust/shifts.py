@@ -22,7 +22,6 @@ from drone_rl.trust.axes import Axis, check_axes, find_axes
 from drone_rl.trust.charts import chart, strips
 from drone_rl.trust.domain import Prober, required_success, run_across
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
-from drone_rl.trust.perturbations import PerturbationMode
 from drone_rl.trust.repetition import require_repeatable
 from drone_rl.trust.shifts_results import Domain, NetworkIdentity, Range, Robustness, packed
 from drone_rl.trust.suite import Suite, make_strip
@@ -104,9 +103,7 @@ def shifts(
         progress(text, next(done), total)
 
     with closing(PairedEvaluator(subject, settings.episodes, seed.value)) as evaluator:
-        suite = Suite(
-            evaluator, [PerturbationMode(mode) for mode in settings.modes], settings.possible_share
-        )
+        suite = Suite(evaluator, settings.modes, settings.possible_share)
         measured = suite.run(axes, settings.strengths, report)
     domain = _domain(subject, axes, settings, seed, report) if settings.domain else None
     with closing(PairedEvaluator(subject, 1, seed.value)) as filmed:

@@ -10,12 +10,12 @@ import numpy as np
 import pydantic
 from numpy.typing import NDArray
 
-from drone_rl.config.commands import ShiftSettings
+from drone_rl.config.commands import Mode, ShiftSettings
 from drone_rl.config.transforms import Fault
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.trust.axes_table import NAMES, TABLE
 from drone_rl.trust.findings import Finding
-from drone_rl.trust.results import Difference, Verdict
+from drone_rl.trust.results import Difference, GoalShare, Verdict
 from drone_rl.utils.display import Result
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import Mean, Share
@@ -24,9 +24,6 @@ from drone_rl.utils.provenance import Provenance
 from drone_rl.utils.text import at_most, listed, percent, render
 
 FORMAT_VERSION = 2
-Mode = Literal["constant", "drifting", "onset"]
-"""How a perturbation changes within an episode."""
-MODES: tuple[Mode, ...] = ("constant", "drifting", "onset")
 MAX_NAMED = 6
 """Largest number of axes that a sentence names."""
 
@@ -46,7 +43,7 @@ class ModeFigures(Stored):
     success: Share
     difference: Mean | None = None
     """Of success, from that without perturbation, paired."""
-    shares: dict[str, Mean] = {}
+    shares: dict[str, GoalShare] = {}
     """Mean fractions of goals reached: "all", and by stratum."""
     ends: dict[str, int] = {}
     """Number of episodes by the name of the end."""
@@ -142,14 +139,6 @@ class FailedEnd(Probe):
     """Whether the oracle's success rate is too low."""
 
 
-class TestedStrength(Stored):
-    """Whether a policy is certainly good at a strength."""
-
-    position: float
-    value: float | None
-    good: bool
-
-
 class RangeTest(Stored):
     """Episodes at strengths drawn uniformly and jointly from ranges, one each."""
 
@@ -194,8 +183,6 @@ class Range(Stored):
     perturbation."""
     failed: tuple[FailedEnd, ...] = ()
     """The strengths at which the sides end, lower values first."""
-    flown: tuple[TestedStrength, ...] = ()
-    """All tested strengths, lowest position first."""
 
     @property
     def possible_failures(self) -> list[FailedEnd]:

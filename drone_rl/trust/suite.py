@@ -1,7 +1,6 @@
 """Measure success rates along every axis, paired with those without perturbation."""
 
 import contextlib
-import dataclasses
 import functools
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -12,14 +11,15 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from drone_rl.config.commands import Mode
 from drone_rl.envs.rollout import Act, StepContext
-from drone_rl.policies.baselines import OracleAgent, has_visible_oracle
 from drone_rl.trust.axes import TOGETHER, Axis
+from drone_rl.trust.metrics import summarise
 from drone_rl.trust.paired_evaluation import ConditionResult, PairedEvaluator
-from drone_rl.trust.perturbations import Condition, PerturbationMode
+from drone_rl.trust.perturbations import Condition
 from drone_rl.trust.shifts_results import AlongAxis, ConditionFigures, Level, ModeFigures, Plain
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.intervals import Share, mean_bounds, proportion
+from drone_rl.utils.intervals import mean_bounds
 
 Report = Callable[[str], None]
 STEP = 8
@@ -30,7 +30,7 @@ class Suite:
     """Run a policy and the oracle under all conditions."""
 
     def __init__(
-        self, evaluator: PairedEvaluator, modes: Sequence[PerturbationMode], possible_share: float
+        self, evaluator: PairedEvaluator, modes: Sequence[Mode], possible_share: float
     ) -> None:
         """Run both without perturbation.
 
@@ -38,9 +38,6 @@ class Suite:
         """
         self._evaluator, self._modes, self._possible = evaluator, modes, possible_share
         self.plain = evaluator.run(Condition())
-        self._knows = has_visible_oracle(self.plain.episodes.task)
-        self.oracle: ConditionResult | None = None
-        self.oracle = self._fly_oracle(Condition()) if self._knows else None
 
     def run(self, axes: Sequence[Axis], numbers: Sequence[int], report: Report) -> dict[str, Any]:
         """Measure axes at the strengths with these numbers (from 1), alone and combined.
@@ -52,7 +49,9 @@ class Suite:
         report("all together")
         parts = (axis.make(axis.strengths[TOGETHER - 1], self._evaluator.subject) for axis in axes)
         together = functools.reduce(lambda a, b: a | b, parts, Condition())
-        plain = Plain(oracle=_success(self.oracle), **dict(self._figures(self.plain)))
+        plain = Plain(
+            oracle=self._evaluator.rate_of_oracle(Condition()), **dict(self._figures(self.plain))
+        )
         return {"plain": plain, "axes": by_axis, "together": self.level(together)}
 
     def along(self, axis: Axis, numbers: Sequence[int], report: Report) -> AlongAxis:
@@ -73,7 +72,7 @@ class Suite:
             group=axis.group,
             unit=axis.unit,
             neutral=finite(axis.value(axis.neutral, subject)),
-            areas={mode.value: success_area(levels, plain, mode) for mode in self._modes},
+            areas={mode: success_area(levels, plain, mode) for mode in self._modes},
             levels=tuple(levels),
         )
 
@@ -83,39 +82,24 @@ class Suite:
             self._evaluator.settings(condition)
         except InputError as error:
             return ConditionFigures(refused=str(error))
-        oracle = _success(self._fly_oracle(condition) if self._knows else None)
+        oracle = self._evaluator.rate_of_oracle(condition)
         drifts = sum(condition.dimensions) > 0
-        modes: Any = {
-            mode.value: self._figures(self._evaluator.run(condition, mode))
+        modes = {
+            mode: self._figures(self._evaluator.run(condition, mode))
             for mode in self._modes
-            if drifts or mode is not PerturbationMode.DRIFTING
+            if drifts or mode != "drifting"
         }
         impossible = None if oracle is None else oracle.upper95 < self._possible
         return ConditionFigures(oracle=oracle, impossible=impossible, modes=modes)
 
-    def _fly_oracle(self, condition: Condition) -> ConditionResult:
-        """Run the oracle; if a condition changes nothing that affects it, reuse the first run.
-
-        Light, colors and faults that hide nothing do not affect it.
-        """
-        faults = tuple(fault for fault in condition.faults if fault.hides)
-        kept = dataclasses.replace(condition, appearance_changes=(), faults=faults)
-        if kept == Condition() and self.oracle is not None:
-            return self.oracle
-        return self._evaluator.run(condition, agent=OracleAgent(only_visible=True))
-
     def _figures(self, result: ConditionResult) -> ModeFigures:
         episodes, plain = result.episodes, self.plain.episodes
-        task = episodes.task
-        shares = {"all": mean_bounds(episodes.share)}
-        for i, name in enumerate(task.strata):
-            shares[name] = mean_bounds(episodes.stratum_share(i))
-        ends = torch.bincount(episodes.end_reason, minlength=len(task.ends)).tolist()
+        figures = summarise(episodes)
         return ModeFigures(
-            success=proportion(int(episodes.success.sum()), len(episodes)),
+            success=figures.success,
             difference=mean_bounds(episodes.success - plain.success, -1.0, 1.0),
-            shares=shares,
-            ends={end.name.lower(): ends[end] for end in task.ends if end != 0},
+            shares=figures.shares,
+            ends={name: of.successes for name, of in figures.ends.items()},
             unchanged=torch.equal(result.trace, self.plain.trace)
             and torch.equal(episodes.length, plain.length),
         )
@@ -161,21 +145,14 @@ def area(positions: Sequence[float], shares: Sequence[float]) -> float:
     return float(np.trapezoid(shares, positions)) / width if width else float(shares[0])
 
 
-def success_area(levels: Iterable[Level], plain: float, mode: PerturbationMode) -> float | None:
+def success_area(levels: Iterable[Level], plain: float, mode: Mode) -> float | None:
     """Return the mean height of the curve of success rate against strength; None without levels."""
     points = [(0.0, plain)] + [
-        (level.position, level.modes[mode.value].success.share or 0.0)
+        (level.position, level.modes[mode].success.share or 0.0)
         for level in levels
-        if mode.value in level.modes
+        if mode in level.modes
     ]
     if len(points) == 1:
         return None
     positions, shares = zip(*sorted(points), strict=True)
     return area(positions, shares)
-
-
-def _success(result: ConditionResult | None) -> Share | None:
-    if result is None:
-        return None
-    success = result.episodes.success
-    return proportion(int(success.sum()), len(success))

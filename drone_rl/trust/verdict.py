@@ -27,7 +27,7 @@ from drone_rl.trust.repetition import exchange_images, repeat
 from drone_rl.trust.results import NEEDED_EPISODES, CameraUse, Proof, Repetition, Verdict
 from drone_rl.trust.rule import USABLE, Quantity, Rule, VerdictKind, decide, kinds_within
 from drone_rl.utils.exit_codes import NOT_CERTAIN
-from drone_rl.utils.intervals import mean_bounds, proportion
+from drone_rl.utils.intervals import mean_bounds, proportion, rate_of
 from drone_rl.utils.progress import Progress
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed
 
@@ -169,9 +169,9 @@ def apply_rule(
         if not torch.equal(other.goals.world, greedy.goals.world):
             raise ValueError("policy and baselines have different initial states; use the same")
     quantities = measure(greedy, baselines, rule)
-    kind = decide([quantity.level for quantity in quantities], len(rule.strata))
-    is_enough = _is_certain(quantities, rule) and _is_oracle_clear(baselines, rule)
-    certain = is_enough and (repetition is None or repetition.is_enough)
+    kind = decide([quantity.level for quantity in quantities.values()], len(rule.strata))
+    certain = len(kinds_of(quantities, rule)) == 1 and _is_oracle_clear(baselines, rule)
+    certain &= repetition is None or repetition.is_enough
     if kind is VerdictKind.GOOD and camera is not None:
         certain &= camera.is_used is not None
         kind = VerdictKind.TRIVIAL if camera.is_used is False else kind
@@ -191,14 +191,11 @@ def apply_rule(
         greedy=summarise(greedy),
         sampled=None if sampled is None else summarise(sampled),
         baselines={name: summarise(of) for name, of in baselines.items()},
-        skill={
-            name: mean_bounds(greedy.share - of.share, -1.0, 1.0) for name, of in baselines.items()
-        },
         drawing=None
         if sampled is None
         else mean_bounds(sampled.success - greedy.success, -1.0, 1.0),
         failures=failure_table(greedy),
-        quantities=dict(zip(rule.quantities, quantities, strict=True)),
+        quantities=quantities,
         enough=_enough(greedy, baselines, rule),
         unlike=dict(unlike or {}),
     )
@@ -218,31 +215,27 @@ def _unless_contradicted(claim: Proof | None, greedy: CompleteEpisodes) -> Proof
 
 def measure(
     greedy: CompleteEpisodes, baselines: Mapping[str, CompleteEpisodes], rule: Rule, times: int = 1
-) -> tuple[Quantity, ...]:
+) -> dict[str, Quantity]:
     """Return the rule's quantities with simultaneous confidence intervals.
 
     Every episode counts `times` times, to extrapolate to more episodes.
     """
     observed = observe(greedy, baselines, rule)
-    return tuple(estimate(i, np.tile(values, times), rule) for i, values in enumerate(observed))
+    measured = (estimate(i, np.tile(values, times), rule) for i, values in enumerate(observed))
+    return dict(zip(rule.quantities, measured, strict=True))
 
 
-def observe(
-    greedy: CompleteEpisodes, baselines: Mapping[str, CompleteEpisodes], rule: Rule
-) -> list[NDArray]:
-    """Return each episode's value of each of the rule's quantities, float64.
-
-    Shapes: (at most n,); those of "collected" are only of episodes that offered such a goal.
-    """
-    each = observe_each(greedy, baselines, rule)
-    return [values[~np.isnan(values)] for values in each]
+def kinds_of(quantities: Mapping[str, Quantity], rule: Rule) -> frozenset[VerdictKind]:
+    """Return all kinds that the intervals admit."""
+    box = tuple(quantity.levels for quantity in quantities.values())
+    return kinds_within(box, len(rule.strata))
 
 
 def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
     """Estimate the quantity of this index in a rule from its values, see `observe`."""
     name, thresholds = rule.quantities[quantity], rule.thresholds[quantity]
     if name.startswith("offered"):
-        of = proportion(int(values.sum()), len(values), rule.confidence)
+        of = rate_of(values, rule.confidence)
         value = of.share
     else:
         of = mean_bounds(values, *rule.ranges[quantity], rule.confidence)
@@ -250,33 +243,29 @@ def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
     return Quantity(value=value, lower=of.lower95, upper=of.upper95, thresholds=thresholds)
 
 
-def observe_each(
+def observe(
     greedy: CompleteEpisodes, baselines: Mapping[str, CompleteEpisodes], rule: Rule
 ) -> list[NDArray]:
-    """Return the values of `observe` for all episodes, NaN if undefined. Shapes: (n,), float64."""
+    """Return each episode's value of each of the rule's quantities.
+
+    Shapes: (n,), float64; NaN where an episode offered no such goal.
+    """
     every = torch.ones_like(greedy.success)
     success = share = solved = every
     if (oracle := reference(baselines)) is not None:
         success, share = oracle.success, oracle.share
         solved = torch.maximum(oracle.success, greedy.success)
-    observed = [greedy.success - rule.good_share * success]
-    offered = [greedy.offered(stratum) for stratum in range(len(rule.strata))]
-    observed += [there.double() for there in offered]
-    for stratum, there in enumerate(offered):
-        reached = torch.full_like(there, torch.nan, dtype=torch.float64)
-        reached[there] = greedy.stratum_share(stratum)
-        observed.append(reached)
-    for name in rule.blind_baselines:
-        blind = (1 - rule.poor_margin) * baselines[name].share
-        observed.append(greedy.share - blind - rule.poor_margin * share)
-    for name in rule.blind_baselines:
-        observed.append(rule.good_share * solved - baselines[name].success)
+    strata = range(len(rule.strata))
+    blind = [baselines[name] for name in rule.blind_baselines]
+    margin = rule.poor_margin
+    observed = [
+        greedy.success - rule.good_share * success,
+        *(greedy.offered(stratum).double() for stratum in strata),
+        *(greedy.stratum_share(stratum) for stratum in strata),
+        *(greedy.share - (1 - margin) * of.share - margin * share for of in blind),
+        *(rule.good_share * solved - of.success for of in blind),
+    ]
     return [values.numpy() for values in observed]
-
-
-def _is_certain(quantities: tuple[Quantity, ...], rule: Rule) -> bool:
-    box = tuple(quantity.levels for quantity in quantities)
-    return len(kinds_within(box, len(rule.strata))) == 1
 
 
 def _is_oracle_clear(baselines: Mapping[str, CompleteEpisodes], rule: Rule, times: int = 1) -> bool:
@@ -293,7 +282,7 @@ def _enough(
 ) -> int | None:
     """Return about how many episodes certainty needs; None if more than `MANY` covers."""
     for times in (1, *MANY):
-        quantities = measure(greedy, baselines, rule, times)
-        if _is_certain(quantities, rule) and _is_oracle_clear(baselines, rule, times):
+        kinds = kinds_of(measure(greedy, baselines, rule, times), rule)
+        if len(kinds) == 1 and _is_oracle_clear(baselines, rule, times):
             return max(NEEDED_EPISODES, times * len(greedy))
     return None

@@ -47,6 +47,12 @@ def proportion(successes: int, trials: int, confidence: float = 0.95) -> Share:
     return Share(share=share, lower95=lower, upper95=upper, successes=successes, trials=trials)
 
 
+def rate_of(events: ArrayLike, confidence: float = 0.95) -> Share:
+    """Return the rate of trials, (n,), that are 1 or true, with its exact interval."""
+    trials = np.asarray(events)
+    return proportion(int(trials.sum()), len(trials), confidence)
+
+
 def mean_bounds(
     values: ArrayLike, low: float = 0.0, high: float = 1.0, confidence: float = 0.95
 ) -> Mean:
@@ -59,16 +65,18 @@ def mean_bounds(
     order of the values irrelevant.
 
     Args:
-        values: Independent and identically distributed, each from `low` to `high`. Shape: (n,).
+        values: Independent and identically distributed, each from `low` to `high`; NaN is no value.
+            Shape: (n,).
         low: Least possible value.
         high: Greatest possible value.
         confidence: Coverage of the interval.
 
     Raises:
-        ValueError: A value is not finite or out of range.
+        ValueError: A value is out of range.
     """
     z = (np.asarray(values, np.float64).ravel() - low) / (high - low)
-    if not np.isfinite(z).all() or (z < -1e-9).any() or (z > 1 + 1e-9).any():
+    z = z[~np.isnan(z)]
+    if (z < -1e-9).any() or (z > 1 + 1e-9).any():
         raise ValueError(f"values must lie from {low} to {high}")
     if len(z) == 0:
         return Mean(mean=None, lower95=low, upper95=high, count=0)

@@ -1,7 +1,6 @@
 import pytest
 
-from drone_rl.config.commands import BODIES, MODES, BodiesSettings, ProvableSettings, ShiftSettings
-from drone_rl.trust.perturbations import PerturbationMode
+from drone_rl.config.commands import BODIES, BodiesSettings, ProvableSettings, ShiftSettings
 from drone_rl.utils.errors import InputError
 
 
@@ -24,11 +23,6 @@ def test_bodies_by_default():
 def test_values_of_bodies_out_of_bounds(told, message):
     with pytest.raises(InputError, match=message):
         BodiesSettings(**told)
-
-
-def test_modes_of_shifts():
-    assert [*MODES] == [mode.value for mode in PerturbationMode]
-    assert ShiftSettings().modes == MODES
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,9 @@ import pytest
 from matplotlib.figure import Figure
 
 from drone_rl.explanations import class_models, explain, response
+from drone_rl.explanations.context import LeftOutError
 from drone_rl.explanations.explain import SECTIONS
 from drone_rl.explanations.report import attribution
-from drone_rl.explanations.results import NoMap
 from drone_rl.trust.plots import saving
 from drone_rl.verification import places_section as places
 from drone_rl.verification.places_section import places_section
@@ -34,10 +34,13 @@ def quick() -> Iterator[None]:
 @contextlib.contextmanager
 def few_sections(*names: str) -> Iterator[None]:
     """Compute these sections alone; all of them take a minute."""
+
+    def no_map(context):
+        raise LeftOutError("The test needs none.")
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(explain, "SECTIONS", {name: SECTIONS[name] for name in names})
-        refused = NoMap(refused="the test needs none")
-        patch.setattr(places, "places_section", lambda context: refused)
+        patch.setattr(places, "places_section", no_map)
         yield
 
 

@@ -14,9 +14,13 @@ from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
 from drone_rl.explanations import explain as explaining
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.explain import Explanations, _named, explain_policy
+from drone_rl.explanations.report import write_report
 from drone_rl.explanations.results import Explanation
+from drone_rl.explanations.rollouts import collect
 from drone_rl.explanations.settings import ExplainSettings
-from drone_rl.policies import MLP
+from drone_rl.policies import MLP, make_actor
+from drone_rl.sim.entities import Cube
+from drone_rl.sim.tasks import EndReason, Task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import RootSeed
@@ -164,3 +168,45 @@ def test_all_sections_work_with_another_task(posts, tmp_path):
     assert numbers.verdict.num_cubes == NUM_POSTS
     assert [row.side for row in numbers.response.rows] == ["left", "right"]
     assert numbers.truth.outcomes.collected.keys() == {"as it was", "moved left", "moved right"}
+
+
+class FlyLeft(Task):
+    """Get a metre to the left within six steps, past a box; nothing else is defined."""
+
+    name = "fly_left"
+
+    def make_props(self):
+        return [Cube(1.0, (0.1, 0.1, 0.6), name="box")]
+
+    def places(self, state):
+        return state.sampled[:, None]
+
+    def sample(self, random_state):
+        return torch.tensor([4.0, random_state.uniform(-2.0, 2.0), 1.0], dtype=torch.float64)
+
+    def step(self, state, body):
+        end = torch.where(body.position[:, 1] >= 1.0, EndReason.SUCCESS, EndReason.RUNNING)
+        end = end.masked_fill(state.steps >= 5, EndReason.FAILURE)
+        steps = state.steps + 1
+        new = dataclasses.replace(state, body=body, steps=steps, end_reason=end)
+        return new, (end == EndReason.SUCCESS).double()
+
+
+def test_a_task_without_operations_on_objects_is_explained(tmp_path, caplog):
+    env = DroneEnv(6, FlyLeft(), seed=2, transforms=[GrayPixels(), StandardizePixels()])
+    generator = torch.Generator().manual_seed(0)
+    network = MLP((1, 25, 64), 3, hidden=(8,), generator=generator)
+    sections = {n: s for n, s in ALL_SECTIONS.items() if n not in ("verdict", "class_model")}
+    results = explain(env, network, tmp_path, sections=sections)
+    assert results.left_out.keys() == {"contradictions", "response", "interventions", "places"}
+    assert len(caplog.messages) == 2 and "interventions: Task fly_left has no" in caplog.text
+    assert results.truth.methods and results.truth.frames and not results.truth.interventions
+    flights = collect(env, make_actor(network, env.action_spec), num_episodes=12)
+    env.close()
+    ends = np.append(flights.episode[1:] != flights.episode[:-1], True)
+    is_reached = flights.end_reason[ends] == EndReason.SUCCESS
+    assert 0 < is_reached.sum() < len(is_reached)
+    np.testing.assert_array_equal(flights.event[ends], np.where(is_reached, 1, -1))
+    assert not flights.event[~ends].any()
+    page = write_report([tmp_path], tmp_path).read_text()
+    assert page.count("interventions: Task fly_left has no objects that can be moved.") == 1

@@ -7,7 +7,7 @@ import torch
 from drone_rl.config import AppearanceSettings
 from drone_rl.config.commands import PlacesSettings
 from drone_rl.envs import DroneEnv, GrayPixels, Noise
-from drone_rl.explanations.context import Context
+from drone_rl.explanations.context import Context, find_lacking
 from drone_rl.explanations.scenes import place_target
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import ExternalNetwork, SmallCNN
@@ -39,11 +39,11 @@ def test_reasons_for_no_exact_map(context):
         network = changes.pop("network", None)
         changed = {name: getattr(scenes, name) for name in names} | changes
         given = SimpleNamespace(scenes=SimpleNamespace(**changed), network=network)
-        return places_section.places_section(given).refused
+        return find_lacking({"places": places_section.places_section}, given)["places"]
 
     assert "stack of frames" in refused(memory=1)
-    assert "does not choose among forward, left, right" in refused(actions=FIVE)
-    assert "its task is not cube collection" in refused(task=None)
+    assert "chooses among forward, left, right" in refused(actions=FIVE)
+    assert "Only cube collection" in refused(task=None)
     tall = scenes.task.settings.replace(vertical_bound=1.0)
     function = ExternalNetwork(lambda x: x.flatten(1)[:, :3], (1, 25, 64), MOVES)
     assert "not a torch module" in refused(network=function)
@@ -63,6 +63,7 @@ def test_there_is_no_exact_map_where_a_place_has_several_images(look, faults, mo
     env = DroneEnv(1, appearance=look, transforms=[GrayPixels(), *faults])
     network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,))
     settings = ExplainSettings(frames=40, episodes=6, perplexity=5, seed=3)
-    found = places_section.places_section(Context(env, network, settings))
+    sections = {"places": places_section.places_section}
+    lacking = find_lacking(sections, Context(env, network, settings))
     env.close()
-    assert "several images" in found.refused
+    assert "several images" in lacking["places"]

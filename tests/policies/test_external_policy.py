@@ -137,7 +137,7 @@ def test_callable_gets_a_reduced_report(network, tmp_path):
     with quick(), quick_figures():
         done = drone_rl.explain(policy, folder=tmp_path, progress=silent, **small)
     explanation = done.policies["a function"]
-    assert explanation.left_out.keys() == {"class_model", "tsne"}
+    assert explanation.left_out.keys() == {"class_model", "tsne", "places"}
     assert explanation.class_model is explanation.tsne is None
     assert [*explanation.attribution.heat] == ["occlusion"]
     assert explanation.attribution.layer is None

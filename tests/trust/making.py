@@ -9,8 +9,7 @@ from drone_rl.config.commands import ShiftSettings
 from drone_rl.policies.zoo import fingerprint
 from drone_rl.sim.tasks import as_task
 from drone_rl.trust.axes import AXES
-from drone_rl.trust.domain import range_of, walk
-from drone_rl.trust.perturbations import PerturbationMode
+from drone_rl.trust.domain import find_range
 from drone_rl.trust.shifts_results import (
     AlongAxis,
     ConditionFigures,
@@ -53,7 +52,7 @@ def along(axis, of, last):
         group=axis.group,
         unit=axis.unit,
         neutral=finite(axis.value(axis.neutral, of)),
-        areas={"constant": success_area(levels, 1.0, PerturbationMode.CONSTANT)},
+        areas={"constant": success_area(levels, 1.0, "constant")},
         levels=levels,
     )
 
@@ -64,16 +63,13 @@ def found_to(axis, of, last):
 
     def probe(strength):
         good = abs(axis.position(strength)) <= limit
-        return Probe(good=good, bad=not good)
+        return Probe(good=good, bad=not good, success=1.0 if good else 0.5)
 
-    ends = {end: walk(axis, sign, probe) for end, sign in axis.signs.items()}
-    failed = [
-        FailedEnd(good=False, bad=True, success=0.5, end=name, value=axis.value(end.failed, of))
-        for name, end in ends.items()
-        if end.failed is not None
-    ]
+    def explain(end, strength, probed):
+        return FailedEnd(**dict(probed), end=end, value=axis.value(strength, of))
+
     passed = RangeTest(success=proportion(EPISODES, EPISODES), required=0.9)
-    return range_of(axis, ends, failed, of, passed)
+    return find_range(axis, of, probe, explain, lambda _: passed)
 
 
 def owned(name, of):

@@ -6,12 +6,13 @@ import torch
 import drone_rl
 from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import DynamicsSettings, TaskSettings
+from drone_rl.config.commands import MODES
 from drone_rl.envs.fault_models import late_frames
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.trust.axes import AXES
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
-from drone_rl.trust.perturbations import ONSET_STEP, Condition, PerturbationMode, whiten
+from drone_rl.trust.perturbations import ONSET_STEP, Condition, whiten
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream
 from tests.trust.subjects import TASK, Blind, subject
@@ -51,7 +52,7 @@ def test_flights_are_repeated_exactly(make_bed):
     condition = AXES["slow_noise"].make(32.0, evaluator.subject) | AXES["object_color"].make(
         0.3, evaluator.subject
     )
-    for mode in PerturbationMode:
+    for mode in MODES:
         one, two = evaluator.run(condition, mode), evaluator.run(condition, mode)
         assert torch.equal(one.trace, two.trace)
         assert torch.equal(one.episodes.length, two.episodes.length)
@@ -83,7 +84,7 @@ def test_an_onset_changes_nothing_before_it(make_bed):
     evaluator = make_bed(
         subject(task=TaskSettings(num_cubes=2, first_distance=15.0, spacing=9.0)), 12
     )
-    plain, onset = evaluator.run(Condition()), evaluator.run(white, PerturbationMode.ONSET)
+    plain, onset = evaluator.run(Condition()), evaluator.run(white, "onset")
     constant = evaluator.run(white)
     early = plain.episodes.length <= ONSET_STEP
     assert torch.equal(onset.trace[early], plain.trace[early])

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from drone_rl.config import CameraSettings, TaskSettings
+from drone_rl.config.commands import MODES
 from drone_rl.envs.fault_models import dead_rows
 from drone_rl.trust.axes import AXES
 from drone_rl.trust.paired_evaluation import PairedEvaluator
-from drone_rl.trust.perturbations import Condition, PerturbationMode
+from drone_rl.trust.perturbations import Condition
 from drone_rl.trust.suite import Suite, area, make_strip
 from tests.trust.subjects import Blind, subject
 
@@ -19,7 +20,7 @@ def silent(text):
 @pytest.fixture(scope="module")
 def suite():
     evaluator = PairedEvaluator(subject(Blind(0)), 20)
-    yield Suite(evaluator, [*PerturbationMode], 0.9)
+    yield Suite(evaluator, MODES, 0.9)
     evaluator.close()
 
 

@@ -56,10 +56,14 @@ def test_mean_bounds_contain_the_exact_interval_of_a_share():
     assert mean_bounds(values[::-1]) == bounds
 
 
-@pytest.mark.parametrize("wrong", [1.5, float("nan"), float("inf"), -1e-6, 1 + 1e-6])
+@pytest.mark.parametrize("wrong", [1.5, float("inf"), -1e-6, 1 + 1e-6])
 def test_mean_bounds_refuse_values_out_of_range(wrong):
     with pytest.raises(ValueError, match="from 0"):
         mean_bounds([0.5, wrong])
+
+
+def test_nan_is_no_value():
+    assert mean_bounds([0.5, float("nan"), 0.7]) == mean_bounds([0.5, 0.7])
 
 
 def test_mean_bounds_cover_a_rare_disaster():

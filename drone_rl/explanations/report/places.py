@@ -11,7 +11,7 @@ from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from drone_rl.explanations.report.part import Figures, Part
-from drone_rl.explanations.results import ExactMap, Explanation, NoMap, Outlines
+from drone_rl.explanations.results import ExactMap, Explanation, Outlines
 from drone_rl.sim.vocabulary import ShownActions
 from drone_rl.utils.palette import FAINT, INK, MUTED, css
 from drone_rl.utils.text import percent, render
@@ -27,21 +27,20 @@ def rows(places: ExactMap, names: Sequence[str]) -> list[list[str]]:
     return [head, *([where, *(percent(s, 2) for s in of)] for where, of in shares.items())]
 
 
-def describe(places: ExactMap | NoMap, names: Sequence[str]) -> str:
-    """Return what the exact map shows in words, or why there is none."""
+def describe(places: ExactMap, names: Sequence[str]) -> str:
+    """Return what the exact map shows in words."""
     return render("drone_rl.explanations.report", "places.j2", map=places, names=names, where=WHERE)
 
 
-def draw(places: ExactMap | NoMap, explanation: Explanation) -> Figures:
-    """Draw the exact map, if there is one."""
-    return {} if isinstance(places, NoMap) else {"places": chart(places, explanation.actions)}
+def draw(places: ExactMap, explanation: Explanation) -> Figures:
+    """Draw the exact map."""
+    return {"places": chart(places, explanation.actions)}
 
 
-def values(places: ExactMap | NoMap, explanation: Explanation) -> dict[str, Any]:
+def values(places: ExactMap, explanation: Explanation) -> dict[str, Any]:
     """Return the map in words, and as a table."""
     names = explanation.actions.names
-    table = [] if isinstance(places, NoMap) else rows(places, names)
-    return {"text": describe(places, names), "rows": table}
+    return {"text": describe(places, names), "rows": rows(places, names)}
 
 
 def chart(places: ExactMap, actions: ShownActions) -> Figure:

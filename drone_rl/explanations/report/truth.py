@@ -100,6 +100,8 @@ def effects_chart(effects: NDArray) -> Figure:
 
 def changes(truth: Truth, explanation: Explanation) -> dict[str, Image.Image]:
     """Return one frame before and after each change to its scene, by caption."""
+    if not truth.interventions:
+        return {}
     captions = ["as it was"]
     for name, effect in truth.interventions.items():
         size = "not tried"
