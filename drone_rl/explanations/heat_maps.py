@@ -85,11 +85,10 @@ class Explainer:
     ) -> Tensor:
         """Return the absolute gradient of the probability, summed over channels. (T, H, W)."""
         method = Saliency(self._forward("probability"))
-
-        def attribute(x: Tensor, a: Tensor, m: Tensor | None) -> Tensor:
-            return method.attribute(x, a, additional_forward_args=m)
-
-        return _in_batches(attribute, observations, actions, memory).abs().sum(1)
+        maps = _in_batches(
+            lambda x, a, m: method.attribute(x, a, True, m), observations, actions, memory
+        )
+        return maps.abs().sum(1)
 
     def integrated_gradients(
         self, observations: Tensor, actions: Tensor, memory: Tensor | None = None
