@@ -5,10 +5,9 @@ import subprocess
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from drone_rl.sweeps.executors import PROGRAM
-from drone_rl.utils.files import read_json
+from drone_rl.utils.run_result import NAME, RunResult
 
 
 def call(
@@ -44,7 +43,9 @@ def call(
         raise RuntimeError(f"drone-rl {' '.join(args)} failed: {process.stderr.strip()[-500:]}")
 
 
-def train(run: Path, *args: str, environment: Mapping[str, str] | None = None) -> tuple[float, Any]:
+def train(
+    run: Path, *args: str, environment: Mapping[str, str] | None = None
+) -> tuple[float, RunResult]:
     """Run `drone-rl train`.
 
     Args:
@@ -53,14 +54,14 @@ def train(run: Path, *args: str, environment: Mapping[str, str] | None = None) -
         environment: Additional environment variables.
 
     Returns:
-        Seconds from the start of the command to its end, and the content of result.json.
+        Seconds from the start of the command to its end, and its result.
 
     Raises:
         RuntimeError: The command failed.
     """
     begin = time.perf_counter()
     call("train", *args, f"hydra.run.dir={run}", environment=environment)
-    return time.perf_counter() - begin, read_json(run / "result.json")
+    return time.perf_counter() - begin, RunResult.read_json(run / NAME)
 
 
 def watch(*args: str) -> tuple[float, float]:
