@@ -1,9 +1,11 @@
 """A command's settings, its exit status, and what becomes of a mistake in one of many runs."""
 
+import copy
 import types
 from unittest.mock import patch
 
 import pytest
+from hydra.core.config_store import ConfigStore
 from omegaconf import OmegaConf
 
 from drone_rl import define_task
@@ -90,9 +92,14 @@ def test_a_term_that_a_task_does_not_list_can_be_set(monkeypatch, tmp_path):
     ball = {"shape": "ball", "role": "goal"}
     terms = {"reward": {"progress": 1.0}, "success": ["all_goals"]}
     given = []
-    monkeypatch.setattr(
-        TrainCommand, "run", lambda settings, _: (given.append(settings.task) or 0, None)
-    )
+
+    def run(settings, folder):
+        given.append(settings.task)
+        return 0, None
+
+    monkeypatch.setattr(TrainCommand, "run", run)
+    store = ConfigStore.instance()
+    monkeypatch.setattr(store, "repo", copy.deepcopy(store.repo))
     with patch.dict(TASKS), patch.dict(MAKERS):
         define_task("test_composed", objects={"ball": ball}, **terms)
         words = ["task=test_composed", "task.reward.time.weight=-0.5"]
