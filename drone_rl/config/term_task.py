@@ -2,13 +2,11 @@
 
 from typing import Annotated, Any
 
-from pydantic import AfterValidator
-
 from drone_rl.config.task import BaseTaskSettings, Color, ObjectRegion
 from drone_rl.config.terms import Ends, Rewards, Success
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import OneOf, Real, Several, Span, Whole
-from drone_rl.utils.settings import ByName, Settings
+from drone_rl.utils.settings import Settings
 
 Coordinate = Annotated[Any, Span(Real(-1000.0, 1000.0, unit="m"))]
 Size = Real(0.01, 1000.0, unit="m")
@@ -81,7 +79,7 @@ class StartSettings(Settings):
 class TermTaskSettings(BaseTaskSettings):
     """A task of terms; `drone_rl.define_task` gives one a name. Lengths in metres."""
 
-    objects: Annotated[dict[str, ObjectSettings], AfterValidator(ByName)] = {}
+    objects: dict[str, ObjectSettings] = {}
     """Objects by name; those placed later keep away from earlier ones."""
     start: StartSettings = StartSettings()
     """Where the drone starts."""

@@ -15,12 +15,12 @@ import inspect
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, TypeVar
 
-from pydantic import AfterValidator, BeforeValidator
+from pydantic import BeforeValidator
 
 from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.plugins import place_of
 from drone_rl.utils.schema import Real, shown
-from drone_rl.utils.settings import ByName, Settings, about
+from drone_rl.utils.settings import Settings, about
 
 MOST_PARAMETERS = 4
 """Largest number of parameters of a term."""
@@ -30,6 +30,13 @@ Number = Annotated[float, Real(-1e6, 1e6)]
 
 class TermSettings(Settings):
     """The numbers of a term: its parameters, and the weight of a reward."""
+
+
+class RewardSettings(TermSettings):
+    """The numbers of a reward term; `drone-rl terms` lists all terms."""
+
+    weight: Number = 1.0
+    """Factor of the term's values."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,7 +83,8 @@ class Term:
 def _settings_class(name: str, numbers: Mapping[str, float]) -> type[TermSettings]:
     hints = dict.fromkeys(numbers, Number)
     members = {"__annotations__": hints, "__module__": __name__, **numbers}
-    return type(f"{name}_settings", (TermSettings,), members)
+    base = RewardSettings if "weight" in numbers else TermSettings
+    return type(f"{name}_settings", (base,), members)
 
 
 class Terms:
@@ -151,11 +159,11 @@ for _name, _weight in {
     REWARDS.declare(_name, _weight)
 REWARDS.declare("altitude", -0.01, height=2.5)
 _Read = dict[str, TermSettings]
-Rewards = Annotated[_Read, BeforeValidator(REWARDS.read), AfterValidator(ByName)]
+Rewards = Annotated[_Read, REWARDS, BeforeValidator(REWARDS.read)]
 """Terms of a reward by name, each with a weight and parameters of its own."""
-Ends = Annotated[_Read, BeforeValidator(ENDS.read), AfterValidator(ByName)]
+Ends = Annotated[_Read, ENDS, BeforeValidator(ENDS.read)]
 """Reasons to end an episode, by name."""
-Success = Annotated[_Read, BeforeValidator(SUCCESSES.read), AfterValidator(ByName)]
+Success = Annotated[_Read, SUCCESSES, BeforeValidator(SUCCESSES.read)]
 """A meaning of success, by name."""
 
 
