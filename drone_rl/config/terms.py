@@ -94,6 +94,11 @@ class Terms:
         """Begin without terms; `kind` is the name of the decorator."""
         self.kind, self.by_name = kind, dict[str, Term]()
 
+    @property
+    def registry(self) -> dict[str, type[TermSettings]]:
+        """Settings of each term by its name."""
+        return {name: term.settings for name, term in self.by_name.items()}
+
     def register(self, name: str, **own: float) -> Callable[[F], F]:
         """Return a decorator that registers a function; `own` are numbers that are not arguments.
 

@@ -136,13 +136,10 @@ def _inner(kind: Any, values: Mapping[str, Any]) -> Iterator[tuple[Any, str, Any
     if isinstance(kind, Changes):
         for of in (kind.of,) if kind.of else reversed(TASKS.values()):  # the default one wins
             yield of, "", {}
-    elif isinstance(kind, Parts):
+    elif isinstance(kind, Parts | Terms):
         for name, below in values.items():
-            if name in kind.of.registry:
-                yield kind.of.registry[name], f".{name}", below
-    elif isinstance(kind, Terms):
-        for name, below in values.items():
-            yield kind.by_name[name].settings, f".{name}", below
+            if name in kind.registry:
+                yield kind.registry[name], f".{name}", below
     elif isinstance(kind, type) and issubclass(kind, Named):
         name = values.get("name", kind.default_name)
         yield from (
