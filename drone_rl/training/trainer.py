@@ -187,13 +187,11 @@ class Trainer:
         return "frames" if progress.frames >= self.total_frames else ""
 
     def _is_solved(self) -> bool:
-        progress = self.progress
+        progress, interval = self.progress, self.confirm_interval
         if self.target is not None:
             is_due = progress.running_reward >= self.target
         else:
-            is_due = bool(self.confirm_interval and progress.updates) and (
-                progress.updates % self.confirm_interval == 0
-            )
+            is_due = interval is not None and progress.updates and progress.updates % interval == 0
         if not is_due:
             return False
         begin = time.perf_counter()
