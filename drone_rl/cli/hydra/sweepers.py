@@ -142,7 +142,8 @@ class SearchSweeper(CombiningSweeper):
         """Refuse ranges in which the metric is not comparable, and runs without the metric."""
         is_success = self.metric == "success"
         for key in space:
-            name = key if is_success else key.partition(".")[0]
+            name = key.lstrip("+")  # of entries that are added
+            name = name if is_success else name.partition(".")[0]
             if name in ("task", "experiment"):
                 other = "" if is_success else ", or add hydra.sweeper.metric=success"
                 raise InputError(
