@@ -410,11 +410,6 @@ class SavedShifts(Stored):
     shifts: Robustness | None = None
     """None if refused."""
 
-    @property
-    def ranges(self) -> Mapping[str, Range]:
-        """Ranges of the operating domain by axis, if there are any."""
-        return {} if self.shifts is None else self.shifts.ranges
-
     def why_not(self, verdict: Verdict) -> str | None:
         """Return why a verdict can't quote it, or None."""
         if self.shifts is None:
