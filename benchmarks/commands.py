@@ -5,10 +5,9 @@ import subprocess
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from drone_rl.sweeps.executors import PROGRAM
-from drone_rl.utils.files import read_json
+from drone_rl.utils.run_result import NAME, RunResult
 
 
 def call(
@@ -16,6 +15,7 @@ def call(
     statuses: tuple[int, ...] = (0,),
     environment: Mapping[str, str] | None = None,
     tree: Path | None = None,
+    folder: Path | None = None,
 ) -> None:
     """Run `drone-rl`.
 
@@ -24,24 +24,28 @@ def call(
         statuses: Exit statuses that count as success.
         environment: Additional environment variables.
         tree: Checkout whose code runs, in its folder; by default that of this program, here.
+        folder: Working folder in which the code of this program runs.
 
     Raises:
         RuntimeError: The exit status is not in `statuses`.
     """
-    python_path = {} if tree is None else {"PYTHONPATH": str(tree)}
+    code = tree if folder is None else Path(__file__).parents[1]
+    python_path = {} if code is None else {"PYTHONPATH": str(code)}
     process = subprocess.run(
         [*PROGRAM, *args],
         capture_output=True,
         text=True,
         check=False,
-        cwd=tree,
+        cwd=folder or tree,
         env={**os.environ, **python_path, **(environment or {})},
     )
     if process.returncode not in statuses:
         raise RuntimeError(f"drone-rl {' '.join(args)} failed: {process.stderr.strip()[-500:]}")
 
 
-def train(run: Path, *args: str, environment: Mapping[str, str] | None = None) -> tuple[float, Any]:
+def train(
+    run: Path, *args: str, environment: Mapping[str, str] | None = None
+) -> tuple[float, RunResult]:
     """Run `drone-rl train`.
 
     Args:
@@ -50,14 +54,14 @@ def train(run: Path, *args: str, environment: Mapping[str, str] | None = None) -
         environment: Additional environment variables.
 
     Returns:
-        Seconds from the start of the command to its end, and the content of result.json.
+        Seconds from the start of the command to its end, and its result.
 
     Raises:
         RuntimeError: The command failed.
     """
     begin = time.perf_counter()
     call("train", *args, f"hydra.run.dir={run}", environment=environment)
-    return time.perf_counter() - begin, read_json(run / "result.json")
+    return time.perf_counter() - begin, RunResult.read_json(run / NAME)
 
 
 def watch(*args: str) -> tuple[float, float]:

@@ -43,11 +43,12 @@ def _run_seed(setup: Setup, seed: int) -> dict[str, Any]:
     clone, whole = folder / f"clone_{seed}", folder / f"reinforce_{seed}"
     train(clone, *settings, "trainer.total_frames=0")
     _, result = train(whole, *settings, *(["trainer.total_frames=4000"] if setup.quick else []))
+    assert result.cloning is not None
     return {
         "success": evaluate(setup, clone)["share"],
         "reinforce_success": evaluate(setup, whole)["share"],
-        "accuracy": result["cloning"]["held_out_accuracy"],
-        "s": result["cloning"]["seconds"],
-        "reinforce_frames": result["frames"],
-        "reason": result["reason"],
+        "accuracy": result.cloning.held_out_accuracy,
+        "s": result.cloning.seconds,
+        "reinforce_frames": result.frames,
+        "reason": result.reason,
     }

@@ -20,6 +20,7 @@ from drone_rl.explanations.trust import Trial, check_maps
 from drone_rl.policies import ImageNetwork, SmallCNN
 from drone_rl.policies.environment import make_env
 from drone_rl.policies.zoo import policy_names, policy_path, read_policy
+from drone_rl.sim.tasks import State
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, WorldState
 
 NUM_METHODS = 5
@@ -39,9 +40,28 @@ def bench_maps(setup: Setup) -> dict[str, Any]:
     env = make_env(64)
     scenes = Scenes(env)
     state, episode = imagined(scenes, 14 if setup.quick else 40, 4 if setup.quick else 6)
+    found = count_maps(scenes, state, episode, expert(scenes, state), setup.quick)
+    env.close()
+    return {**found, "maps_s": time.perf_counter() - begin}
+
+
+def count_maps(
+    scenes: Scenes, state: State, episode: np.ndarray, actions: Tensor, quick: bool
+) -> dict[str, Any]:
+    """Count trusted maps in some states of environments.
+
+    Args:
+        scenes: Scenes of the task.
+        state: The states, T.
+        episode: Episode of each, (T,).
+        actions: What policies with known maps should do there, (T,).
+        quick: Whether to test few policies.
+
+    Returns:
+        See `bench_maps`.
+    """
     seen, absent = scenes.observe(state), scenes.absent
     others = list(alternatives(scenes, state).values())
-
     grid = make_grid(*seen.shape[-2:])
 
     def trial(network: ImageNetwork) -> Trial:
@@ -58,15 +78,14 @@ def bench_maps(setup: Setup) -> dict[str, Any]:
         )
         return whole[has_effect(effects)]
 
-    planted = make_policies(absent, seen, expert(scenes, state))
-    planted = planted[::7] if setup.quick else planted
+    planted = make_policies(absent, seen, actions)
+    planted = planted[::7] if quick else planted
     failed = {p.name: failed_tests(trial(p.network)) for p in planted}
     seeing = [p for p in planted if not p.is_blind]
-    policies = {p.name: p.network for p in seeing[:: 3 if setup.quick else 2]}
-    policies |= shipped(absent) if not setup.quick else {}
-    policies |= untrained(absent, 1 if setup.quick else 4)
+    policies = {p.name: p.network for p in seeing[:: 3 if quick else 2]}
+    policies |= shipped(absent) if not quick else {}
+    policies |= untrained(absent, 1 if quick else 4)
     trusted = {name: trusted_adversarial(trial(n), absent) for name, n in policies.items()}
-    env.close()
     return {
         "placebo_maps_trusted": sum(len(names) for names, _ in trusted.values()),
         "placebo_maps_total": sum(total for _, total in trusted.values()),
@@ -77,7 +96,6 @@ def bench_maps(setup: Setup) -> dict[str, Any]:
         "planted_maps_missed": {p.name: failed[p.name] for p in seeing if failed[p.name]},
         "planted_maps_blind_trusted": sum(not failed[p.name] for p in planted if p.is_blind),
         "planted_maps_blind_total": len(planted) - len(seeing),
-        "maps_s": time.perf_counter() - begin,
     }
 
 

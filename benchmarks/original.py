@@ -107,9 +107,9 @@ def train_seeds(folder: Path, settings: Sequence[str], seeds: Sequence[int]) -> 
         call("verdict", f"policy={run}", "seed=0", place, statuses=tuple(range(20)))
         verdict = read_json(run / "verdict" / "verdict.json")
         outcome = {
-            "solved": result["reason"] == "solved",
-            "episodes": result["episodes"],
-            "frames": result["frames"],
+            "solved": result.reason == "solved",
+            "episodes": result.episodes,
+            "frames": result.frames,
             "seconds": seconds,
             "verdict": f"{verdict['kind']}{'' if verdict['certain'] else ' (not certain)'}",
         }

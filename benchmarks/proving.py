@@ -81,6 +81,6 @@ def bench_provable(setup: Setup) -> dict[str, Any]:
         run = folder / f"provable_{seed}"
         seconds, result = commands.train(run, "experiment=provable", f"seed={seed}", *easier)
         results["provable_s"].append(seconds)
-        results["provable_rounds"].append(len(result["rounds"]))
-        results["provable_proved"].append(result["reason"] == "proved")
+        results["provable_rounds"].append(len(result.rounds))
+        results["provable_proved"].append(result.reason == "proved")
     return results

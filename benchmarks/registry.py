@@ -26,6 +26,7 @@ from benchmarks.maps import bench_maps
 from benchmarks.memory import bench_memory
 from benchmarks.onnx_export import bench_onnx
 from benchmarks.original import bench_original
+from benchmarks.own_task.measuring import bench_tasks
 from benchmarks.peers.comparison import bench_peers
 from benchmarks.proving import bench_provable, bench_prove
 from benchmarks.render_truth import bench_render_truth
@@ -138,6 +139,9 @@ BENCHMARKS: dict[str, Benchmark] = {
         *_RENDERING,
         "flight",
         *_parts("airsim", "airsim_scripts", "airsim_chapter", "airsim_programs"),
+    ),
+    "tasks": _benchmark(
+        bench_tasks, "system", *_COMMANDS, "trust", "explanations", *_parts("own_task", "maps")
     ),
     "startup": _benchmark(bench_startup, "system", *_COMMANDS, "trust"),
     "onnx": _benchmark(bench_onnx, "libraries", *_JUDGING),

@@ -59,7 +59,7 @@ def bench_robust(setup: Setup) -> dict[str, Any]:
 
     def train_run(key: tuple[str, int]) -> int:
         _, result = train(runs[key], f"seed={key[1]}", *ARMS[key[0]], *brief)
-        return result["frames"]
+        return result.frames
 
     with ThreadPoolExecutor(_PARALLEL) as pool:
         frames = dict(zip(runs, pool.map(train_run, runs), strict=True))

@@ -5,6 +5,7 @@ import statistics
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.benchmark import Setup
@@ -46,19 +47,27 @@ def import_seconds(name: str = "drone_rl") -> float:
     return float(subprocess.run(command, capture_output=True, check=True).stdout)
 
 
-def first_update_seconds(folder: Path, device: str, kernels: Path | None = None) -> float:
+def first_update_seconds(
+    folder: Path, device: str, kernels: Path | None = None, settings: Sequence[str] = ()
+) -> float:
     """Return the seconds from the start of `drone-rl train` to the first row of metrics.csv.
 
     Args:
         folder: Folder of the run.
         device: Device of the training.
         kernels: Folder of the kernel cache; Warp's default if None.
+        settings: Further settings of the training.
 
     Raises:
         RuntimeError: The command ended without an update.
     """
     metrics, begin = folder / "metrics.csv", time.perf_counter()
-    settings = ["trainer.total_frames=1", f"device={device}", f"hydra.run.dir={folder}"]
+    settings = [
+        *settings,
+        "trainer.total_frames=1",
+        f"device={device}",
+        f"hydra.run.dir={folder}",
+    ]
     null = subprocess.DEVNULL
     cache = {} if kernels is None else {"WARP_CACHE_PATH": str(kernels)}
     process = subprocess.Popen(

@@ -1,7 +1,6 @@
 """Sweeps: speed-up of parallel runs, and kills."""
 
 import contextlib
-import json
 import os
 import signal
 import subprocess
@@ -15,6 +14,7 @@ from benchmarks.benchmark import Setup
 from benchmarks.commands import PROGRAM, call
 from drone_rl.sweeps.manifest import THREADS
 from drone_rl.utils.checkpoint import load_checkpoint
+from drone_rl.utils.run_result import NAME, RunResult
 
 
 def bench_sweeps(setup: Setup) -> dict[str, Any]:
@@ -99,10 +99,8 @@ def _kill_processes(text: str) -> None:
                 os.kill(pid, signal.SIGKILL)
 
 
-def _outcome(run: Path) -> tuple[dict[str, Any], dict[str, list]]:
+def _outcome(run: Path) -> tuple[RunResult, dict[str, list]]:
     """Return result and parameters of a run, without time and verdict (which has a fresh seed)."""
-    result = json.loads((run / "result.json").read_text())
-    del result["seconds"]
-    result.pop("verdict", None)
+    result = RunResult.read_json(run / NAME).replace(seconds=0.0, verdict=None)
     policy = load_checkpoint(run / "checkpoints" / "last.pt")["policy"]
     return result, {name: values.tolist() for name, values in policy.items()}

@@ -60,7 +60,7 @@ def bench_large(setup: Setup) -> dict[str, Any]:
     settings.append(f"trainer.total_frames={500 if setup.quick else 20_000}")
     train(setup.runs / "large_first", *settings)
     _, result = train(setup.runs / "large", *settings)
-    return {"learning_fps_large": result["frames"] / result["seconds"]}
+    return {"learning_fps_large": result.frames / result.seconds}
 
 
 def bench_experiment(setup: Setup, experiment: str, num_seeds: int) -> dict[str, Any]:
@@ -109,9 +109,9 @@ def train_and_evaluate(
         run = folder / f"train_{seed}"
         seconds, result = train(run, f"seed={seed}", f"device={setup.device}", *settings)
         results["seconds"].append(seconds)
-        results["frames"].append(result["frames"])
-        results["trained_s"].append(result["seconds"])
-        results["reason"].append(result["reason"])
+        results["frames"].append(result.frames)
+        results["trained_s"].append(result.seconds)
+        results["reason"].append(result.reason)
         results["lower95"].append(evaluate(setup, run)["lower95"])
     return results
 

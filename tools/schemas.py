@@ -14,6 +14,7 @@ from drone_rl.trust.evaluate import Evaluation
 from drone_rl.trust.judge import Judgement
 from drone_rl.trust.shifts import Shifts
 from drone_rl.utils.models import Model
+from drone_rl.utils.run_result import RunResult
 from drone_rl.utils.settings import meanings
 from drone_rl.verification.chances import Chances
 from drone_rl.verification.check import Check
@@ -27,6 +28,7 @@ RESULTS: dict[str, type[Model]] = {
     "check": Check,
     "evaluation": Evaluation,
     "places": Places,
+    "result": RunResult,
     "shifts": Shifts,
     "summary": Summary,
     "sweep": Sweep,

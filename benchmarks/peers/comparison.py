@@ -84,13 +84,13 @@ def train_ours(arguments: Sequence[str], *, seed: int, episodes: int, folder: Pa
     """
     run = folder / str(seed)
     seconds, result = train(run, *arguments, f"seed={seed}")
-    columns, start = Training(run, "", result).metrics(), seconds - result["seconds"]
+    columns, start = Training(run, result).metrics(), seconds - result.seconds
     ends = [start + at for at in columns["seconds"]]
     measured = {
         "seconds": seconds,
-        "seconds_without_imports": result["seconds"],
-        "frames": result["frames"],
-        "is_solved": result["reason"] == "solved",
+        "seconds_without_imports": result.seconds,
+        "frames": result.frames,
+        "is_solved": result.reason == "solved",
         "curve": [*zip(ends, columns["train/running_reward"], strict=True)],
     }
     return measured | ({"success_lower95": success_lower95(run, episodes)} if episodes else {})

@@ -25,7 +25,7 @@ class BenchCommand(CommandSettings, BenchSettings):
       verification: prove, exact_coverage, provable
       long: imitation, original, chapter
       libraries: pillars, onnx, peers, gymnasium
-      system: revisions, startup
+      system: revisions, tasks, startup
       flight: airsim, fly_page, flight_speed, flight_parity, flight_paths, flight_moves,
         flight_velocity, flight_pillars
     """

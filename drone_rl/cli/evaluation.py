@@ -182,7 +182,7 @@ class BodiesCommand(CommandSettings, BodiesSettings):
     def run(self, folder: Path) -> tuple[int, int]:
         """Judge policies under several dynamics; return the exit status and number of verdicts."""
         settings = self.as_base(BodiesSettings)
-        result = drone_rl.bodies(settings=settings, outputs=self.paths.outputs, progress=silent)
+        result = drone_rl.bodies(settings=settings, outputs=self.paths.outputs, progress=log)
         finish(result, folder, "bodies.json, bodies.png and bodies.svg")
         return 0, sum(map(len, result.policies.values()))
 

@@ -75,9 +75,8 @@ class ClassModelsCommand(PolicyCommandSettings, ClassModelsSettings):
 
     def run(self, folder: Path) -> tuple[int, str]:
         """Optimize observations for each action; return the exit status and the image's path."""
-        result = drone_rl.class_models(
-            self.policy, self.as_base(ClassModelsSettings), **self.shared()
-        )
+        settings = self.as_base(ClassModelsSettings)
+        result = drone_rl.class_models(self.policy, settings, **self.shared(), progress=log)
         finish(result, folder, "class_models.png, class_models.json and class_models.npz")
         return 0, str(folder / "class_models.png")
 

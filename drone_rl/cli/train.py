@@ -16,7 +16,7 @@ from drone_rl.config.training import Logger, Tensorboard, TrainSettings
 from drone_rl.config.values import Seed
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import bar_or_lines
-from drone_rl.utils.readers import read_result
+from drone_rl.utils.run_result import read_result
 from drone_rl.utils.text import render
 
 if TYPE_CHECKING:
@@ -80,13 +80,13 @@ class TrainCommand(CommandSettings, TrainSettings):
                 raise
             training = vars(stop)["training"]
         _log.info("%s", training)
-        for row in training.result.get("rounds", ()):
-            _log.info(render("drone_rl.verification", "round.j2", **row))
-        if not training.reason.startswith("SIG"):
-            if before is not None and before.get("frames") == training.result["frames"]:
+        for row in training.result.rounds:
+            _log.info(render("drone_rl.verification", "round.j2", **dict(row)))
+        if not training.result.is_interrupted:
+            if before is not None and before.frames == training.result.frames:
                 _log.info(
                     "the run is already finished (%s, %s frames); %s",
-                    *(training.reason, f"{training.result['frames']:,}"),
+                    *(training.reason, f"{training.result.frames:,}"),
                     _TRAIN_LONGER.get(training.reason, "start a new one"),
                 )
             return 0, training.running_reward

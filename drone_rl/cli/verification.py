@@ -11,7 +11,7 @@ from drone_rl.cli.settings import CommandSettings, PolicyCommandSettings, finish
 from drone_rl.config.commands import ChanceSettings, CheckSettings, PlacesSettings, ProveSettings
 from drone_rl.config.configuration import TaskChanges
 from drone_rl.utils.exit_codes import NOT_PROVED
-from drone_rl.utils.progress import silent
+from drone_rl.utils.progress import bar_or_lines, log
 from drone_rl.utils.schema import Real, Several
 
 _log = logging.getLogger(__name__)
@@ -57,7 +57,7 @@ class CheckCommand(CommandSettings, CheckSettings):
             self.as_base(CheckSettings),
             task=self.task,
             outputs=self.paths.outputs,
-            progress=silent,
+            progress=bar_or_lines(),
         )
         finish(result, folder / "check.json")
         return result.exit_code, result.accepted
@@ -72,7 +72,7 @@ class PlacesCommand(PolicyCommandSettings, PlacesSettings):
     def run(self, folder: Path) -> tuple[int, float]:
         """Map actions by cube position; return the exit status and the blind fraction of places."""
         settings = self.as_base(PlacesSettings)
-        result = drone_rl.places(self.policy, settings, **self.shared(), progress=silent)
+        result = drone_rl.places(self.policy, settings, **self.shared(), progress=log)
         finish(result, folder, "places.json, places.png and places.svg")
         return 0, result.blind
 
@@ -90,6 +90,7 @@ class ChainCommand(PolicyCommandSettings, ChanceSettings):
     def run(self, folder: Path) -> tuple[int, float]:
         """Compute outcome probabilities; return the exit status and the success probability."""
         settings, cubes = self.as_base(ChanceSettings), self.cubes or None
-        result = drone_rl.chances(self.policy, cubes, settings, **self.shared(), progress=silent)
+        how = {**self.shared(), "progress": bar_or_lines()}
+        result = drone_rl.chances(self.policy, cubes, settings, **how)
         finish(result, folder / "chances.json")
         return 0, result.success

@@ -49,7 +49,8 @@ class TrainerSettings(Settings):
     """Stop after the batch that reaches this many episodes; null for no limit."""
     target_share: Annotated[float, Real(0.0, 1.0, is_above=True)] | None = 0.99
     """Stop once the running reward reaches this fraction of the task's `largest_reward`; null
-    disables this rule."""
+    disables this rule. In a task without one, confirmations decide, each after ten times as many
+    episodes."""
     confirm_episodes: Annotated[int, Whole(0, unit="episodes")] = 200
     """Greedy episodes in other environments that must confirm the policy before `target_share`
     stops the training; 0 skips the confirmation."""

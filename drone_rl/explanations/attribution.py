@@ -23,7 +23,7 @@ def section(context: Context) -> Attribution:
     """Compute the heat maps of the film."""
     flights, explainer, film = context.flights, context.explainer, context.film
     first = int(np.flatnonzero(flights.episode == FILMED)[0])
-    inputs = film.tensor("observations"), film.tensor("actions")
+    inputs = film.tensor("observations"), film.tensor("actions"), film.memory
     maps = {n: context.scenes.to_frame(of(*inputs)) for n, of in explainer.methods().items()}
     methods = shown_methods(maps)
     frames = key_frames(flights, FILMED, context.scenes.task, len(film))

@@ -53,15 +53,23 @@ def dataset_section(context: Context) -> Dataset:
     )
 
 
-@needs(contradictions=objects)
+def without_excuse(context: Context) -> str | None:
+    """Need nothing but the next target's place to justify an action."""
+    if context.remembers:
+        return "The policy remembers earlier frames, which may justify opposite actions."
+    return objects(context)
+
+
+@needs(contradictions=without_excuse)
 def flaws_section(context: Context) -> Flaws:
     """Find contradictions (Fig. 9) of the analysed frames, and loops of whole episodes."""
     data, flights, scenes = context.dataset, context.flights, context.scenes
     alike = median_frame_change(flights)
     loops = find_loops(flights, scenes.actions)
     looping = len({int(flights.episode[loop.first]) for loop in loops})
+    offset = data.offset(scenes.worlds) * (np.nan if context.remembers else 1.0)
     return Flaws(
-        pairs=tuple(find_pairs(data, alike, scenes.actions, data.offset(scenes.worlds))),
+        pairs=tuple(find_pairs(data, alike, scenes.actions, offset)),
         alike_metres=ALIKE_METRES,
         loops=tuple(loops),
         looping_steps=sum(loop.length for loop in loops) / len(flights),

@@ -31,6 +31,7 @@ from drone_rl.trust.plots.saving import to_png
 from drone_rl.utils.display import Result, picture
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.palette import INK, MUTED, css
+from drone_rl.utils.progress import silent
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.schema import Whole
 from drone_rl.utils.seeding import legacy_seed
@@ -222,7 +223,7 @@ def _pair(settings: FigureSettings, policy: Policy) -> _Drawn:
 
 def _class_models(settings: FigureSettings, policy: Policy) -> _Drawn:
     """Figs. 10 to 12: class models with the chapter's refinements."""
-    models = class_models(policy, seed=settings.seed, **CHAPTER)
+    models = class_models(policy, seed=settings.seed, progress=silent, **CHAPTER)
     caption = (
         f"Class models of policy {policy.name}: gradient ascent on the action's probability "
         "(Eq. 18) in steps of fixed length, with blur and the training set's mean and deviation."

@@ -26,6 +26,7 @@ from drone_rl.trust.plots import images
 from drone_rl.utils.display import TableResult
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.models import Seeded
+from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import listed
@@ -137,6 +138,7 @@ def class_models(
     *,
     task: Mapping[str, Any] | None = None,
     outputs: str | Path = "outputs",
+    progress: Progress | None = None,
     **changes: Any,
 ) -> ClassModels:
     """Optimize an observation for each action of a policy (section 5.2, Eq. 18).
@@ -148,31 +150,30 @@ def class_models(
         settings: Of the gradient ascent; `gallery` replaces them by each refinement.
         task: Changes to the policy's task.
         outputs: See `load_policy`.
+        progress: Called with the progress; a bar by default.
         changes: Changes to the settings, as in `class_models("good", maximize="probability")`.
 
     Raises:
         InputError: The policy or a setting is unusable, or the images diverge.
     """
     settings, seed = with_seed(from_arguments(ClassModelsSettings, settings, changes, class_models))
+    progress = as_progress(progress)
     subject = as_policy(policy, outputs, task=task)
     network = subject.make_network()
     if not network.is_differentiable:
         raise InputError(NO_GRADIENTS)
+    tried = {"given settings": settings.as_base(ClassModelSettings)}
+    if settings.gallery:
+        tried = {title: ClassModelSettings(**changed) for title, changed in GALLERY.items()}
+    steps = len(tried) + 1
+    progress(f"{settings.episodes} episodes", 0, steps)
     with subject.flying(min(settings.episodes, _BATCH), seed=seed.value) as (env, actor):
         seen = collect(env, actor, num_episodes=settings.episodes).tensor("observations")
         channels = Scenes(env).channels
     statistics = image_statistics(seen)
-    tried = {"given settings": settings.as_base(ClassModelSettings)}
-    if settings.gallery:
-        tried = {title: ClassModelSettings(**changed) for title, changed in GALLERY.items()}
-    return ClassModels(
-        subject,
-        {
-            title: (one, best_models(network, statistics, [one], seed=seed.value))
-            for title, one in tried.items()
-        },
-        statistics,
-        network.actions.shown,
-        channels,
-        seed,
-    )
+    found = {}
+    for number, (title, one) in enumerate(tried.items(), start=1):
+        progress(title, number, steps)
+        found[title] = one, best_models(network, statistics, [one], seed=seed.value)
+    progress("optimized", steps, steps)
+    return ClassModels(subject, found, statistics, network.actions.shown, channels, seed)

@@ -59,8 +59,7 @@ class Context:
         """
         self.env, self.network, self.claim = env, network, claim
         self.remembers = network.is_recurrent
-        """Whether the policy remembers earlier frames in rollouts; of single frames, each counts as
-        the first of an episode."""
+        """Whether the policy remembers earlier frames."""
         self.settings, self.seed = with_seed(settings, seed)
         self.measured, self.unlike = measured, unlike
         self.scenes = Scenes(env)

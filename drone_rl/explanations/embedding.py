@@ -77,7 +77,8 @@ def embed(
         raise InputError("features hold a value that is not finite; the policy's weights are bad")
     centred = flat - flat.mean(0)
     pca = PCA(min(COMPONENTS, *flat.shape), svd_solver="full")  # not a random one
-    reduced = pca.fit_transform(flat)
+    with np.errstate(invalid="ignore"):  # equal points have no variance
+        reduced = pca.fit_transform(flat)
     few = len(flat) <= FEW
     model = openTSNE.TSNE(
         perplexity=perplexity,  # pyright: ignore[reportArgumentType] (takes fractions, too)

@@ -1,6 +1,7 @@
 """`drone-rl explain`: compute all sections, write them as files, and make one report."""
 
 import dataclasses
+import itertools
 import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -115,6 +116,8 @@ def explain(
     by_name = _named(policies, outputs)
     progress = as_progress(progress)
     folder = new_run_folder("explain", outputs) if folder is None else as_path(folder, "folder")
+    sections = {**SECTIONS, **(more_sections or {})}
+    done, steps = itertools.count(), len(by_name) * len(sections) + 1
     folders = {n: folder / f"{i}_{to_file_name(n)}" for i, n in enumerate(by_name)}
 
     def explain_one(policy: BasePolicy, folder: Path) -> Explanation:
@@ -129,8 +132,8 @@ def explain(
                 folder,
                 name=policy.name,
                 provenance={"policy": policy.source, "trained": policy.trained, **provenance()},
-                progress=lambda title: progress(f"{policy.name}: {title}"),
-                sections={**SECTIONS, **(more_sections or {})},
+                progress=lambda title: progress(f"{policy.name}: {title}", next(done), steps),
+                sections=sections,
             )
 
     with torch_threads(1):  # same results for any number of cores; more would gain nothing
@@ -138,9 +141,9 @@ def explain(
     for name, one in by_name.items():
         if verdict := explained[name].verdict:
             record_verdict(folders[name], one, verdict)
-    progress("report")
+    progress("report", steps - 1, steps)
     report = write_report(list(folders.values()), folder)
-    progress("explained", 1, 1)
+    progress("explained", steps, steps)
     return Explanations(folder, report, explained, seed)
 
 

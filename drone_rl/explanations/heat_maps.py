@@ -1,6 +1,7 @@
 """Heat maps of a policy's observations: Grad-CAM (section 5.3) and other methods, by Captum."""
 
 import dataclasses
+import functools
 import itertools
 from collections.abc import Callable
 from typing import Literal
@@ -11,7 +12,13 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from drone_rl.acceleration import with_fused_passes
-from drone_rl.explanations.hooks import find_layer, probabilities, spatial_layers
+from drone_rl.explanations.hooks import (
+    batches,
+    evaluate,
+    find_layer,
+    probabilities,
+    spatial_layers,
+)
 from drone_rl.explanations.patches import replaced
 from drone_rl.policies import ImageNetwork
 from drone_rl.utils.errors import InputError
@@ -19,7 +26,8 @@ from drone_rl.utils.errors import InputError
 Objective = Literal["probability", "logit"]
 BATCH = 256  # observations in one call, which bounds memory
 INTEGRATION_STEPS = 64  # with 16, errors of up to 0.7 occur on a steep softmax
-MapMethod = Callable[[Tensor, Tensor], Tensor]  # observations and actions (T,) to maps (T, H, W)
+MapMethod = Callable[..., Tensor]
+"""Observations, actions (T,) and memory, see `hooks`, to maps (T, H, W)."""
 
 
 @dataclasses.dataclass
@@ -45,8 +53,8 @@ class Explainer:
         """Return all methods that this policy allows, by name."""
         maps: dict[str, MapMethod] = {}
         if self.layer is not None:
-            maps["grad_cam"] = lambda x, a: self.grad_cam(x, a, "probability")
-            maps["grad_cam_logit"] = lambda x, a: self.grad_cam(x, a, "logit")
+            maps["grad_cam"] = self.grad_cam
+            maps["grad_cam_logit"] = functools.partial(self.grad_cam, objective="logit")
         if self.network.is_differentiable:
             maps["saliency"] = self.saliency
             maps["integrated_gradients"] = self.integrated_gradients
@@ -54,44 +62,57 @@ class Explainer:
         return maps
 
     def grad_cam(
-        self, observations: Tensor, actions: Tensor, objective: Objective = "probability"
+        self,
+        observations: Tensor,
+        actions: Tensor,
+        memory: Tensor | None = None,
+        objective: Objective = "probability",
     ) -> Tensor:
         """Return Grad-CAM in the observation's size (T, H, W); raise InputError without a layer."""
         if self.layer is None:
             raise InputError("Grad-CAM needs a convolution with gradients, which this policy lacks")
         method = LayerGradCam(self._forward(objective), find_layer(self.network, self.layer))
 
-        def attribute(x: Tensor, a: Tensor) -> Tensor:
-            coarse = method.attribute(x, target=a, relu_attributions=True)
+        def attribute(x: Tensor, a: Tensor, m: Tensor | None) -> Tensor:
+            coarse = method.attribute(x, a, m, relu_attributions=True)
             assert isinstance(coarse, Tensor)  # a tuple only if x is one
             return functional.interpolate(coarse, x.shape[-2:], mode="bilinear")
 
-        return _in_batches(attribute, observations, actions).sum(1)
+        return _in_batches(attribute, observations, actions, memory).sum(1)
 
-    def saliency(self, observations: Tensor, actions: Tensor) -> Tensor:
+    def saliency(
+        self, observations: Tensor, actions: Tensor, memory: Tensor | None = None
+    ) -> Tensor:
         """Return the absolute gradient of the probability, summed over channels. (T, H, W)."""
         method = Saliency(self._forward("probability"))
-        attributed = _in_batches(lambda x, a: method.attribute(x, target=a), observations, actions)
-        return attributed.abs().sum(1)
+        maps = _in_batches(
+            lambda x, a, m: method.attribute(x, a, True, m), observations, actions, memory
+        )
+        return maps.abs().sum(1)
 
-    def integrated_gradients(self, observations: Tensor, actions: Tensor) -> Tensor:
+    def integrated_gradients(
+        self, observations: Tensor, actions: Tensor, memory: Tensor | None = None
+    ) -> Tensor:
         """Return the absolute path integral from the baseline. Shape: (T, H, W)."""
         quick = with_fused_passes(self.network, wrt="pixels")
         method = IntegratedGradients(self._forward("probability", quick))
 
-        def attribute(x: Tensor, a: Tensor) -> Tensor:
+        def attribute(x: Tensor, a: Tensor, m: Tensor | None) -> Tensor:
             return method.attribute(
                 x,
                 self.absent[None],
                 a,
+                m,
                 method="riemann_middle",
                 n_steps=INTEGRATION_STEPS,
                 internal_batch_size=BATCH,
             )
 
-        return _in_batches(attribute, observations, actions).sum(1).abs()
+        return _in_batches(attribute, observations, actions, memory).sum(1).abs()
 
-    def occlusion(self, observations: Tensor, actions: Tensor) -> Tensor:
+    def occlusion(
+        self, observations: Tensor, actions: Tensor, memory: Tensor | None = None
+    ) -> Tensor:
         """Return the change of the probability if a patch is replaced by the baseline. (T, H, W).
 
         Patches overlap by about half; a pixel gets the absolute value of the mean change over the
@@ -99,10 +120,12 @@ class Explainer:
         """
         height, width = observations.shape[-2:]
         windows = _windows(height, width)
-        before = probabilities(self.network, observations).gather(1, actions[:, None])[:, 0]
+        base = probabilities(self.network, observations, memory)
+        before = base.gather(1, actions[:, None])[:, 0]
         change = before.new_zeros(len(before), len(windows))
         absent = self.absent[None].expand_as(observations)
-        for frames, patches, after in replaced(self.network, observations, absent, windows):
+        parts = replaced(self.network, observations, absent, windows, memory)
+        for frames, patches, after in parts:
             change[frames, patches] = before[frames] - after[range(len(frames)), actions[frames]]
         covered = windows.flatten(1).float()
         mean = change @ covered / covered.sum(0).clamp_min(1)
@@ -110,19 +133,19 @@ class Explainer:
 
     def _forward(
         self, objective: Objective, network: nn.Module | None = None
-    ) -> Callable[[Tensor], Tensor]:
+    ) -> Callable[..., Tensor]:
         actions = self.network.actions
         evaluated = self.network if network is None else network
         make = actions.scores if objective == "logit" else actions.probabilities
-        return lambda x: make(evaluated(x))
+        return lambda *inputs: make(evaluate(evaluated, *inputs))
 
 
 def _in_batches(
-    attribute: Callable[[Tensor, Tensor], Tensor], observations: Tensor, actions: Tensor
+    attribute: Callable[..., Tensor], observations: Tensor, actions: Tensor, memory: Tensor | None
 ) -> Tensor:
     """Return attributions of all observations. Shape: (T, ...), that of `attribute`."""
-    pairs = zip(observations.split(BATCH), actions.split(BATCH), strict=True)
-    maps = [attribute(x.detach().clone().requires_grad_(), a).detach() for x, a in pairs]
+    parts = batches(BATCH, observations, actions, memory)
+    maps = [attribute(x.detach().clone().requires_grad_(), a, m).detach() for x, a, m in parts]
     return torch.cat(maps).float()
 
 

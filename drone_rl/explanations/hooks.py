@@ -1,6 +1,12 @@
-"""Layers of a network by name, and their outputs. No hook remains after a call."""
+"""Layers of a network by name, and their outputs. No hook remains after a call.
+
+Recurrent policies are evaluated step by step: `memory`, of shape (T, 2, 1, size), is hidden state
+and cell before each step. Without, each frame is the first of an episode.
+"""
 
 import collections
+import functools
+from collections.abc import Iterator, Mapping
 from typing import Any, cast
 
 import torch
@@ -8,6 +14,7 @@ from captum.attr import LayerActivation
 from torch import Tensor, nn
 
 from drone_rl.policies import ImageNetwork
+from drone_rl.policies.recurrent import CELL, HIDDEN, Memory
 from drone_rl.utils.errors import InputError
 
 BATCH = 512  # observations in one forward pass, which bounds memory
@@ -68,15 +75,39 @@ def feature_layer(network: ImageNetwork) -> str | None:
     return names[-2] if len(names) > 1 else None
 
 
+def memory_in(entries: Mapping[Any, Tensor]) -> Tensor | None:
+    """Return the memory in what an actor reads; None of a policy that is not recurrent."""
+    return torch.stack([entries[HIDDEN], entries[CELL]], 1) if HIDDEN in entries else None
+
+
+def evaluate(network: Any, observations: Tensor, memory: Tensor | None = None) -> Tensor:
+    """Return the outputs of a network. Shape: (T, C, h, w) to (T, num_outputs)."""
+    if memory is None:
+        return network(observations)
+    return network.step(observations, Memory(*memory.unbind(1)))[0]
+
+
+def batches(size: int, *values: Tensor | None) -> Iterator[list[Any]]:
+    """Yield parts of at most `size` rows; None stays None."""
+    for start in range(0, len(cast(Tensor, values[0])), size):
+        yield [None if of is None else of[start : start + size] for of in values]
+
+
 @torch.no_grad()
-def features(network: ImageNetwork, observations: Tensor, layer: str) -> Tensor:
+def features(
+    network: ImageNetwork, observations: Tensor, layer: str, memory: Tensor | None = None
+) -> Tensor:
     """Return a layer's output (T, *) on observations (T, C, h, w); see `find_layer` for errors."""
-    method = LayerActivation(network, find_layer(network, layer))
-    return torch.cat([cast(Tensor, method.attribute(part)) for part in observations.split(BATCH)])
+    method = LayerActivation(functools.partial(evaluate, network), find_layer(network, layer))
+    parts = batches(BATCH, observations, memory)
+    return torch.cat([cast(Tensor, method.attribute(x, m)) for x, m in parts])
 
 
 @torch.no_grad()
-def probabilities(network: ImageNetwork, observations: Tensor) -> Tensor:
+def probabilities(
+    network: ImageNetwork, observations: Tensor, memory: Tensor | None = None
+) -> Tensor:
     """Return action probabilities (Eq. 9). (T, C, h, w) to (T, parts), see `Actions`."""
-    outputs = torch.cat([network(part) for part in observations.split(BATCH)])
+    parts = batches(BATCH, observations, memory)
+    outputs = torch.cat([evaluate(network, *part) for part in parts])
     return network.actions.probabilities(outputs)

@@ -16,7 +16,7 @@ from scipy.stats import rankdata
 from torch import Tensor
 from torch.nn import functional
 
-from drone_rl.explanations.hooks import BATCH, probabilities
+from drone_rl.explanations.hooks import BATCH, evaluate, probabilities
 from drone_rl.policies import ImageNetwork
 from drone_rl.utils.seeding import plain_generator
 
@@ -77,7 +77,11 @@ def make_grid(height: int, width: int, patches: int = PATCHES) -> PatchGrid:
 
 @torch.no_grad()
 def replaced(
-    network: ImageNetwork, observations: Tensor, other: Tensor, masks: Tensor
+    network: ImageNetwork,
+    observations: Tensor,
+    other: Tensor,
+    masks: Tensor,
+    memory: Tensor | None = None,
 ) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
     """Evaluate the policy with one part of an observation replaced, for all parts that differ.
 
@@ -89,22 +93,27 @@ def replaced(
     for batch in (pixels @ masks.flatten(1).float().T > 0).nonzero().split(BATCH):
         frames, parts = batch.unbind(1)
         changed = torch.where(masks[parts, None], other[frames], observations[frames])
-        yield frames, parts, network.actions.probabilities(network(changed))
+        kept = None if memory is None else memory[frames]
+        yield frames, parts, network.actions.probabilities(evaluate(network, changed, kept))
 
 
 def patch_effects(
-    network: ImageNetwork, observations: Tensor, others: Iterable[Tensor], grid: PatchGrid
+    network: ImageNetwork,
+    observations: Tensor,
+    others: Iterable[Tensor],
+    grid: PatchGrid,
+    memory: Tensor | None = None,
 ) -> NDArray:
     """Return the effect on the policy of replacing each patch by alternatives (T, C, h, w).
 
     It is the mean distance of the action probabilities. Shape: (T, count).
     """
-    base = probabilities(network, observations)
+    base = probabilities(network, observations, memory)
     masks, effects = grid.masks(observations.shape[-2:]), []
     distance = network.actions.distance
     for other in others:
         effect = base.new_zeros(len(base), grid.count)
-        for frames, patches, after in replaced(network, observations, other, masks):
+        for frames, patches, after in replaced(network, observations, other, masks, memory):
             effect[frames, patches] = distance(after, base[frames])
         effects.append(effect)
     return torch.stack(effects).mean(0).double().cpu().numpy()
@@ -208,7 +217,11 @@ def smoothed(maps: Tensor, passes: int = 2) -> Tensor:
 
 
 def shuffled_networks(
-    network: ImageNetwork, observations: Tensor, count: int, seed: int = 0
+    network: ImageNetwork,
+    observations: Tensor,
+    count: int,
+    seed: int = 0,
+    memory: Tensor | None = None,
 ) -> Iterator[ImageNetwork]:
     """Yield copies of a policy with weights and biases shuffled within each layer.
 
@@ -218,14 +231,16 @@ def shuffled_networks(
     """
     generator = plain_generator(seed)
     with torch.no_grad():
-        wanted_deviation, wanted_mean = torch.std_mean(network(observations), 0, correction=0)
+        wanted = evaluate(network, observations, memory)
+        wanted_deviation, wanted_mean = torch.std_mean(wanted, 0, correction=0)
     for _ in range(count):
         other = copy.deepcopy(network)
         with torch.no_grad():
             for parameter in other.parameters():
                 order = torch.randperm(parameter.numel(), generator=generator)
                 parameter.copy_(parameter.flatten()[order].view(parameter.shape))
-            deviation, mean = torch.std_mean(other(observations), 0, correction=0)
+            outputs = evaluate(other, observations, memory)
+            deviation, mean = torch.std_mean(outputs, 0, correction=0)
             factor = torch.where(deviation > NO_CHANGE, wanted_deviation / deviation, 1.0)
             other.rescale(factor, wanted_mean - factor * mean)
         yield other

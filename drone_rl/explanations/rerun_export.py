@@ -21,6 +21,7 @@ from drone_rl.envs import base_env
 from drone_rl.envs.rollout import Act, StepContext
 from drone_rl.explanations.attribution import first_heat, shown_methods
 from drone_rl.explanations.heat_maps import Explainer
+from drone_rl.explanations.hooks import memory_in
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.policy import BasePolicy
@@ -64,8 +65,7 @@ def record(
     """Record episodes in held-out environments as Rerun files, and return the files.
 
     The episodes are those of `drone_rl.trust.video.film`. Heat maps are those that a report
-    shows by default, see `drone_rl.explanations.attribution`; recurrent policies and those without
-    gradients have none.
+    shows by default, see `drone_rl.explanations.attribution`; policies without gradients have none.
 
     Args:
         policy: The policy.
@@ -164,6 +164,8 @@ class EpisodeLog:
         self._observed: list[Tensor] = []
         self._parts: list[int] = []
         """The parts of the actions taken."""
+        self._memory: list[Tensor] = []
+        """Memory of a recurrent policy before them."""
         self._return = 0.0
         stream.send_blueprint(_layout(rerun, self._timestep))
         half = self._worlds.task.drone_size / 2
@@ -193,6 +195,8 @@ class EpisodeLog:
         """Log the action that the policy takes now, and the probabilities of all."""
         part = int(self._actions.part(act.action[0]))
         self._parts.append(part)
+        if (memory := memory_in(act.entries)) is not None:
+            self._memory.append(memory)
         probs = probabilities(act, self._actions).cpu().numpy()
         self._log("action/probabilities", self._rr.Scalars(probs))
         self._log("action/taken", self._rr.TextLog(self._actions.names[part]))
@@ -205,12 +209,13 @@ class EpisodeLog:
         for step, image in enumerate(images):
             self._set_step(step)
             self._log("observation", self._rr.Image(image))
-        if network.is_recurrent or not network.is_differentiable:
+        if not network.is_differentiable:
             return
         # the methods that are shown for a policy with gradients do not read the baseline
         maps = Explainer(network, absent=observed[0]).methods()
         device = self._base.device
-        inputs = observed[:-1].to(device), torch.tensor(self._parts, device=device)
+        memory = torch.cat(self._memory) if self._memory else None
+        inputs = observed[:-1].to(device), torch.tensor(self._parts, device=device), memory
         heat, by = first_heat({name: maps[name](*inputs) for name in shown_methods(maps)})
         for step, (one, method) in enumerate(zip(heat.cpu().numpy(), by, strict=True)):
             self._set_step(step)

@@ -41,8 +41,7 @@ class Dataset(Model):
     """Of the policy, relative to the uniform one's."""
     goals_reached: int
     remembers: bool = False
-    """Whether the policy remembers earlier frames in rollouts; of single frames, each counts as the
-    first of an episode."""
+    """Whether the policy remembers earlier frames."""
 
 
 class Faithfulness(Model):
@@ -87,7 +86,10 @@ class Pair(Model):
     opposition: float
     """From 0 to 1; see `Actions.opposition`."""
     kind: Literal["contradiction", "justified", "unknown"]
-    """Whether the next target is at about the same place in both, elsewhere, or one has none."""
+    """Whether the next target is at about the same place in both, elsewhere, or one has none.
+
+    Also unknown if the policy remembers earlier frames, which may justify the difference.
+    """
 
 
 class Loop(Model):

@@ -20,7 +20,7 @@ from torchrl.envs import EnvBase
 from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.envs import worlds_of
 from drone_rl.envs.rollout import ActorAgent, Recording, Step, steps
-from drone_rl.explanations.hooks import features, probabilities
+from drone_rl.explanations.hooks import features, memory_in, probabilities
 from drone_rl.explanations.scenes import Scenes, has_objects
 from drone_rl.policies import ImageNetwork, RecurrentNetwork, greedy_agent
 from drone_rl.sim.dynamics.state import heading_of
@@ -54,6 +54,11 @@ class RolloutDataset:
     def tensor(self, name: str) -> Tensor:
         """Return an array as a tensor."""
         return torch.from_numpy(self.arrays[name])
+
+    @property
+    def memory(self) -> Tensor | None:
+        """Memory of a recurrent policy before each step, see `hooks`; None of others."""
+        return self.tensor("memory") if "memory" in self.arrays else None
 
     def offset(self, worlds: Worlds) -> NDArray:
         """Return how far ahead of the drone and to its left the next target stands. (T, 2).
@@ -118,6 +123,8 @@ def collect(
         "step": torch.cat([torch.arange(length) for length in episodes.length.tolist()]),
         "end_reason": after["end_reason"][:, 0],
     }
+    if (memory := memory_in(dict(batch.items()))) is not None:
+        arrays["memory"] = memory
     dataset = RolloutDataset({name: value.cpu().numpy() for name, value in arrays.items()})
     if has_objects(task):
         dataset.arrays["next_target"] = task.next_target(dataset.state(worlds)).cpu().numpy()
@@ -194,9 +201,10 @@ def render_frames(
     arrays["frames"] = scenes.frames(state).cpu().numpy()
     arrays["regions"] = scenes.regions(state).cpu().numpy()
     arrays["depth"] = scenes.depth(state).cpu().numpy().astype(np.float16)
-    arrays["probabilities"] = probabilities(network, observations).cpu().numpy()
+    arrays["probabilities"] = probabilities(network, observations, dataset.memory).cpu().numpy()
     for layer in layers:
-        arrays[f"features/{layer}"] = features(network, observations, layer).cpu().numpy()
+        outputs = features(network, observations, layer, dataset.memory)
+        arrays[f"features/{layer}"] = outputs.cpu().numpy()
     return dataset
 
 

@@ -16,7 +16,7 @@ distribution and any dependence within episodes.
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 import torch
@@ -45,8 +45,9 @@ from drone_rl.explanations.scenes import alternatives
 from drone_rl.policies import ImageNetwork
 from drone_rl.utils.intervals import Mean, episode_means, mean_interval, median_bounds
 
-MapOf = Callable[[ImageNetwork, Tensor, Tensor], Tensor]
-"""A method: network, observations (T, C, h, w) and actions (T,) to maps (T, h, w), 0 or more."""
+MapOf = Callable[..., Tensor]
+"""A method: network, observations (T, C, h, w), actions (T,), and of recurrent policies memory, see
+`hooks`, to maps (T, h, w), 0 or more."""
 ERROR_RATE = 0.05  # probability that any method is trusted whose maps do not depend on the policy
 FRAMES_AN_EPISODE = 10  # frames of an episode that are tested, evenly spaced
 WEIGHT_SEEDS = 5  # shuffled policies whose maps are compared with the policy's, pixel by pixel
@@ -66,6 +67,7 @@ class Trial:
     placebos: dict[str, Tensor]  # (T, h, w) each
     episode: NDArray  # (T,)
     grid: PatchGrid
+    memory: Tensor | None = None  # see `hooks`
     frames_without_effect: int = 0  # left out, as no patch affects the policy
     seed: int = 0  # of shuffled weights
 
@@ -79,11 +81,19 @@ class Trial:
             effects=self.effects[rows],
             placebos={name: maps[index] for name, maps in self.placebos.items()},
             episode=self.episode[rows],
+            memory=None if self.memory is None else self.memory[index],
         )
 
     def maps(self, method: MapOf, network: ImageNetwork | None = None) -> Tensor:
         """Return a method's maps of the trial's frames. Shape: (T, h, w)."""
-        return method(network or self.network, self.observations, self.actions)
+        memory = () if self.memory is None else (self.memory,)
+        return method(network or self.network, self.observations, self.actions, *memory)
+
+    def shuffled(self, count: int) -> Iterator[ImageNetwork]:
+        """Yield policies with shuffled weights, see `shuffled_networks`."""
+        return shuffled_networks(
+            self.network, self.observations, count, self.seed, memory=self.memory
+        )
 
     def scores(self, maps: Tensor) -> NDArray:
         """Return the score of each map. Shape: (T, h, w) to (T,)."""
@@ -107,8 +117,9 @@ def make_trial(context: Context) -> Trial:
     state = data.state(scenes.worlds)[index]
     others = list(alternatives(scenes, state, seed).values())
     actions, seen = data.tensor("actions")[index], scenes.observe(state)
-    episode = data.episode[rows]
-    return measure(context.network, actions, seen, others, scenes.absent, episode, seed)
+    memory = None if data.memory is None else data.memory[index]
+    episode, network = data.episode[rows], context.network
+    return measure(network, actions, seen, others, scenes.absent, episode, seed, memory)
 
 
 def measure(
@@ -119,6 +130,7 @@ def measure(
     absent: Tensor,
     episode: NDArray,
     seed: int = 0,
+    memory: Tensor | None = None,
 ) -> Trial:
     """Return a trial on the frames in which some patch affects a policy.
 
@@ -130,9 +142,10 @@ def measure(
         absent: Observation of the scene without objects. Shape: (C, h, w).
         episode: Number of each frame's episode. Shape: (T,).
         seed: Of noise and shuffled weights.
+        memory: That of a recurrent policy before each step, see `hooks`.
     """
     grid = make_grid(*observations.shape[-2:])
-    effects = patches.patch_effects(network, observations, others, grid)
+    effects = patches.patch_effects(network, observations, others, grid, memory)
     moved = patches.has_effect(effects)
     trial = Trial(
         network=network,
@@ -142,6 +155,7 @@ def measure(
         placebos=placebo_maps(observations, absent, others, seed),
         episode=episode,
         grid=grid,
+        memory=memory,
         frames_without_effect=int((~moved).sum()),
         seed=seed,
     )
@@ -223,7 +237,7 @@ def depends_on_weights(trial: Trial, method: MapOf, level: float) -> bool:
     few = trial.thinned()
     score = float(few.scores(few.maps(method)).mean())
     count = math.ceil(1 / level) - 1
-    networks = shuffled_networks(trial.network, trial.observations, count, trial.seed)
+    networks = trial.shuffled(count)
     return all(few.scores(few.maps(method, n)).mean() < score - 1e-9 for n in networks)
 
 
@@ -231,7 +245,7 @@ def _likeness(trial: Trial, method: MapOf, level: float) -> Likeness:
     """Compare a policy's maps with those of shuffled weights, all seeds together and each."""
     few = trial.thinned()
     maps = few.maps(method)
-    networks = shuffled_networks(trial.network, trial.observations, WEIGHT_SEEDS, trial.seed)
+    networks = trial.shuffled(WEIGHT_SEEDS)
     seeds = np.stack([likeness(maps, few.maps(method, network)) for network in networks])
     medians = tuple(np.median(seeds, axis=1).tolist())
     return Likeness(**_median(seeds.mean(0), few.episode, level).model_dump(), seeds=medians)

@@ -29,7 +29,8 @@ def section(context: Context) -> Truth:
     trial = trust.make_trial(context)
     changes, outcomes = [], None
     if has_objects(scenes.task):
-        changes = intervene(scenes, network, state, data.tensor("regions"), seed=seed)
+        regions = data.tensor("regions")
+        changes = intervene(scenes, network, state, regions, seed, data.memory)
         outcomes = measure_outcomes(scenes, network, state, episode)
     shown_frame = clear_frame(changes[0]) if changes else 0
     methods = trust.method_maps(context.explainer) if network.has_weights else {}
@@ -63,14 +64,19 @@ class Intervention:
 
 
 def intervene(
-    scenes: Scenes, network: ImageNetwork, state: State, regions: Tensor, seed: int = 0
+    scenes: Scenes,
+    network: ImageNetwork,
+    state: State,
+    regions: Tensor,
+    seed: int = 0,
+    memory: Tensor | None = None,
 ) -> list[Intervention]:
     """Remove, move and recolor the next target; as a control, change a patch of ground.
 
-    `regions` has the `Region` of each pixel (T, H, W).
+    `regions` has the `Region` of each pixel (T, H, W). For `memory` see `hooks`.
     """
     before = scenes.frames(state)
-    base = probabilities(network, scenes.transform(before))
+    base = probabilities(network, scenes.transform(before), memory)
     visible = regions == Region.NEXT_TARGET
     ground = _patches(regions == Region.GROUND, visible.sum((1, 2)), seed)
     recolored = scenes.frames(state, OTHER_TARGETS)
@@ -84,7 +90,8 @@ def intervene(
     }
     interventions = []
     for name, (frames, area) in changes.items():
-        effect = scenes.actions.distance(probabilities(network, scenes.transform(frames)), base)
+        after = probabilities(network, scenes.transform(frames), memory)
+        effect = scenes.actions.distance(after, base)
         effect = torch.where(area.flatten(1).any(1), effect, torch.nan).double().cpu().numpy()
         interventions.append(Intervention(name, area, effect, frames))
     return interventions

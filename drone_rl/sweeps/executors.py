@@ -21,7 +21,7 @@ from drone_rl.utils.files import is_locked, read_tail, write_atomically
 from drone_rl.utils.limits import LOG_BYTES
 from drone_rl.utils.provenance import num_cores
 from drone_rl.utils.ray_cluster import connect
-from drone_rl.utils.readers import read_result
+from drone_rl.utils.run_result import read_result
 from drone_rl.utils.schema import OneOf
 
 PROGRAM = (sys.executable, "-m", "drone_rl.cli.main")

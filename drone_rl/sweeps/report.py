@@ -4,11 +4,10 @@ It needs no torch unless the runs are judged again.
 """
 
 import base64
-import json
 import logging
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from markupsafe import Markup, escape
 
@@ -23,11 +22,12 @@ from drone_rl.sweeps.summary import (
     summarise_sweep,
     to_csv,
 )
+from drone_rl.trust.results import Verdict
 from drone_rl.utils.display import content_security_policy, page_environment, static_text
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, last_of, newest, write_atomically
 from drone_rl.utils.models import Seeded
-from drone_rl.utils.readers import read_result
+from drone_rl.utils.run_result import read_result
 from drone_rl.utils.text import FILTERS, render
 
 if TYPE_CHECKING:
@@ -118,14 +118,14 @@ def judge_sweep(sweep: Sweep, episodes: int, device: str) -> None:
         name = sweep.name_of(run)
         try:
             verdict = judge_run(run.folder, episodes, device, seed=seed)
-            _log.info("[%d/%d] %s: %s", number, len(finished), name, verdict["kind"])
+            _log.info("[%d/%d] %s: %s", number, len(finished), name, verdict.kind.value)
         except InputError as error:
             _log.warning("[%d/%d] %s not judged: %s", number, len(finished), name, error)
 
 
 def judge_run(
     folder: Path, episodes: int, device: str, *, seed: "RootSeed | None" = None
-) -> dict[str, Any]:
+) -> Verdict:
     """Judge the last policy of a finished run and store the verdict in its result.json.
 
     All runs that are compared need the same root of the environments' streams; default: fresh.
@@ -139,15 +139,13 @@ def judge_run(
         result = read_result(folder)
         if result is None:
             raise InputError(f"{folder} has no result.json; give the sweep's command to finish it")
-        judged, progress = judge_for_selection(last_of(folder), episodes, device, seed=seed)
-        verdict = judged.as_dict()
-        if progress.frames != result.get("frames"):
+        verdict, progress = judge_for_selection(last_of(folder), episodes, device, seed=seed)
+        if progress.frames != result.frames:
             raise InputError(
                 f"{folder}/checkpoints/last.pt is of frame {progress.frames}, result.json of "
-                f"frame {result.get('frames')}; resume with: drone-rl train resume={folder}"
+                f"frame {result.frames}; resume with: drone-rl train resume={folder}"
             )
-        content = json.dumps({**result, "verdict": verdict}, indent=2)
-        write_atomically(folder / "result.json", content)
+        result.with_verdict(verdict.as_dict()).write(folder)
     return verdict
 
 

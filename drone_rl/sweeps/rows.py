@@ -2,7 +2,6 @@
 
 import contextlib
 import itertools
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -14,25 +13,15 @@ from drone_rl.sweeps.manifest import Run, Sweep, read_failure, read_sweep
 from drone_rl.trust.results import Verdict
 from drone_rl.trust.rule import SIDES, Rule
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.models import Model, Stored
-from drone_rl.utils.readers import read_result, read_table
+from drone_rl.utils.models import Model
+from drone_rl.utils.readers import read_table
+from drone_rl.utils.run_result import OwnVerdict, RunResult
 
 Array = NDArray[np.float64]
 LAST_UPDATES = 20
 """Number of last updates over which the entropy is averaged."""
 _DAMAGE = (ValueError, LookupError, TypeError)
 """Exceptions that reading damaged files raises; `InputError` is a `ValueError`."""
-
-
-class _Result(Stored):
-    """What a row takes from `result.json`."""
-
-    reason: str
-    frames: Annotated[int, Field(ge=0)]
-    episodes: Annotated[int, Field(ge=0)]
-    seconds: Annotated[float, Field(ge=0.0)]
-    largest_reward: Annotated[float, Field(gt=0.0)]
-    running_reward: float
 
 
 class Row(Model):
@@ -115,33 +104,39 @@ def _choice(run: Run) -> dict[str, str]:
 def _read_row(run: Run, settings: dict[str, str], folder: str) -> Row:
     command = run.repeat_command()
     row = Row(run=run.number, settings=settings, folder=folder, command=command)
-    result, error = read_result(run.folder), read_failure(run)
-    if result is None and error is None:
-        return row
-    if result is None:
-        progress = {}
-        with contextlib.suppress(*_DAMAGE):  # a failed run may have metrics
-            progress, _ = _read_metrics(run.folder)
-        return row.replace(state="failed", error=error, **progress)
     try:
-        figures = _Result.read(result, "result")
+        result = RunResult.of(run.folder)
+        if result is None:
+            return _read_unfinished(row, run)
         progress, curve = _read_metrics(run.folder)
-        judged = _read_verdict(result.get("verdict"))
+        judged = _read_verdict(result.verdict)
     except _DAMAGE as damage:
         return row.replace(state="failed", error=f"its files can't be read ({damage})")
-    reward, most = figures.running_reward, figures.largest_reward
+    reward, most = result.running_reward, result.largest_reward
+    shared = {"reason", "frames", "episodes", "seconds", "running_reward"}
     return row.replace(
         state="finished",
-        **progress | figures.model_dump(exclude={"largest_reward"}),
+        **progress | result.model_dump(include=shared),
         curve=(curve[0], curve[1] / most),
         final_share=reward / most,
     ).replace(**{} if judged is None else _figures_of(judged))
 
 
-def _read_verdict(verdict: Mapping[str, Any] | None) -> Verdict | None:
+def _read_unfinished(row: Row, run: Run) -> Row:
+    """Return the row of a run without a result, which has failed or is unfinished."""
+    error, progress = read_failure(run), {}
+    if error is None:
+        return row
+    with contextlib.suppress(*_DAMAGE):  # a failed run may have metrics
+        progress, _ = _read_metrics(run.folder)
+    return row.replace(state="failed", error=error, **progress)
+
+
+def _read_verdict(verdict: OwnVerdict | None) -> Verdict | None:
     """Return the verdict if it is by the current rule."""
-    is_current = verdict is not None and verdict["rule"] == Rule().text
-    return Verdict.read(verdict, "result.verdict") if is_current else None
+    if verdict is None or verdict.rule != Rule().text:
+        return None
+    return Verdict.read(dict(verdict), "result.verdict")
 
 
 def _figures_of(judged: Verdict) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from typing import Any
 from drone_rl.utils.errors import InputError, extra
 from drone_rl.utils.files import read_bytes
 from drone_rl.utils.limits import JOURNAL_BYTES
+from drone_rl.utils.run_result import RunResult
 
 NAME = "sweep"
 METRICS = {"running_reward": "running reward", "success": "success rate"}
@@ -82,17 +83,17 @@ def next_trials(study: Any, space: Mapping[str, Any], count: int, seed: int) -> 
     return study.trials[begin:]
 
 
-def note_outcome(study: Any, number: int, result: Mapping[str, Any] | None) -> None:
+def note_outcome(study: Any, number: int, result: RunResult | None) -> None:
     """Report the outcome of a trial: the value of the study's metric, pruned or failed."""
     states = import_optuna().trial.TrialState
     if study.trials[number].state != states.RUNNING:
         return
     by_success = metric_of(study) == "success"
-    if result is None or (by_success and not result.get("confirming_flights")):
+    if result is None or (by_success and not result.confirming_flights):
         study.tell(number, state=states.FAIL)
-    elif result["reason"] == "pruned":
+    elif result.reason == "pruned":
         study.tell(number, state=states.PRUNED)
     elif by_success:
-        study.tell(number, result["confirming_flights_succeeded"] / result["confirming_flights"])
+        study.tell(number, result.confirming_flights_succeeded / result.confirming_flights)
     else:
-        study.tell(number, float(result["running_reward"]))
+        study.tell(number, result.running_reward)

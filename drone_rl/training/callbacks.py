@@ -17,6 +17,7 @@ from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.files import make_folder, write_atomically
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.readers import read_table
+from drone_rl.utils.run_result import NAME
 from drone_rl.utils.schema import Instance, Several
 
 
@@ -141,7 +142,7 @@ class CsvCallback(Callback):
 
     def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
         """Append a row; delete result.json, which is of the training before this update."""
-        self.path.with_name("result.json").unlink(missing_ok=True)
+        self.path.with_name(NAME).unlink(missing_ok=True)
         done = training.progress
         counters = {"update": done.updates, "frames": done.frames, "episodes": done.episodes}
         _append_row(self.path, {**counters, "seconds": round(done.seconds, 3)}, metrics)
@@ -185,11 +186,6 @@ class CollapseCheck(Callback):
         """Episodes and updates at the last sign of learning."""
         self.collapsed_at: int | None = None
         """Frames at the warning, if there was one."""
-
-    @property
-    def result(self) -> dict[str, int]:
-        """Entry of `result.json`, if learning collapsed."""
-        return {} if self.collapsed_at is None else {"collapsed_at_frames": self.collapsed_at}
 
     def on_start(self, training: OngoingTraining) -> None:
         """Count from here, also in a resumed run."""

@@ -9,7 +9,7 @@ checkpoint, so that a resumed run does not repeat it.
 import math
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Annotated, Any, NamedTuple, Self, TypeVar
+from typing import Any, NamedTuple, Self, TypeVar
 
 import torch
 from tensordict import TensorDict, TensorDictBase
@@ -26,33 +26,13 @@ from drone_rl.training.callbacks import Callback
 from drone_rl.training.demonstrations import Demonstration
 from drone_rl.training.learners import NotANumberError, add_gradients, descend
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Real, Whole
+from drone_rl.utils.run_result import Cloning
 from drone_rl.utils.seeding import Stream, torch_generator
-from drone_rl.utils.settings import Settings
 
 MOST_ACTION = math.tanh(MOST_MEAN)
 """Largest magnitude of a continuous action that a greedy policy takes."""
 _LOSS = "loss_cloning"
 T = TypeVar("T")
-_Count = Annotated[int, Whole(0, 2**62)]
-_Loss = Annotated[float, Real(-1e30, 1e30)]
-_Rate = Annotated[float, Real(0.0, 1.0)]
-
-
-class Cloning(Settings):
-    """Result of behavior cloning, the entry "cloning" of `result.json`."""
-
-    folder: str  # of the demonstrations
-    demonstrations: _Count  # that it learned from
-    frames: _Count  # of these
-    held_out_demonstrations: _Count  # that only measured
-    held_out_frames: _Count  # of these
-    epochs: _Count
-    loss: _Loss  # mean over the frames of the last epoch, measured while learning
-    accuracy: _Rate  # fraction of the same frames whose most probable action is the recorded one
-    held_out_loss: _Loss | None  # after the last epoch; None without held-out demonstrations
-    held_out_accuracy: _Rate | None
-    seconds: Annotated[float, Real(0.0, 1e12)]
 
 
 class RecordedFrames(NamedTuple):
@@ -222,7 +202,7 @@ def clone(
         held_out_accuracy=done.get("held_out_accuracy"),
         seconds=round(time.perf_counter() - begin, 3),
     )
-    return {"cloning": result.values()}
+    return {"cloning": result.model_dump()}
 
 
 def _named(terms: Any) -> dict[str, float]:

@@ -3,7 +3,6 @@
 import contextlib
 import dataclasses
 import enum
-import json
 import logging
 import math
 import signal
@@ -22,8 +21,7 @@ from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import Checkpoint, describe, read_checkpoint
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.tasks import Task, as_settings, as_task
-from drone_rl.training.callbacks import CheckpointCallback, TrainingProgress
-from drone_rl.training.cloning import Cloning
+from drone_rl.training.callbacks import CheckpointCallback, CollapseCheck, TrainingProgress
 from drone_rl.training.confirmation import Confirmation
 from drone_rl.training.demonstrations import Demonstration, FlightConditions, read_demonstrations
 from drone_rl.training.restore import check_fits
@@ -41,9 +39,12 @@ from drone_rl.utils.files import (
 from drone_rl.utils.models import Model
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.readers import read_metrics
+from drone_rl.utils.run_result import NAME, Cloning, RunResult
 from drone_rl.utils.schema import shown
 
 _log = logging.getLogger(__name__)
+_EPISODES_PER_CONFIRMED = 10
+"""Episodes of training for each of a confirmation, where no running reward calls for one."""
 MAY_CHANGE = (
     "trainer.total_frames",
     "trainer.total_episodes",
@@ -63,16 +64,18 @@ class Training(Result):
     """Result of a training run."""
 
     folder: Path
-    reason: str
-    """Why it stopped: "solved", "frames", "episodes", a signal's name, or a callback's
-    `stop_request`, such as "pruned"."""
-    result: dict[str, Any]
+    result: RunResult
     """Content of `result.json`."""
+
+    @property
+    def reason(self) -> str:
+        """Why it stopped, see `RunResult.reason`."""
+        return self.result.reason
 
     @property
     def running_reward(self) -> float:
         """Running mean of the episodes' rewards at the end."""
-        return self.result["running_reward"]
+        return self.result.running_reward
 
     @property
     def policy(self) -> Policy:
@@ -84,11 +87,11 @@ class Training(Result):
         return read_metrics(self.folder)
 
     def __str__(self) -> str:
-        judged = self.result.get("verdict")
-        verdict = f", verdict: {judged['kind']}" if judged else ""
+        result = self.result
+        verdict = f", verdict: {result.verdict.kind}" if result.verdict else ""
         return (
-            f"stopped ({self.reason}) after {self.result['frames']:,} frames, "
-            f"{self.result['episodes']:,} episodes, {self.result['seconds']:.1f} s: "
+            f"stopped ({self.reason}) after {result.frames:,} frames, "
+            f"{result.episodes:,} episodes, {result.seconds:.1f} s: "
             f"running reward {self.running_reward:.3f}{verdict}; {self.folder}"
         )
 
@@ -99,8 +102,8 @@ class Training(Result):
         figure = Figure(figsize=(6, 3), layout="constrained")
         axes = figure.add_subplot(xlabel="frames", ylabel="running mean of rewards")
         axes.plot(columns["frames"], columns["train/running_reward"])
-        values = {k: v for k, v in self.result.items() if not isinstance(v, dict)}
-        rows = [[k, f"{v:.4g}" if isinstance(v, float) else str(v)] for k, v in values.items()]
+        values = [(k, v) for k, v in self.result if isinstance(v, str | int | float)]
+        rows = [[k, f"{v:.4g}" if isinstance(v, float) else str(v)] for k, v in values]
         return table(["training", str(self.folder)], rows) + picture(figure)
 
 
@@ -132,7 +135,7 @@ class RunFolder:
             )
         if resume:
             return cls(folder), read_checkpoint(last_of(folder))
-        is_finished = (folder / "result.json").exists()
+        is_finished = (folder / NAME).exists()
         if is_finished or last_of(folder).exists():
             kind = "a finished" if is_finished else "an unfinished"
             raise InputError(
@@ -203,7 +206,7 @@ class RunFolder:
             checkpoints.best = saved["best"]
             if "cloning" in saved:
                 cloning = Cloning.read(saved["cloning"], "the checkpoint's cloning")
-                checkpoints.extra["cloning"] = cloning.values()
+                checkpoints.extra["cloning"] = cloning.model_dump()
         extra = checkpoints.extra
         noted = {"config": extra["config"], "description": extra["description"]}
         text = yaml.safe_dump({**noted, **extra["provenance"]}, sort_keys=False)
@@ -242,13 +245,15 @@ def possible_ends(settings: TrainSettings) -> list[enum.IntEnum]:
 
 
 def target_of(settings: TrainSettings) -> float | None:
-    """Return the running reward at which a run is solved, if any.
+    """Return the running reward at which a run is solved; None if none is known or wanted.
 
     Raises:
         InputError: It is a fraction of a largest reward that is not above 0 and finite, as are all
             figures.
     """
     share, largest = settings.trainer.target_share, as_task(settings.task).largest_reward
+    if largest is None:
+        return None
     if not 0 < largest < math.inf:
         raise InputError(
             f"task={settings.task.name} has largest_reward={largest:g}, of which no fraction is a "
@@ -257,34 +262,47 @@ def target_of(settings: TrainSettings) -> float | None:
     return share and share * largest
 
 
+def confirm_interval_of(settings: TrainSettings) -> int | None:
+    """Return the updates between confirmations in a task whose largest reward is unknown.
+
+    Confirmations are then a tenth of all episodes. None if they follow the target, or for none.
+    """
+    trainer = settings.trainer
+    is_known = as_task(settings.task).largest_reward is not None
+    if is_known or trainer.target_share is None or not trainer.confirm_episodes:
+        return None
+    episodes = _EPISODES_PER_CONFIRMED * trainer.confirm_episodes
+    return math.ceil(episodes / settings.collector.num_envs)
+
+
 def result_of(
     trainer: Trainer,
     settings: TrainSettings,
     confirmation: Confirmation | None,
     checkpoints: CheckpointCallback,
-) -> dict[str, Any]:
-    """Return the values of `result.json`."""
-    confirmed = {} if confirmation is None else confirmation.result
-    cloned = {k: v for k, v in checkpoints.extra.items() if k == "cloning"}
-    progress = dataclasses.asdict(trainer.progress)
-    figures = {
-        "reason": trainer.reason,
-        **progress,
-        "largest_reward": as_task(settings.task).largest_reward,
-    }
-    return {**figures, **confirmed, **cloned}
+    collapse: CollapseCheck,
+) -> RunResult:
+    """Return the content of `result.json`."""
+    return RunResult(
+        reason=trainer.reason,
+        **dataclasses.asdict(trainer.progress),
+        largest_reward=as_task(settings.task).largest_reward,
+        **({} if confirmation is None else confirmation.result),
+        collapsed_at_frames=collapse.collapsed_at,
+        cloning=checkpoints.extra.get("cloning"),
+    )
 
 
 def finish(
-    settings: TrainSettings, folder: Path, result: dict[str, Any], judge: Judge | None
+    settings: TrainSettings, folder: Path, result: RunResult, judge: Judge | None
 ) -> Training:
     """Judge the last policy if settings request it and no signal came; write `result.json`."""
-    if settings.evaluate_after and judge and not result["reason"].startswith("SIG"):
+    if settings.evaluate_after and judge and not result.is_interrupted:
         last, episodes = last_of(folder), settings.evaluate_after
         verdict, _ = judge.verdict(last, episodes, settings.device, settings.renderer)
-        result["verdict"] = verdict.model_dump(mode="json")
-    write_atomically(folder / "result.json", json.dumps(result, indent=2, allow_nan=False))
-    return Training(folder, result["reason"], result)
+        result = result.with_verdict(verdict.model_dump(mode="json"))
+    result.write(folder)
+    return Training(folder, result)
 
 
 def reraise_signal(training: Training, function: str = "train") -> Training:
@@ -296,7 +314,7 @@ def reraise_signal(training: Training, function: str = "train") -> Training:
     a KeyboardInterrupt and no subclass: Python exits by SIGINT, as shells expect, for it alone.
     SIGTERM raises a SystemExit.
     """
-    if not training.reason.startswith("SIG"):
+    if not training.result.is_interrupted:
         return training
     number = signal.Signals[training.reason]
     handler = signal.getsignal(number)

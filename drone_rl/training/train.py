@@ -37,6 +37,7 @@ from drone_rl.utils.available_memory import require_memory
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress
 from drone_rl.utils.provenance import num_cores
+from drone_rl.utils.run_result import RunResult
 from drone_rl.utils.seeding import Stream, as_global_stream, torch_generator
 from drone_rl.utils.threads import torch_threads
 
@@ -88,7 +89,7 @@ def learn(
     state: Checkpoint | None,
     callbacks: Sequence[Callback],
     replay: FailureReplayTask | None = None,
-) -> dict[str, Any]:
+) -> RunResult:
     """Clone demonstrations, if any, and train until solved, out of budget or stopped; write files.
 
     Args:
@@ -99,7 +100,7 @@ def learn(
         replay: Task that replays failures, used instead of the settings' task; not saved.
 
     Returns:
-        Why it stopped and how far it came, as in `result.json`.
+        The content of `result.json`, without a verdict.
 
     Raises:
         InputError: The checkpoint is of another training run, or learning broke down.
@@ -121,7 +122,7 @@ def learn(
         if confirmation is not None:
             stack.callback(confirmation.close)
         checkpoints = run.checkpoints(settings)
-        collapse = CollapseCheck(target or as_task(settings.task).largest_reward)
+        collapse = CollapseCheck(target or as_task(settings.task).largest_reward or 0.0)
         first = (CsvCallback(folder / "metrics.csv"), checkpoints, collapse)
         trainer = Trainer(
             collector=parts.collector,
@@ -131,6 +132,7 @@ def learn(
             stream=stream if modules_of(settings) else None,
             target=target,
             confirm=confirmation,
+            confirm_interval=run_folder.confirm_interval_of(settings),
             total_frames=limits.total_frames,
             total_episodes=limits.total_episodes,
             running_decay=limits.running_decay,
@@ -150,7 +152,7 @@ def learn(
         except NotANumberError as error:
             last = checkpoints.last_path
             raise InputError(f"{error}; the last good checkpoint is {last}") from error
-        return run_folder.result_of(trainer, settings, confirmation, checkpoints) | collapse.result
+        return run_folder.result_of(trainer, settings, confirmation, checkpoints, collapse)
 
 
 class Components(NamedTuple):

@@ -64,6 +64,8 @@ class Trainer:
     confirm: Callable[[int], bool] | None = None
     """Called with the number of updates when the target is reached; returns whether the policy has
     solved its task. By default the target is enough."""
+    confirm_interval: int | None = None
+    """Updates between two calls of `confirm` in a task without a target; None for no calls."""
     running_decay: float = 0.99
     """Weight of the old value in the running mean, per episode."""
     ends: Iterable[enum.IntEnum] = ()
@@ -185,8 +187,12 @@ class Trainer:
         return "frames" if progress.frames >= self.total_frames else ""
 
     def _is_solved(self) -> bool:
-        progress = self.progress
-        if self.target is None or progress.running_reward < self.target:
+        progress, interval = self.progress, self.confirm_interval
+        if self.target is not None:
+            is_due = progress.running_reward >= self.target
+        else:
+            is_due = interval is not None and progress.updates and progress.updates % interval == 0
+        if not is_due:
             return False
         begin = time.perf_counter()
         is_confirmed = self.confirm is None or self.confirm(progress.updates)

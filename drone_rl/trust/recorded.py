@@ -9,7 +9,7 @@ from drone_rl.trust.judge import Judgement, identify
 from drone_rl.trust.results import Verdict
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import make_folder, newest_first
-from drone_rl.utils.readers import read_result
+from drone_rl.utils.run_result import read_result
 from drone_rl.utils.text import rate
 
 NAME = "verdict.json"
@@ -50,9 +50,10 @@ def _own(policy: Policy) -> Iterator[tuple[float, Verdict]]:
     path, verdict = policy.path, policy.state.verdict
     if path.suffix == ".pt":
         path = path.absolute().parents[1] / "result.json"
-        result = read_result(path.parent) or {}
-        is_same = result.get("frames") == policy.state.progress.frames
-        verdict = result.get("verdict") if is_same else None
+        result = read_result(path.parent)
+        if result is None or result.frames != policy.state.progress.frames:
+            return
+        verdict = result.verdict and dict(result.verdict)
     with suppress(InputError):
         if verdict is not None:
             yield path.stat().st_mtime, Verdict.read(verdict)

@@ -129,23 +129,23 @@ class Rule(Model):
 
     @property
     def text(self) -> str:
-        """The rule as text."""
-        strata = ", ".join(self.strata)
+        """The rule as text, for all strata and baselines."""
         return f"""\
 good: the share of episodes in which every goal is reached is more than \
 {100 * self.good_share:g}% of the oracle's, and so are more than {100 * self.side_share:g}% of the \
-goals of each stratum ({strata}), wherever more than {100 * self.offered_share:g}% of episodes \
-offer one. good, but trivial: the same, but random actions or one action always succeed in at \
-least {100 * self.good_share:g}% of the episodes that the policy or the oracle solves, too. \
-one-sided: more than {100 * self.side_share:g}% of the goals of the first or last stratum and no \
-more than {100 * self.other_share:g}% of the other one, both offered. poor: neither, and no \
-farther than {self.poor_margin:.0%} of the way from luck to the oracle, in goals; luck is the best \
-of random actions and of each action always, in the same environments. none of these: anything \
-else. Without an oracle that succeeds in more than {USABLE:.0%} of episodes, thresholds are \
-absolute: success in every episode takes its place. Every episode counts once: a share is a mean over \
-episodes. The verdict is certain if the kind is the same wherever the quantities lie within their \
-intervals. The procedure that gives them errs in at most {100 * self.error_rate:g}% of cases, that \
-is, an interval misses its quantity, whatever depends on what within an episode."""
+goals of each stratum (such as left, ahead and right), wherever more than \
+{100 * self.offered_share:g}% of episodes offer one. good, but trivial: the same, but random \
+actions or one action always succeed in at least {100 * self.good_share:g}% of the episodes that \
+the policy or the oracle solves, too. one-sided: more than {100 * self.side_share:g}% of the goals \
+of the first or last stratum and no more than {100 * self.other_share:g}% of the other one, both \
+offered. poor: neither, and no farther than {self.poor_margin:.0%} of the way from luck to the \
+oracle, in goals; luck is the best of random actions and of each action always, in the same \
+environments. none of these: anything else. Without an oracle that succeeds in more than \
+{USABLE:.0%} of episodes, thresholds are absolute: success in every episode takes its place. \
+Every episode counts once: a share is a mean over episodes. The verdict is certain if the kind is \
+the same wherever the quantities lie within their intervals. The procedure that gives them errs in \
+at most {100 * self.error_rate:g}% of cases, that is, an interval misses its quantity, whatever \
+depends on what within an episode."""
 
 
 class Quantity(Stored):

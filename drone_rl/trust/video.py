@@ -76,9 +76,9 @@ def film(
     with policy.flying(1, seed=seed, device=device, renderer=renderer) as (env, actor):
         for episode in range(episodes):
             frames = list(film_episode(env, actor, greedy=greedy))
-            files += write_video(frames, folder / f"episode_{episode}")
-    for file in files:
-        _log.info("written: %s", file)
+            written = write_video(frames, folder / f"episode_{episode}")
+            _log.info("written: %s and %s", *written)
+            files += written
     return files
 
 

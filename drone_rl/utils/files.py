@@ -107,17 +107,16 @@ def read_json(path: Path, most: int = SMALL_JSON_BYTES) -> Any:
     return parse_json(read_bytes(path, most), str(path))
 
 
-def parse_json(content: bytes | str, where: str, *, allow_nan: bool = False) -> Any:
-    """Return plain data from JSON, whose numbers are finite by default.
+def parse_json(content: bytes | str, where: str) -> Any:
+    """Return plain data from JSON, whose numbers are finite.
 
     `where` is its name for messages.
 
     Raises:
         InputError: It is no such JSON.
     """
-    number = float if allow_nan else _finite
     try:
-        return json.loads(content, parse_float=number, parse_constant=number)
+        return json.loads(content, parse_float=_finite, parse_constant=_finite)
     except (ValueError, RecursionError) as error:
         raise InputError(
             f"{where} is damaged or no plain JSON ({str(error)[:200]}); give another file"

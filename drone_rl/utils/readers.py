@@ -9,9 +9,8 @@ from typing import Any
 import yaml
 
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import parse_json, read_bytes
-from drone_rl.utils.limits import METRICS_BYTES, RESULT_BYTES, YAML_BYTES
-from drone_rl.utils.schema import Text, as_mapping
+from drone_rl.utils.files import read_bytes
+from drone_rl.utils.limits import METRICS_BYTES, YAML_BYTES
 
 
 def read_yaml(path: Path, most: int = YAML_BYTES) -> Any:
@@ -79,14 +78,3 @@ def read_metrics(folder: Path) -> dict[str, list[float]]:
     """Return the columns of a run's `metrics.csv`, one value for each update; see `read_table`."""
     head, *rows = read_table(folder / "metrics.csv")
     return {name: [float(row[i]) for row in rows] for i, name in enumerate(head)}
-
-
-def read_result(folder: Path) -> dict[str, Any] | None:
-    """Return `result.json` of a finished run, or None for an unfinished one."""
-    try:
-        content = read_bytes(folder / "result.json", RESULT_BYTES)
-        result = dict(as_mapping(parse_json(content, "result", allow_nan=True), "result"))
-        reason = Text(100).read(result.get("reason"), "reason")
-    except InputError:
-        return None
-    return None if reason.startswith("SIG") else result

@@ -67,6 +67,10 @@ class Settings(Model):
         """Raise an `InputError` about a field: its value, what is wrong, and the remedy."""
         raise InputError(f"{name}={plain(getattr(self, name))} {problem}")
 
+    def __hash__(self) -> int:
+        """Return equal numbers for equal settings, those with mappings included."""
+        return hash((type(self), *(_hashable(value) for _, value in self)))
+
     def as_base(self, cls: type[S]) -> S:
         """Return these settings as an instance of a base class, without the fields it lacks."""
         return cls(**{name: getattr(self, name) for name in cls.model_fields})
@@ -82,6 +86,12 @@ class Settings(Model):
     def config(self) -> dict[str, Any]:
         """Return `values`, and the name of what is selected by name, as in Hydra's configs."""
         return self.values()
+
+
+def _hashable(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return frozenset((name, _hashable(item)) for name, item in value.items())
+    return tuple(map(_hashable, value)) if isinstance(value, list | tuple) else value
 
 
 def plain(value: Any) -> Any:

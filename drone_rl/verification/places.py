@@ -119,13 +119,13 @@ def places(
     spec = make_policy_spec(policy.description, network, gap, settings.renderer)
     transform = Pipeline(policy.description.make_transforms())
     with torch_threads(1), closing(spec):
-        progress("comparing the renderer's images")
+        progress("comparing the renderer's images", 0, 2)
         compared = spec.images.check(
             settings.compared, np.random.RandomState(legacy_seed(fresh_seed()))
         )
-        progress("deciding the cells")
+        progress("deciding the cells", 1, 2)
         action_map = map_policy(spec.images, transform, network, settings)
-    progress("mapped", 1, 1)
+    progress("mapped", 2, 2)
     return Places(
         **dict(action_map.summary(settings.logit_gap)),
         policy=policy.name,

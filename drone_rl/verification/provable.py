@@ -40,6 +40,7 @@ from drone_rl.utils.archives import read_array
 from drone_rl.utils.files import last_of, read_json, write_atomically
 from drone_rl.utils.models import Model
 from drone_rl.utils.progress import Progress, as_progress
+from drone_rl.utils.run_result import Round, RunResult
 from drone_rl.utils.schema import Instance
 from drone_rl.utils.seeding import Stream
 from drone_rl.verification.prove import STATE_NAME, Proof, prove
@@ -49,19 +50,6 @@ from drone_rl.verification.requirements import require_cubes
 
 WORLDS = 250  # environments of a search; each search uses other seeds
 HOW_MAY_CHANGE = ("rounds", "limit_s")  # settings of rounds that a resumed run may change
-
-
-class Round(Model):
-    """The result of one search for failures; the next training starts episodes there."""
-
-    frames: int  # collected by training so far
-    trained_s: float  # training time so far, seconds
-    flights: int  # greedy episodes, each from its own placement
-    failures: int  # failed episodes
-    losing: float | None = None  # fraction of all placements proved to fail; None without a proof
-    undecided: float | None = None  # fraction of all placements that the proof leaves open
-    proof_s: float | None = None  # duration of the proof since its last resume, seconds
-    boxes: int  # number of boxes of failures to train on
 
 
 class _Saved(Model):
@@ -232,10 +220,10 @@ def train_until_proved(
         certificate = journal.certificate
         if certificate is not None:
             write_atomically(folder / "certificate.json", certificate.read_bytes())
-        is_same = journal.is_proved and journal.rounds[-1].frames == result["frames"]
-        if is_same and not result["reason"].startswith("SIG"):
-            result["reason"] = "proved"
-        result["rounds"] = [search.model_dump() for search in journal.rounds]
+        is_same = journal.is_proved and journal.rounds[-1].frames == result.frames
+        if is_same and not result.is_interrupted:
+            result = result.replace(reason="proved")
+        result = result.replace(rounds=tuple(journal.rounds))
         judge = Judge(check_judged, judge_for_selection)
         training = finish(journal.settings, folder, result, judge)
     return reraise_signal(training, "train_until_proved")
@@ -261,11 +249,11 @@ def find_failures(
     return np.concatenate(failures), episodes
 
 
-def _is_stopped(journal: Journal, result: Mapping[str, Any]) -> bool:
+def _is_stopped(journal: Journal, result: RunResult) -> bool:
     """Whether a signal or callback ended training, or no episodes are left since a search."""
-    if result["reason"] == "episodes":
-        return bool(journal.rounds) and journal.rounds[-1].frames == result["frames"]
-    return result["reason"] not in ("solved", "frames")
+    if result.reason == "episodes":
+        return bool(journal.rounds) and journal.rounds[-1].frames == result.frames
+    return result.reason not in ("solved", "frames")
 
 
 def _check_support(settings: TrainSettings) -> None:
@@ -277,9 +265,7 @@ def _check_support(settings: TrainSettings) -> None:
         partition_placements(spec, ProveSettings().most_combinations)
 
 
-def _learn(
-    journal: Journal, state: Checkpoint | None, callbacks: Sequence[Callback]
-) -> dict[str, Any]:
+def _learn(journal: Journal, state: Checkpoint | None, callbacks: Sequence[Callback]) -> RunResult:
     """Train to the target at first, then for a round's frames on its failures."""
     settings, how, practice = journal.settings, journal.how, None
     if journal.rounds:

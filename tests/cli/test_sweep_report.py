@@ -36,4 +36,4 @@ def test_judge(sweep, in_process):
 def test_a_report_judges_nothing_by_default(sweep, in_process):
     done = in_process("sweep-report", sweep.folder)
     assert done.returncode == 0, done.stderr
-    assert "verdict" not in json.loads((sweep.folder / "0" / "result.json").read_text())
+    assert json.loads((sweep.folder / "0" / "result.json").read_text())["verdict"] is None

@@ -150,7 +150,8 @@ def test_episodes_with_a_loop_are_counted_once():
     data.arrays["episode"][8:] = 1
     data.offset = lambda worlds: data.offsets
     scenes = SimpleNamespace(actions=MOVES, worlds=None)
-    found = flaws_section(SimpleNamespace(dataset=data, flights=data, scenes=scenes))
+    parts = {"dataset": data, "flights": data, "scenes": scenes, "remembers": False}
+    found = flaws_section(SimpleNamespace(**parts))
     assert len(found.loops) == 2 and found.looping_steps == pytest.approx(0.6)
     assert (found.looping_episodes.successes, found.looping_episodes.trials) == (1, 2)
 

@@ -42,7 +42,7 @@ def test_grad_cam_against_written_out_derivatives(explainer, frames, objective):
     (gradients,) = torch.autograd.grad(value.gather(1, actions[:, None]).sum(), activations)
     coarse = grad_cam(activations, gradients).detach()
     expected = torch.nn.functional.interpolate(coarse[:, None], (25, 64), mode="bilinear")[:, 0]
-    torch.testing.assert_close(explainer.grad_cam(x, actions, objective), expected)
+    torch.testing.assert_close(explainer.grad_cam(x, actions, objective=objective), expected)
 
 
 def test_maps_have_the_size_of_observations_and_leave_no_hook(explainer, frames):

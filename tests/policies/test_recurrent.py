@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 import torch
 from torchrl.modules import set_recurrent_mode
@@ -12,6 +13,9 @@ from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.config.commands import HeldOutSettings
 from drone_rl.config.networks import Lstm
 from drone_rl.config.training import TrainSettings
+from drone_rl.explanations.heat_maps import Explainer
+from drone_rl.explanations.rollouts import collect, render_frames
+from drone_rl.explanations.scenes import Scenes
 from drone_rl.objectives import LeaveOneOut, ReinforceLoss
 from drone_rl.policies import RecurrentNetwork, make_actor
 from drone_rl.policies.actor import exploring
@@ -251,11 +255,34 @@ def test_every_command_runs_it(trained, tmp_path):
     sizes = {"frames": 40, "data_episodes": 30, "perplexity": 5}
     explained = drone_rl.explain(policy, folder=tmp_path / "explained", **sizes, **few)
     (results,) = explained.policies.values()
-    assert not results.left_out and results.dataset.remembers
+    assert [*results.left_out] == ["contradictions"] and results.dataset.remembers
     assert "remembers earlier frames" in explained.report.read_text()
     drone_rl.class_models(policy, steps=2, episodes=2, gallery=False, seed=0)
     film(policy, tmp_path / "film", 1)
     assert (tmp_path / "film" / "episode_0.mp4").is_file()
+
+
+def test_recorded_frames_are_analysed_with_what_it_remembered():
+    collector, network = make_collector()
+    flights, scenes = collect(collector.env, collector.actor, num_episodes=2), Scenes(collector.env)
+    data = render_frames(flights, np.flatnonzero(flights.episode == 0), scenes, network)
+    x, actions, memory = data.tensor("observations"), data.tensor("actions"), network.start(1)
+    for pixels, expected in zip(x, data.tensor("probabilities"), strict=True):
+        before = memory
+        outputs, memory = network.step(pixels[None].requires_grad_(), before)
+        torch.testing.assert_close(outputs.softmax(-1)[0], expected)
+    last = x[-1:].clone().requires_grad_()
+    network.step(last, before)[0].softmax(-1)[0, actions[-1]].backward()
+    methods = Explainer(network, scenes.absent).methods()
+    assert len(methods) == 5
+    for name, method in methods.items():
+        maps = method(x, actions, data.memory)
+        expected = method(x[-1:], actions[-1:], torch.stack(before, 1).detach())
+        torch.testing.assert_close(maps[-1:], expected, rtol=1e-4, atol=1e-7)
+        assert not torch.allclose(maps[-1:], method(x[-1:], actions[-1:]), rtol=1e-3), name
+        if name == "saliency":
+            torch.testing.assert_close(maps[-1], last.grad[0].abs().sum(0))
+    collector.shutdown()
 
 
 def test_proofs_are_refused(trained, tmp_path):

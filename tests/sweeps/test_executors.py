@@ -21,7 +21,7 @@ from drone_rl.sweeps.manifest import read_failure
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock
 from drone_rl.utils.provenance import num_cores
-from drone_rl.utils.readers import read_result
+from drone_rl.utils.run_result import read_result
 
 pytestmark = pytest.mark.usefixtures("fake_training")
 
@@ -107,7 +107,8 @@ def test_clusters_of_this_machine(make_runs, tmp_path, cluster):
     executor = cluster(tmp_path)
     finished, lost = make_runs("seed=0", "seed=1")
     finished.folder.mkdir()
-    (finished.folder / "result.json").write_text(json.dumps({"reason": "solved"}))
+    result = json.dumps({"reason": "solved", "largest_reward": 3})
+    (finished.folder / "result.json").write_text(result)
     (lost.folder / "output.log").mkdir(parents=True)  # where nothing can be started
     assert dict(executor.finish([finished, lost])) == {finished: 0, lost: 1}
     assert "was lost" in read_failure(lost)
@@ -167,7 +168,7 @@ def test_a_run_that_another_process_works_on_is_waited_for(make_runs):
         thread.start()
         time.sleep(0.5)
         assert not statuses
-        result = {"reason": "solved", "running_reward": 2.0}
+        result = {"reason": "solved", "running_reward": 2.0, "largest_reward": 3}
         (run.folder / "result.json").write_text(json.dumps(result))
     thread.join(10)
     assert statuses == [0]
@@ -178,7 +179,7 @@ def test_a_process_that_came_too_late_is_no_failure(make_runs):
     (run,) = make_runs("fail=true")
     process = RunProcess(run)
     assert process.poll() is None
-    result = {"reason": "solved", "running_reward": 2.0}
+    result = {"reason": "solved", "running_reward": 2.0, "largest_reward": 3}
     (run.folder / "result.json").write_text(json.dumps(result))  # by an earlier sweep's process
     assert process.wait() == 0
     assert read_failure(run) is None

@@ -14,7 +14,7 @@ from drone_rl.sweeps.manifest import (
     sweep_name,
 )
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.readers import read_result
+from drone_rl.utils.run_result import RunResult, read_result
 
 
 def begin(folder, runs, **settings):
@@ -115,7 +115,9 @@ def test_the_name_of_a_sweep_depends_on_its_settings_alone():
     assert sweep_name(["sweep=learning_rate"]).startswith("learning_rate-")
 
 
-@pytest.mark.parametrize("content", ["[1]", '{"frames": 1}', '{"reason": 5}', "[" * 10**5])
+@pytest.mark.parametrize(
+    "content", ["[1]", '{"largest_reward": 3}', '{"reason": 5, "largest_reward": 3}', "[" * 10**5]
+)
 def test_a_damaged_result_is_none(tmp_path, content):
     (tmp_path / "result.json").write_text(content)
     assert read_result(tmp_path) is None
@@ -124,8 +126,8 @@ def test_a_damaged_result_is_none(tmp_path, content):
 def test_results(tmp_path):
     path = tmp_path / "result.json"
     path.write_text('{"reason": "solved", "largest_reward": 3}')
-    assert read_result(tmp_path) == {"reason": "solved", "largest_reward": 3}
-    path.write_text('{"reason": "SIGTERM"}')  # a stopped run is unfinished
+    assert read_result(tmp_path) == RunResult(reason="solved", largest_reward=3)
+    path.write_text('{"reason": "SIGTERM", "largest_reward": 3}')  # a stopped run is unfinished
     assert read_result(tmp_path) is None
     path.unlink()
     os.mkfifo(path)

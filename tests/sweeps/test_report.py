@@ -20,9 +20,11 @@ from drone_rl.sweeps.report import (
     write_sweep_report,
 )
 from drone_rl.sweeps.summary import median_of_runs
+from drone_rl.trust.results import Verdict
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import proportion
 from drone_rl.utils.progress import silent
+from drone_rl.utils.run_result import RunResult
 from drone_rl.utils.seeding import RootSeed
 from tests.training.test_train import TINY
 
@@ -176,14 +178,15 @@ def trained(training, tmp_path):
 
 
 def test_a_run_keeps_its_verdict_beside_its_result(trained):
-    before = json.loads((trained / "result.json").read_text())
-    assert "verdict" not in before
+    before = RunResult.of(trained)
+    assert before.verdict is None
     seed = RootSeed(4, is_fixed=False)
     verdict = judge_run(trained, 12, "cpu", seed=seed)
-    assert (verdict["seed"], verdict["seed_is_fixed"]) == (4, False)
-    after = json.loads((trained / "result.json").read_text())
-    assert after == {**before, "verdict": json.loads(json.dumps(verdict))}
-    assert verdict["greedy"]["episodes"] == verdict["sampled"]["episodes"] == 12
+    assert (verdict.seed, verdict.seed_is_fixed) == (4, False)
+    after = RunResult.of(trained)
+    assert Verdict.read(dict(after.verdict)) == verdict
+    assert after.replace(verdict=None) == before
+    assert verdict.greedy.episodes == verdict.sampled.episodes == 12
     assert judge_run(trained, 12, "cpu", seed=seed) == verdict  # once more, to the last bit
 
 

@@ -93,4 +93,4 @@ def test_damaged_metrics(sweep, text):
     (sweep.folder / "0" / "metrics.csv").write_text(text)
     (sweep.folder / "1" / "result.json").write_text("{")
     rows = read_rows(sweep)
-    assert [row.state for row in rows] == ["failed", "unfinished", "finished", "failed"]
+    assert [row.state for row in rows] == ["failed", "failed", "finished", "failed"]

@@ -11,6 +11,7 @@ from drone_rl.sweeps.pruning import TrialCallback  # noqa: E402
 from drone_rl.sweeps.search import next_trials, note_outcome, open_study  # noqa: E402
 from drone_rl.utils.errors import InputError  # noqa: E402
 from drone_rl.utils.files import refuse_links  # noqa: E402
+from drone_rl.utils.run_result import RunResult  # noqa: E402
 
 SPACE = {"optimizer.lr": optuna.distributions.FloatDistribution(1e-4, 1e-1, log=True)}
 
@@ -28,11 +29,15 @@ def params(trials):
     return [trial.params for trial in trials]
 
 
+def ended(reason, reward, **figures):
+    return RunResult(reason=reason, running_reward=reward, largest_reward=3, **figures)
+
+
 def test_a_killed_search_resumes_its_trials(tmp_path):
     first = next_trials(begin(tmp_path), SPACE, 3, seed=0)
     study = begin(tmp_path)  # a new process
     assert params(next_trials(study, SPACE, 3, seed=0)) == params(first)
-    note_outcome(study, 1, {"reason": "frames", "running_reward": 2.0})
+    note_outcome(study, 1, ended("frames", 2.0))
     assert [t.number for t in next_trials(study, SPACE, 3, seed=0)] == [0, 1, 2]
 
 
@@ -51,7 +56,7 @@ def test_the_same_results_give_the_same_trials(tmp_path):
         study = begin(tmp_path / name)
         for number in (0, 1):
             next_trials(study, SPACE, 1, seed=0)
-            note_outcome(study, number, {"reason": "frames", "running_reward": float(number)})
+            note_outcome(study, number, ended("frames", float(number)))
         sampled.append(params(next_trials(study, SPACE, 2, seed=0)))
     assert sampled[0] == sampled[1]
 
@@ -59,8 +64,8 @@ def test_the_same_results_give_the_same_trials(tmp_path):
 def test_outcomes_of_trials(tmp_path):
     study = begin(tmp_path)
     next_trials(study, SPACE, 3, seed=0)
-    note_outcome(study, 0, {"reason": "solved", "running_reward": 2.97})
-    note_outcome(study, 1, {"reason": "pruned", "running_reward": 0.1})
+    note_outcome(study, 0, ended("solved", 2.97))
+    note_outcome(study, 1, ended("pruned", 0.1))
     note_outcome(study, 2, None)
     note_outcome(study, 2, None)
     assert [t.state.name for t in study.trials] == ["COMPLETE", "PRUNED", "FAIL"]
@@ -77,10 +82,9 @@ def test_a_search_by_success_takes_it_from_confirmation_episodes_of_the_last_pol
     for reason in ("frames", "solved", "SIGTERM"):
         callback.on_end(training, reason)
     assert confirmed == [7]
-    figures = {"reason": "frames", "running_reward": 9.0}
     confirmations = {"confirming_flights": 200, "confirming_flights_succeeded": 150}
-    note_outcome(study, 0, figures | confirmations)
-    note_outcome(study, 1, figures | {"confirming_flights": 0, "confirming_flights_succeeded": 0})
+    note_outcome(study, 0, ended("frames", 9.0, **confirmations))
+    note_outcome(study, 1, ended("frames", 9.0))
     assert [t.value for t in study.trials] == [0.75, None]
 
 
@@ -117,7 +121,6 @@ def test_a_run_below_the_median_is_stopped(tmp_path, prune, reason):
             progress.frames = frames
             callback.on_update(trainer, {})
         reasons.append(trainer.stop_request)
-        result = {"reason": trainer.stop_request or "frames", "running_reward": reward}
-        note_outcome(study, number, result)
+        note_outcome(study, number, ended(trainer.stop_request or "frames", reward))
     assert reasons == ["", reason]
     assert list(study.trials[0].intermediate_values) == [1, 2]

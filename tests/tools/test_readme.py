@@ -48,6 +48,7 @@ def test_rows_name_benchmarks():
     named = {row.bench for table in TABLES for row in table}
     assert set(BENCHMARKS) - named == {
         "adversaries",
+        "tasks",
         "scaling",
         "revisions",
     }  # a chart, and for contributors

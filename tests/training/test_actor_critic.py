@@ -103,7 +103,7 @@ def test_resuming_within_episodes_equals_an_uninterrupted_run(settings, tmp_path
     longer = settings.trainer.replace(total_frames=420)
     whole = drone_rl.train(settings, folder=tmp_path / "whole", trainer=longer, progress=silent)
     half = drone_rl.train(settings, folder=tmp_path / "half", progress=silent)
-    assert half.result["frames"] == 180
+    assert half.result.frames == 180
     counts = [c["step_count"] for c in checkpoint(half)["collector"]["collectors"]]
     assert torch.cat(counts).count_nonzero() > 0  # episodes are running
     again = drone_rl.train(folder=half.folder, resume=True, trainer=longer, progress=silent)
@@ -131,7 +131,7 @@ def test_episodes_are_counted_once_when_complete(trained):
     ]
     parts = checkpoint(trained)["collector"]["collectors"]
     under_way = sum(int(part["step_count"].sum()) for part in parts)
-    assert sum(ended) + under_way == pytest.approx(trained.result["frames"])
+    assert sum(ended) + under_way == pytest.approx(trained.result.frames)
 
 
 @pytest.mark.parametrize(

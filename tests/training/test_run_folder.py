@@ -11,6 +11,7 @@ from drone_rl.config.training import TrainSettings
 from drone_rl.sim.tasks.task import MAKERS, as_settings
 from drone_rl.training.run_folder import (
     RunFolder,
+    confirm_interval_of,
     possible_ends,
     settings_of,
     target_of,
@@ -49,6 +50,19 @@ def test_a_task_of_costs_has_no_target():
         with pytest.raises(InputError, match="task=costs has largest_reward=0, of which no fract"):
             target_of(settings)
     assert target_of(TrainSettings()) == pytest.approx(2.97)  # 0.99 of three cubes
+
+
+def test_a_task_whose_largest_reward_is_unknown_is_confirmed_regularly():
+    class Open(Posts):
+        name, largest_reward = "open", None
+
+    with patch.dict(TASKS), patch.dict(MAKERS):
+        settings = TrainSettings(task=as_settings(Open()))
+        assert target_of(settings) is None
+        assert confirm_interval_of(settings) == 125  # 2,000 episodes, 16 at a time: 200 confirm
+        never = settings.trainer.replace(target_share=None)
+        assert confirm_interval_of(settings.replace(trainer=never)) is None
+    assert confirm_interval_of(TrainSettings()) is None
 
 
 def test_a_task_that_no_verdict_accepts_is_refused_before_the_training(tmp_path):

@@ -1,6 +1,5 @@
 """Training from Python equals training from the command line and resumes bit for bit."""
 
-import json
 import shutil
 import signal
 
@@ -15,6 +14,7 @@ from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.training import Callback
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
+from drone_rl.utils.run_result import RunResult
 from tests.forked import run_forked
 
 TINY = TrainSettings(
@@ -45,7 +45,7 @@ def test_training_writes_the_same_files_as_the_command(trained):
     assert {p.name for p in done.folder.iterdir() if p.suffix} == {
         *("metrics.csv", "result.json", "run.yaml"),
     }
-    assert json.loads((done.folder / "result.json").read_text()) == done.result
+    assert RunResult.of(done.folder) == done.result
     noted = yaml.safe_load((done.folder / "run.yaml").read_text())
     assert noted["config"]["task"]["num_cubes"] == 1
     assert noted["description"]["network"]["name"] == "small_cnn"
@@ -57,9 +57,9 @@ def test_resumed_training_equals_an_uninterrupted_one(trained, tmp_path):
     longer = TINY.trainer.replace(total_frames=900)
     whole = drone_rl.train(TINY, folder=tmp_path / "whole", trainer=longer, progress=silent)
     half = drone_rl.train(TINY, folder=tmp_path / "half", progress=silent)
-    assert half.result["frames"] < 900
+    assert half.result.frames < 900
     again = drone_rl.train(folder=half.folder, resume=True, trainer=longer, progress=silent)
-    assert again.result["frames"] == whole.result["frames"]
+    assert again.result.frames == whole.result.frames
     one, two = weights(whole.folder), weights(again.folder)
     assert all(torch.equal(one[name], two[name]) for name in one)
 
@@ -176,8 +176,8 @@ def test_signal_takes_effect_after_the_state_is_saved(
         drone_rl.train(TINY, folder=tmp_path, callbacks=[Stop(number, update=update)])
     done = stopped.value.training
     assert done.reason == number.name
-    assert json.loads((tmp_path / "result.json").read_text()) == done.result
-    assert done.result["updates"] == update
+    assert RunResult.read_json(tmp_path / "result.json") == done.result
+    assert done.result.updates == update
     assert_resumes(tmp_path, trained)
 
 

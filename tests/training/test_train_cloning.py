@@ -13,6 +13,7 @@ from drone_rl.config.training import CloningSettings, TrainerSettings, TrainSett
 from drone_rl.training.demonstrations import record_oracle
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
+from drone_rl.utils.run_result import RunResult
 
 TINY = TrainSettings(
     task=TaskSettings(num_cubes=1, first_distance=6.0, step_limit=40),
@@ -54,9 +55,9 @@ def assert_same(one, other):
 
 def test_a_run_may_only_clone(cloned, flights):
     done, messages = cloned
-    assert (done.reason, done.result["frames"], done.result["updates"]) == ("frames", 0, 0)
+    assert (done.reason, done.result.frames, done.result.updates) == ("frames", 0, 0)
     written = json.loads((done.folder / "result.json").read_text())
-    assert written == done.result and written["cloning"]["folder"] == str(flights)
+    assert RunResult.of(done.folder) == done.result and written["cloning"]["folder"] == str(flights)
     counts = [written["cloning"][name] for name in ("demonstrations", "held_out_demonstrations")]
     assert counts == [3, 1]
     assert messages[2][0].startswith("cloning: accuracy ") and messages[2][1:] == (3, 3)
@@ -77,11 +78,11 @@ def test_reinforce_continues_from_the_clone_and_resumes_bit_for_bit(cloned, flig
     )
     half = drone_rl.train(TINY, folder=tmp_path / "half", demonstrations=path, progress=silent)
     only = shutil.copytree(cloned[0].folder, tmp_path / "only")
-    assert 0 < half.result["frames"] < whole.result["frames"]
+    assert 0 < half.result.frames < whole.result.frames
     for folder in (half.folder, only):
         again = drone_rl.train(folder=folder, resume=True, trainer=longer, progress=silent)
         assert_same(weights(whole.folder), weights(folder))
-        own, other = ({**r.result["cloning"], "seconds": 0} for r in (whole, again))
+        own, other = (r.result.cloning.replace(seconds=0) for r in (whole, again))
         assert own == other
         assert again.metrics()["frames"] == whole.metrics()["frames"]
     assert not torch.equal(
@@ -93,7 +94,7 @@ def test_a_resumed_run_needs_no_demonstrations(cloned, tmp_path):
     folder = shutil.copytree(cloned[0].folder, tmp_path / "run")
     for changes in ({"demonstrations": None}, {"demonstrations": "/moved"}):
         done = drone_rl.train(folder=folder, resume=True, progress=silent, **changes)
-        assert done.result["cloning"] == cloned[0].result["cloning"]
+        assert done.result.cloning == cloned[0].result.cloning
     with pytest.raises(InputError, match=r"^can't resume with cloning\.epochs=9: .*epochs=3"):
         drone_rl.train(folder=folder, resume=True, cloning=CloningSettings(epochs=9))
 
@@ -111,6 +112,6 @@ def test_a_critic_continues_from_the_clone(flights, tmp_path):
             demonstrations=str(flights),
             progress=silent,
         )
-    assert runs["on"].result["updates"] > 0
-    own, other = ({**run.result["cloning"], "seconds": 0, "folder": ""} for run in runs.values())
+    assert runs["on"].result.updates > 0
+    own, other = (r.result.cloning.replace(seconds=0, folder="") for r in runs.values())
     assert own == other

@@ -129,6 +129,13 @@ def test_training_is_solved_only_after_confirmation(make_trainer):
     assert calls == sorted(set(calls)) and trainer.progress.running_reward >= 0.5
 
 
+def test_without_a_target_confirmations_at_intervals_decide(make_trainer):
+    calls = []
+    trainer = make_trainer(target=None, total_frames=100_000)
+    trainer.confirm, trainer.confirm_interval = lambda n: calls.append(n) or len(calls) == 3, 5
+    assert run(trainer) == "solved" and calls == [5, 10, 15]
+
+
 def test_stops_at_episodes(make_trainer):
     trainer = make_trainer(total_episodes=16)
     assert run(trainer) == "episodes"

@@ -31,7 +31,8 @@ def trained(tmp_path):
     plain |= {"policy": state.weights, "config": {}}
     save_checkpoint(folder / "checkpoints" / "last.pt", plain)
     frames = state.progress.frames
-    result = {"reason": "solved", "frames": frames, "verdict": verdict("poor").as_dict()}
+    result = {"reason": "solved", "frames": frames, "largest_reward": 3}
+    result["verdict"] = verdict("poor").as_dict()
     path = folder / "result.json"
     path.write_text(json.dumps(result))
     os.utime(path, (100, 100))

@@ -1,5 +1,4 @@
 import errno
-import math
 import multiprocessing
 import os
 from pathlib import Path
@@ -120,7 +119,6 @@ def test_other_files_are_refused_without_waiting(tmp_path, make, message):
 def test_json_is_read(tmp_path):
     (tmp_path / "a").write_text('{"a": [1, 2.5, null, true, "ä"]}')
     assert read_json(tmp_path / "a") == {"a": [1, 2.5, None, True, "ä"]}
-    assert math.isnan(parse_json("[NaN]", "x", allow_nan=True)[0])
     assert parse_json(str(2**128 - 1), "x") == 2**128 - 1
 
 

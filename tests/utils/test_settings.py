@@ -43,6 +43,18 @@ def test_settings_are_frozen():
     assert made == Inner(x=3) and hash(made) == hash(Inner(x=3))
 
 
+def test_equal_settings_have_equal_hashes():
+    class Named(Settings):
+        parts: dict[str, Inner] = {}
+
+    one, other = (
+        Named(parts={"a": Inner(x=2), "b": Inner()}),
+        Named(parts={"b": Inner(), "a": Inner(x=2)}),
+    )
+    assert one == other and hash(one) == hash(other)
+    assert hash(one) != hash(Named(parts={"a": Inner()}))
+
+
 def test_as_base_leaves_out_further_fields():
     class More(Outer):
         extra: str = "z"

@@ -19,10 +19,11 @@ from drone_rl.sim.actions import Move
 from drone_rl.training import Callback
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
+from drone_rl.utils.run_result import Round, RunResult
 from drone_rl.utils.seeding import world_random_state
 from drone_rl.verification import provable
 from drone_rl.verification.checker.certificate import Certificate
-from drone_rl.verification.provable import Journal, Round, find_failures
+from drone_rl.verification.provable import Journal, find_failures
 from drone_rl.verification.prove import Proof
 from tests.fake_flight import FLIGHT
 
@@ -94,12 +95,12 @@ def usual(tmp_path_factory):
 
 def test_rounds_until_proved(whole):
     assert whole.reason == "proved"
-    rounds = whole.result["rounds"]
-    assert [r["boxes"] for r in rounds] == [2, 1, 0]
-    assert [r["losing"] for r in rounds] == pytest.approx([2 / 12, 0.5 / 12, 0.0])
-    frames = [r["frames"] for r in rounds]
-    assert frames[0] + 200 <= frames[1] and frames[1] + 200 <= frames[2] == whole.result["frames"]
-    assert json.loads((whole.folder / "result.json").read_text()) == whole.result
+    rounds = whole.result.rounds
+    assert [r.boxes for r in rounds] == [2, 1, 0]
+    assert [r.losing for r in rounds] == pytest.approx([2 / 12, 0.5 / 12, 0.0])
+    frames = [r.frames for r in rounds]
+    assert frames[0] + 200 <= frames[1] and frames[1] + 200 <= frames[2] == whole.result.frames
+    assert RunResult.of(whole.folder) == whole.result
     last = (whole.folder / "rounds" / "2" / "certificate.json").read_text()
     assert (whole.folder / "certificate.json").read_text() == last
     first = np.load(whole.folder / "rounds" / "0" / "failures.npy")
@@ -127,12 +128,12 @@ def test_an_interrupted_run_resumes_exactly(whole, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         train(tmp_path, callbacks=[Interrupt(3)])
     done = drone_rl.train_until_proved(folder=tmp_path, resume=True, progress=silent)
-    assert done.result["frames"] == whole.result["frames"]
+    assert done.result.frames == whole.result.frames
     one, two = weights(tmp_path), weights(whole.folder)
     assert all(torch.equal(one[name], two[name]) for name in one)
-    same = ("frames", "failures", "losing", "undecided", "boxes")
-    told, expected = done.result["rounds"], whole.result["rounds"]
-    assert [[r[k] for k in same] for r in told] == [[r[k] for k in same] for r in expected]
+    same = {"frames", "failures", "losing", "undecided", "boxes"}
+    told, expected = ([r.model_dump(include=same) for r in x.result.rounds] for x in (done, whole))
+    assert told == expected
 
 
 def test_resuming_an_ordinary_run(whole, usual, tmp_path):
@@ -141,22 +142,22 @@ def test_resuming_an_ordinary_run(whole, usual, tmp_path):
         drone_rl.train_until_proved(None, HOW, folder=tmp_path, resume=True, seed=9)
     assert not (tmp_path / "provable.json").exists()
     done = drone_rl.train_until_proved(None, HOW, folder=tmp_path, resume=True, progress=silent)
-    assert done.reason == "proved" and done.result["frames"] == whole.result["frames"]
+    assert done.reason == "proved" and done.result.frames == whole.result.frames
 
 
 def test_resuming_a_proved_run_changes_nothing(whole):
     before = weights(whole.folder)
     again = drone_rl.train_until_proved(folder=whole.folder, resume=True, progress=silent)
-    assert again.reason == "proved" and again.result["frames"] == whole.result["frames"]
+    assert again.reason == "proved" and again.result.frames == whole.result.frames
     after = weights(whole.folder)
     assert all(torch.equal(before[name], after[name]) for name in before)
 
 
 def test_more_rounds_continue_a_run(whole, tmp_path):
     done = train(tmp_path, HOW.replace(rounds=1))
-    assert done.reason == "frames" and len(done.result["rounds"]) == 2
+    assert done.reason == "frames" and len(done.result.rounds) == 2
     done = drone_rl.train_until_proved(None, HOW, folder=tmp_path, resume=True, progress=silent)
-    assert done.reason == "proved" and done.result["frames"] == whole.result["frames"]
+    assert done.reason == "proved" and done.result.frames == whole.result.frames
 
 
 def test_episodes_are_searched_first(tmp_path, monkeypatch, prover):
@@ -169,9 +170,9 @@ def test_episodes_are_searched_first(tmp_path, monkeypatch, prover):
     monkeypatch.setattr(provable, "find_failures", fly)
     monkeypatch.setitem(globals(), "LOSING", [[], [], []])
     done = train(tmp_path, HOW.replace(flights=300, enough=7))
-    first, second = done.result["rounds"]
-    assert (first["failures"], first["losing"], first["boxes"]) == (2, None, 2)
-    assert (second["failures"], second["losing"]) == (0, 0.0)
+    first, second = done.result.rounds
+    assert (first.failures, first.losing, first.boxes) == (2, None, 2)
+    assert (second.failures, second.losing) == (0, 0.0)
     boxes = np.load(tmp_path / "rounds" / "0" / "failures.npy")
     np.testing.assert_allclose(boxes, [[[1.75, 2.25]], [[-6.0, -5.65]]])
     assert len(prover.weights) == 1
@@ -261,7 +262,7 @@ class Interrupt(Callback):
 
 def test_training_before_the_first_search_is_ordinary(tmp_path, prover, usual):
     done = train(tmp_path, HOW.replace(rounds=0, most_boxes=1))
-    assert done.result["rounds"][0]["boxes"] == 1
+    assert done.result.rounds[0].boxes == 1
     one, two = weights(usual.folder), prover.weights[0]
     assert all(torch.equal(one[name], two[name]) for name in one)
 
@@ -276,7 +277,7 @@ def test_undecided_boxes_are_replayed_only_of_finished_proofs():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"rounds": [{"frames": -1}]}, r"rounds\[0\]\.trained_s is missing"),
+        ({"rounds": [{"frames": 1}]}, r"rounds\[0\]\.trained_s is missing"),
         ({"more": 3}, "more is unknown"),
     ],
 )

@@ -26,7 +26,7 @@ from drone_rl.sweeps.manifest import Run, Sweep, check_folders, inside, open_swe
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock
 from drone_rl.utils.progress import Heartbeat
-from drone_rl.utils.readers import read_result
+from drone_rl.utils.run_result import read_result
 from drone_rl.utils.text import plural
 
 _LONGEST_NAME = 180
@@ -179,7 +179,7 @@ def _job_return(run: Run) -> JobReturn:
     job = JobReturn(
         overrides=list(run.overrides), working_dir=str(run.folder), status=JobStatus.COMPLETED
     )
-    job.return_value = None if result is None else result.get("running_reward")
+    job.return_value = None if result is None else result.running_reward
     return job
 
 
@@ -187,9 +187,8 @@ def _outcome(run: Run) -> str:
     result = read_result(run.folder)
     if result is None:
         return f"failed: {read_failure(run) or 'reason unknown'}"
-    verdict = result.get("verdict")
-    kind = f", verdict: {verdict['kind']}" if verdict else ""
-    return f"ended ({result['reason']}), running reward {result['running_reward']:.3f}{kind}"
+    kind = f", verdict: {result.verdict.kind}" if result.verdict else ""
+    return f"ended ({result.reason}), running reward {result.running_reward:.3f}{kind}"
 
 
 def _shortened(name: str) -> str:

@@ -24,7 +24,7 @@ from drone_rl.sweeps.search import (
 )
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import refuse_links
-from drone_rl.utils.readers import read_result
+from drone_rl.utils.run_result import read_result
 from drone_rl.utils.schema import OneOf, Whole, shown
 
 _log = logging.getLogger(__name__)

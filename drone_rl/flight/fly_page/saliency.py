@@ -97,7 +97,7 @@ class LiveSaliency:
             network = world.policy.make_network()
             self._explainer = Explainer(network, world.scenes.absent)
         part = torch.tensor(seen.probabilities).argmax()[None]
-        maps = self._explainer.methods()[self.method](seen.observation, part)
+        maps = self._explainer.methods()[self.method](seen.observation, part, seen.memory)
         return maps[0].numpy()
 
     def close(self) -> None:

@@ -1,14 +1,21 @@
 """A command's settings, its exit status, and what becomes of a mistake in one of many runs."""
 
+import copy
 import types
+from unittest.mock import patch
 
 import pytest
+from hydra.core.config_store import ConfigStore
 from omegaconf import OmegaConf
 
+from drone_rl import define_task
 from drone_rl.cli.evaluation import EvaluateCommand
 from drone_rl.cli.hydra import composition
 from drone_rl.cli.hydra.composition import HydraConfig, _job, read_settings
 from drone_rl.cli.settings import CommandSettings
+from drone_rl.cli.train import TrainCommand
+from drone_rl.config import TASKS
+from drone_rl.sim.tasks.task import MAKERS
 from drone_rl.utils.errors import InputError
 
 
@@ -77,3 +84,24 @@ def test_a_command_gets_its_settings_and_status_for_each_run(monkeypatch, tmp_pa
     with pytest.raises(InputError, match="runs 0 and 1 have the same folder"):
         composition.run_command("evaluate", EvaluateCommand, [*words[:-1], "hydra.sweep.subdir=y"])
     assert len(runs) == 2 and not (tmp_path / "x" / "y").exists()
+
+
+def test_a_term_that_a_task_does_not_list_can_be_set(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "1")
+    ball = {"shape": "ball", "role": "goal"}
+    terms = {"reward": {"progress": 1.0}, "success": ["all_goals"]}
+    given = []
+
+    def run(settings, folder):
+        given.append(settings.task)
+        return 0, None
+
+    monkeypatch.setattr(TrainCommand, "run", run)
+    store = ConfigStore.instance()
+    monkeypatch.setattr(store, "repo", copy.deepcopy(store.repo))
+    with patch.dict(TASKS), patch.dict(MAKERS):
+        define_task("test_composed", objects={"ball": ball}, **terms)
+        words = ["task=test_composed", "task.reward.time.weight=-0.5"]
+        composition.run_command("train", TrainCommand, words)
+        assert {n: t.weight for n, t in given[0].reward.items()} == {"progress": 1.0, "time": -0.5}

@@ -19,7 +19,8 @@ arguments = dict(a.split("=", 1) for a in sys.argv[2:])
 folder = pathlib.Path(arguments["hydra.run.dir"].strip("'"))
 with (folder / "starts").open("a") as file:
     file.write(f"{arguments['seed']} {arguments['optimizer.lr']}")
-(folder / "result.json").write_text(json.dumps({"reason": "solved", "running_reward": 1.0}))
+result = {"reason": "solved", "running_reward": 1.0, "largest_reward": 3}
+(folder / "result.json").write_text(json.dumps(result))
 """
 """A program instead of `drone-rl train` that notes its settings."""
 GRID = ["train", "-m", "seed=0,1", "optimizer.lr=1e-3,1e-2", "hydra.sweep.dir=sweep"]
