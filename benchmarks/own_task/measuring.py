@@ -43,7 +43,7 @@ TASK, TERM = "reach_ball.py", "near_wall.py"
 """The user's files: a task, and a reward term for another run."""
 _PROGRAMS = {"Gymnasium": "gymnasium_program.py", "SB3": "sb3_program.py"}
 SEARCHED = (
-    "task.reward.facing.weight=interval(0,0.5)",
+    "task.reward.facing.weight=tag(log,interval(1e-3,0.3))",
     "task.reward.progress.weight=interval(0.05,0.2)",
 )
 """Weights that a search varies. A drone that faces the ball without reaching it is paid longer."""

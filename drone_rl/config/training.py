@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Self, Unpack
 
+import pydantic
+
 from drone_rl.config import (
     ActionSettings,
     AppearanceSettings,
@@ -86,7 +88,10 @@ class CloningSettings(Settings):
 
 
 class TrainSettings(Settings):
-    """Settings of a training."""
+    """Settings of a training.
+
+    A mapping without a name has values of the default variant: `optimizer={"lr": 1e-3}` is Adam's.
+    """
 
     task: BaseTaskSettings = TaskSettings()
     """Task."""
@@ -130,6 +135,11 @@ class TrainSettings(Settings):
     """Episodes of a verdict on last.pt after training, in environments reserved for model selection
     (never for training or reported figures); 0 for none."""
 
+    @pydantic.field_validator("*", mode="before")
+    @classmethod
+    def _of_default(cls, value: Any, info: pydantic.ValidationInfo) -> Any:
+        return _of_variant(cls.model_fields[str(info.field_name)].default, value)
+
     def check(self) -> None:
         """Refuse parts that don't work together."""
         if self.renderer != "raytrace" and not self.appearance.is_minimal:
@@ -165,11 +175,15 @@ class TrainSettings(Settings):
             if not isinstance(getattr(self, name), type(part)):
                 changes.setdefault(name, part)
         for name, part in {**dict(self), **needs}.items():
-            values = changes.get(name)
-            is_named = isinstance(values, Mapping) and values.keys() & {"name", "_target_"}
-            if isinstance(part, Part) and isinstance(values, Mapping) and not is_named:
-                changes[name] = {"name": part.name, **values}
+            if name in changes:
+                changes[name] = _of_variant(part, changes[name])
         return super().replace(**changes)
+
+
+def _of_variant(part: object, value: Any) -> Any:
+    """Return a mapping without a name as one of a part's variant, and anything else as it is."""
+    is_unnamed = isinstance(value, Mapping) and not value.keys() & {"name", "_target_"}
+    return {"name": part.name, **value} if is_unnamed and isinstance(part, Part) else value
 
 
 class Logger(Part):

@@ -80,6 +80,12 @@ def memory_in(entries: Mapping[Any, Tensor]) -> Tensor | None:
     return torch.stack([entries[HIDDEN], entries[CELL]], 1) if HIDDEN in entries else None
 
 
+def entries_of(memory: Tensor) -> dict[Any, Tensor]:
+    """Return a memory as what an actor reads."""
+    hidden, cell = memory.unbind(1)
+    return {HIDDEN: hidden, CELL: cell}
+
+
 def evaluate(network: Any, observations: Tensor, memory: Tensor | None = None) -> Tensor:
     """Return the outputs of a network. Shape: (T, C, h, w) to (T, num_outputs)."""
     if memory is None:

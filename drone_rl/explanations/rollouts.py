@@ -20,7 +20,7 @@ from torchrl.envs import EnvBase
 from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.envs import worlds_of
 from drone_rl.envs.rollout import ActorAgent, Recording, Step, steps
-from drone_rl.explanations.hooks import features, memory_in, probabilities
+from drone_rl.explanations.hooks import entries_of, features, memory_in, probabilities
 from drone_rl.explanations.scenes import Scenes, has_objects
 from drone_rl.policies import ImageNetwork, RecurrentNetwork, greedy_agent
 from drone_rl.sim.dynamics.state import heading_of
@@ -214,15 +214,18 @@ def run_from(
     state: State,
     goes_on: Callable[[Step], Tensor],
     appearance: Appearance | None = None,
+    memory: Tensor | None = None,
 ) -> State:
     """Step all environments with the policy's most probable actions until none goes on.
 
-    At the initial states, a policy that remembers frames has seen only the first one. For `goes_on`
-    see `steps`. The appearance is the task's by default. Return the last states.
+    At the initial states, a policy that observes a stack of frames has seen only the first one, and
+    a recurrent one has a `memory`, see `hooks`. For `goes_on` see `steps`. The appearance is the
+    task's by default. Return the last states.
     """
     ends = state[torch.arange(len(state), device=state.end_reason.device)]
-    agent, observer = greedy_agent(network), scenes.observer(appearance)
-    for step in steps(agent, observer, state, goes_on=goes_on):
+    agent = greedy_agent(network, None if memory is None else entries_of(memory))
+    observer, starts = scenes.observer(appearance), memory is None
+    for step in steps(agent, observer, state, starts=starts, goes_on=goes_on):
         ends[step.rows] = step.after
     return ends
 

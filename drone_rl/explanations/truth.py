@@ -1,6 +1,7 @@
 """Section "truth": tests of the heat maps against the effects of changes to the scene."""
 
 import dataclasses
+import functools
 
 import numpy as np
 import torch
@@ -31,7 +32,7 @@ def section(context: Context) -> Truth:
     if has_objects(scenes.task):
         regions = data.tensor("regions")
         changes = intervene(scenes, network, state, regions, seed, data.memory)
-        outcomes = measure_outcomes(scenes, network, state, episode)
+        outcomes = measure_outcomes(scenes, network, state, episode, data.memory)
     shown_frame = clear_frame(changes[0]) if changes else 0
     methods = trust.method_maps(context.explainer) if network.has_weights else {}
     effects = trial.effects if len(trial.effects) else np.zeros((1, trial.grid.count))
@@ -140,25 +141,31 @@ class TargetRollouts:
 
 
 def measure_outcomes(
-    scenes: Scenes, network: ImageNetwork, state: State, episode: NDArray
+    scenes: Scenes,
+    network: ImageNetwork,
+    state: State,
+    episode: NDArray,
+    memory: Tensor | None = None,
 ) -> Outcomes:
     """Compare greedy rollouts with the next target moved, and with another ground.
 
     That an action's probability changes does not show that the outcome changes. The rollouts start
-    from T states of the data set; `episode` has shape (T,).
+    from T states of the data set; `episode` has shape (T,). For `memory` see `hooks`.
     """
     task = scenes.task
     ahead = (~task.next_offset(state)[:, 0].isnan()).nonzero()[:, 0].cpu().numpy()
     rows = ahead[spread_frames(episode[ahead], FLIGHTS_AN_EPISODE)]
     start, group = state[torch.from_numpy(rows)].to(scenes.worlds.device), episode[rows]
     target = task.next_target(start)
+    memory = None if memory is None else memory[torch.from_numpy(rows)]
     variants = {
         "as it was": start,
         "moved left": task.next_moved(start, MOVED_METRES),
         "moved right": task.next_moved(start, -MOVED_METRES),
     }
-    runs = {name: run_to_target(scenes, network, s, target) for name, s in variants.items()}
-    repainted = run_to_target(scenes, network, start, target, DARK_GROUND)
+    run = functools.partial(run_to_target, scenes, network, target=target, memory=memory)
+    runs = {name: run(changed) for name, changed in variants.items()}
+    repainted = run(start, appearance=DARK_GROUND)
 
     return Outcomes(
         flights=len(rows),
@@ -174,6 +181,7 @@ def run_to_target(
     state: State,
     target: Tensor,
     appearance: Appearance | None = None,
+    memory: Tensor | None = None,
 ) -> TargetRollouts:
     """Step until one target (N,) of each environment is reached or passed; see `run_from`."""
     task = scenes.task
@@ -188,7 +196,7 @@ def run_to_target(
         is_over = task.is_behind(after, goal) | task.is_reached(after, goal)
         return ~is_over & (after.end_reason == 0) & (len(lateral) <= PATIENCE)
 
-    end = run_from(scenes, network, state, goes_on, appearance)
+    end = run_from(scenes, network, state, goes_on, appearance, memory)
     return TargetRollouts(
         task.is_reached(end, target).cpu().numpy(),
         decided.cpu().numpy(),

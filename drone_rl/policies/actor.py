@@ -1,7 +1,7 @@
 """Actors: from the outputs of a network to actions, and the distributions of actions."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from typing import Any
@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import InteractionType, TensorDictModule, dispatch
+from tensordict.utils import NestedKey
 from torch import Tensor, nn
 from torch.distributions import Categorical, Distribution
 from torch.distributions.constraints import Constraint
@@ -262,7 +263,11 @@ def make_actor(
     )
 
 
-def greedy_agent(network: ImageNetwork) -> Agent:
-    """Return an agent that takes the most probable actions of a network."""
-    spec = make_action_spec(network.actions.entry)
-    return Exploring(ActorAgent(make_actor(network, spec)), greedy=True)
+def greedy_agent(network: ImageNetwork, memory: Mapping[NestedKey, Tensor] | None = None) -> Agent:
+    """Return an agent that takes the most probable actions of a network.
+
+    A recurrent one goes on with a `memory` where episodes do not start, see `ActorAgent`.
+    """
+    agent = ActorAgent(make_actor(network, make_action_spec(network.actions.entry)))
+    agent.memory = memory or {}
+    return Exploring(agent, greedy=True)

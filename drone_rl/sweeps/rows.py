@@ -62,7 +62,8 @@ class Row(Model):
     command: Annotated[str, Field(exclude=True)]
     """The shell command that repeats the run."""
     final_share: Annotated[float, Field(exclude=True)] = 0.0
-    """Final running mean as a fraction of the greatest reward; 0 if the run failed."""
+    """Final running mean as a fraction of the greatest reward, or itself if that is not known; 0 if
+    the run failed."""
     judged: Annotated[Verdict | None, Field(exclude=True)] = None
     """The verdict by the current rule."""
     curve: Annotated[tuple[Any, Any], Field(exclude=True)] = (np.empty(0), np.empty(0))
@@ -112,7 +113,7 @@ def _read_row(run: Run, settings: dict[str, str], folder: str) -> Row:
         judged = _read_verdict(result.verdict)
     except _DAMAGE as damage:
         return row.replace(state="failed", error=f"its files can't be read ({damage})")
-    reward, most = result.running_reward, result.largest_reward
+    reward, most = result.running_reward, result.largest_reward or 1.0
     shared = {"reason", "frames", "episodes", "seconds", "running_reward"}
     return row.replace(
         state="finished",

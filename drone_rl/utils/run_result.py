@@ -80,8 +80,8 @@ class RunResult(Stored):
     """Training time, over all resumptions."""
     running_reward: float = 0.0
     """Running mean of the episodes' rewards."""
-    largest_reward: PositiveFloat
-    """Largest reward of an episode."""
+    largest_reward: PositiveFloat | None
+    """Largest reward of an episode; None if the task does not know it."""
     confirming_attempts: NonNegativeInt = 0
     """Confirmations since the run began or was last resumed."""
     confirming_flights: NonNegativeInt = 0

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from drone_rl.config import AppearanceSettings, TaskSettings
-from drone_rl.config.learning import Adam, Optimizer
+from drone_rl.config.learning import Adam, Optimizer, Sgd
 from drone_rl.config.networks import Mlp, Network
 from drone_rl.config.parts import locate
 from drone_rl.config.training import TrainerSettings, TrainSettings
@@ -44,7 +44,7 @@ def test_settings_round_trip():
             {"network": {"_target_": "resnet"}},
             "network._target_='resnet': it must be one of small_",
         ),
-        ({"network": {}}, "network.name=None: it must be one of"),
+        ({"optimizer": {"momentum": 0.9}}, "optimizer.momentum is unknown; valid names: lr"),
         (
             {"transforms": {"crop": {"top": -1}}},
             "transforms.crop.top=-1: it must be a whole number",
@@ -57,6 +57,13 @@ def test_settings_round_trip():
 def test_errors_begin_with_the_place(config, message):
     with pytest.raises(InputError, match=f"^{message}"):
         TrainSettings.read(config)
+
+
+def test_values_without_a_name_are_those_of_the_default_variant():
+    settings = TrainSettings(optimizer={"lr": 0.5}, network={})
+    assert settings == TrainSettings(optimizer=Adam(lr=0.5))
+    with_sgd = TrainSettings(optimizer="sgd")
+    assert with_sgd.replace(optimizer={"lr": 0.5}).optimizer == Sgd(lr=0.5)  # of the present one
 
 
 def test_a_class_of_another_package_gets_all_values():

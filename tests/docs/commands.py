@@ -10,7 +10,7 @@ from hydra.core.hydra_config import HydraConfig
 from omegaconf import open_dict
 
 from drone_rl.cli.hydra import composition
-from drone_rl.cli.hydra.composition import import_plugins, read_settings
+from drone_rl.cli.hydra.composition import adding, import_plugins, read_settings
 from drone_rl.cli.main import COMMANDS, find_command
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import conf_dir
@@ -42,6 +42,7 @@ def check_command(name, *words):
             import_plugins(told)
         except InputError:
             return  # of a tutorial, whose own test has the module
+    told = adding(told)  # after the plugins, whose tasks it knows
     composition.store_defaults({file: command})
     GlobalHydra.instance().clear()
     with initialize_config_dir(str(conf_dir()), version_base="1.3"):

@@ -14,7 +14,7 @@ from drone_rl.config.commands import HeldOutSettings
 from drone_rl.config.networks import Lstm
 from drone_rl.config.training import TrainSettings
 from drone_rl.explanations.heat_maps import Explainer
-from drone_rl.explanations.rollouts import collect, render_frames
+from drone_rl.explanations.rollouts import collect, render_frames, run_from
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.objectives import LeaveOneOut, ReinforceLoss
 from drone_rl.policies import RecurrentNetwork, make_actor
@@ -282,6 +282,15 @@ def test_recorded_frames_are_analysed_with_what_it_remembered():
         assert not torch.allclose(maps[-1:], method(x[-1:], actions[-1:]), rtol=1e-3), name
         if name == "saliency":
             torch.testing.assert_close(maps[-1], last.grad[0].abs().sum(0))
+    steps = []
+
+    def once(step):
+        steps.append(step)
+        return torch.zeros(len(x), dtype=torch.bool)
+
+    run_from(scenes, network, data.state(scenes.worlds), once, memory=data.memory)
+    outputs = steps[0].act.distribution.softmax(-1)
+    torch.testing.assert_close(outputs, data.tensor("probabilities"))
     collector.shutdown()
 
 

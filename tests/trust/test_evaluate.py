@@ -75,6 +75,14 @@ def test_table_of_an_evaluation(good):
     assert all(len(re.split(" {2,}", row)) == 4 for row in whole)  # no two columns touch
 
 
+def test_a_missing_oracle_is_named(good):
+    done = drone_rl.evaluate(good, episodes=2, num_envs=2, progress=silent)
+    assert "no oracle" not in str(done.notes())
+    figures = {n: of for n, of in done.figures.items() if n != "oracle"}
+    kept = {"policy": "good", "terms": done.terms, "seed": 0, "seed_is_fixed": True}
+    assert "There is no oracle" in str(Evaluation(**kept, **figures).notes())
+
+
 def test_another_appearance_is_named(good):
     good = good.in_task(num_cubes=1)  # short episodes
     few, fog = (

@@ -134,7 +134,7 @@ def import_plugins(overrides: Sequence[str]) -> list[str]:
     return words
 
 
-def _adding(words: Sequence[str]) -> list[str]:
+def adding(words: Sequence[str]) -> list[str]:
     """Let words add entries to a task's mappings, such as rewards, which take any name."""
     mappings = tuple(
         f"task.{name}."
@@ -155,7 +155,7 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
     words = [word for word in overrides if word not in topics]
     with _explained(name, words):
         words = import_plugins(words)
-    words = _adding(spare_run(command.prepare(words)))
+    words = adding(spare_run(command.prepare(words)))
     words.sort(key=lambda word: word not in OPTIONS)  # Hydra needs options before settings
     store_defaults({name: command})
     check_words(name, words)
