@@ -70,6 +70,7 @@ def test_a_journal_sets_only_what_is_searched():
     ("words", "message"),
     [
         (["task.collision_penalty=interval(0,1)"], "add hydra.sweeper.metric=success"),
+        (["++task.collision_penalty=interval(0,1)"], "add hydra.sweeper.metric=success"),
         (["experiment=smoke,pillars", "optimizer.lr=1,2"], "it changes the task"),
         (["hydra.sweeper.metric=success", "task=collect_cubes,pillars"], "it changes the task"),
         (["hydra.sweeper.metric=loss", "seed=0,1"], "metric='loss': it must be"),
