@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from drone_rl.envs.fault_models import dead_rows, late_frames, noise, out_of_focus
+from drone_rl.envs.fault_models import dead_rows, frozen_frames, late_frames, noise, out_of_focus
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.trust.axes_table import TABLE
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy
@@ -22,7 +22,6 @@ from drone_rl.trust.perturbations import (
     Condition,
     expose,
     fog,
-    frozen_frames,
     mount,
     sun_at,
     task_region,
@@ -94,15 +93,6 @@ class Axis:
         zero, one = (self.value(strength, subject) for strength in (0.0, 1.0))
         strength = (value - zero) / (one - zero)
         return float(round(strength)) if self.whole else strength
-
-    def between(self, low: float, high: float, share: float = 0.5) -> float | None:
-        """Return the strength at a fraction of the way between two, None if there is none."""
-        forward, inverse, _ = self.scale
-        if not self.whole:
-            return inverse(forward(low) + share * (forward(high) - forward(low)))
-        inside = round(abs(high - low)) - 1
-        nearer = 1 + min(math.floor(share * inside), inside - 1)
-        return math.copysign(nearer, high - low) + low if inside > 0 else None
 
     def at(self, position: float) -> float:
         """Return the strength at a position, the inverse of `position`."""

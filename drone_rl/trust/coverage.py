@@ -14,7 +14,7 @@ from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
 from drone_rl.trust.shifts_file import read_shifts
 from drone_rl.trust.shifts_results import Coverage, Need, SavedShifts
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import as_path, parse_json, read_bytes
+from drone_rl.utils.files import as_path, newest_first, parse_json, read_bytes
 from drone_rl.utils.limits import YAML_BYTES
 from drone_rl.utils.readers import parse_yaml
 from drone_rl.utils.schema import OneOf, as_mapping
@@ -59,10 +59,10 @@ def find_domain(
     folder = as_path(outputs, "outputs") / "shifts"
     there = [*folder.glob("runs/*/shifts.json"), *folder.glob("multiruns/*/*/shifts.json")]
     newest = None
-    for path in sorted(there, key=lambda p: p.stat().st_mtime, reverse=True)[:MAX_FILES]:
+    for path in newest_first(there)[:MAX_FILES]:
         with suppress(InputError):  # of another policy
             measured = read_shifts(path, *of)
-            if measured.ranges:
+            if measured.shifts and measured.shifts.ranges:
                 return measured
             newest = newest or measured
     return newest

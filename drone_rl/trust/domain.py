@@ -113,8 +113,9 @@ def walk(axis: Axis, sign: int, probe: Callable[[float], Probe]) -> End:
             break
     if failed is None:
         return End(limit, failed, bad, True if side else None)
-    parts = (axis.between(limit, failed[0], part / PARTS) for part in range(1, PARTS))
-    for strength in dict.fromkeys(part for part in parts if part is not None):
+    first, last = axis.position(limit), axis.position(failed[0])
+    parts = (axis.at(first + part / PARTS * (last - first)) for part in range(1, PARTS))
+    for strength in dict.fromkeys(part for part in parts if part not in (limit, failed[0])):
         found = probe(strength)
         if not found.good:
             bad = strength if found.bad else bad

@@ -9,7 +9,7 @@ from torchrl.envs import EnvBase
 
 from drone_rl.config import AppearanceSettings, DynamicsSettings, TaskSettings
 from drone_rl.config.commands import HeldOutSettings, JudgeSettings
-from drone_rl.config.configuration import Changes, as_changes, from_arguments
+from drone_rl.config.configuration import Changes, S, as_changes, from_arguments
 from drone_rl.envs import DroneEnv
 from drone_rl.envs.rollout import Agent
 from drone_rl.policies.baselines import make_baseline
@@ -207,13 +207,9 @@ def judge_one(
                     f"{setting}={path}, but policy={name} has no network; give {setting}= with the "
                     "policy that it is of"
                 )
-        changed_task = Changes(TaskSettings).read(as_changes(task, "task"), "task")
-        changed_dynamics = Changes(DynamicsSettings).read(
-            as_changes(dynamics, "dynamics"), "dynamics"
-        )
-        drone = DynamicsSettings.read(changed_dynamics, "dynamics")
+        drone = _changed(DynamicsSettings, dynamics, "dynamics")
         drone.check_air()
-        worlds = _baseline(name, TaskSettings.read(changed_task, "task"), drone, settings, seed)
+        worlds = _baseline(name, _changed(TaskSettings, task, "task"), drone, settings, seed)
     else:
         measured = find_domain(loaded, shifts, outputs)
         if require_domain is not None:
@@ -270,6 +266,11 @@ def _loaded(policy: Any, outputs: str | Path, changed: Mapping[str, Any]) -> Bas
     if changed["appearance"] is not None:
         raise InputError(f"policy={policy} sees no images; leave appearance out")
     return None
+
+
+def _changed(of: type[S], changes: Any, where: str) -> S:
+    """Return the default settings of a class with changes."""
+    return of.read(Changes(of).read(as_changes(changes, where), where), where)
 
 
 @contextmanager

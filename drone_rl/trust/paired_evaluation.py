@@ -221,7 +221,12 @@ class PairedEvaluator:
         full = scene_appearance(worlds.scene) if condition.appearance_changes else None
         distractors = self.distractor_places() if condition.clutter else None
 
+        known: tuple[Tensor, Appearance | None] | None = None
+
         def appearance(rows: Tensor) -> Appearance | None:
+            nonlocal known
+            if mode != "drifting" and known is not None and torch.equal(known[0], rows):
+                return known[1]  # which the renderer need not encode again
             look = appearances.current(rows) if appearances.varies else appearances.middle
             if full is not None:
                 look = full if look is None else look.over(full)
@@ -230,6 +235,7 @@ class PairedEvaluator:
             if distractors is not None:
                 region = task_region(self.subject.task)
                 look = clutter(look, region, distractors[rows, : condition.clutter])
+            known = rows, look
             return look
 
         hiding_only = getattr(agent, "needs_only_hiding_faults", False)

@@ -11,7 +11,6 @@ from torch import Tensor
 from drone_rl.config import BaseTaskSettings
 from drone_rl.config.commands import Mode
 from drone_rl.config.task import ObjectRegion
-from drone_rl.envs import fault_models
 from drone_rl.envs.fault_models import FaultModel, Sample
 from drone_rl.envs.observer import Pipeline, Stage
 from drone_rl.sim.rendering import Appearance, Distractors, Scene
@@ -183,12 +182,6 @@ def mount(
     return AppearanceChange(change, 1)
 
 
-def elevation(direction: Colors) -> float:
-    """Return the elevation of a sun that shines in this direction, degrees above the horizon."""
-    x, y, z = _tensor(direction).tolist()
-    return math.degrees(math.atan2(-z, math.hypot(x, y)))
-
-
 def task_region(settings: BaseTaskSettings) -> ObjectRegion:
     """Return where a task's objects are, their size and color; an `InputError` without any."""
     if settings.object_region is None:
@@ -230,19 +223,6 @@ def clutter(appearance: Appearance | None, region: ObjectRegion, places: Tensor)
     return dataclasses.replace(
         appearance, distractors=more if distractors is None else distractors.concat(more)
     )
-
-
-def frozen_frames(rate: float) -> FaultModel:
-    """Repeat the previous image with this probability at each step.
-
-    Unlike `fault_models.frozen_frames` it samples a number at the first step, too.
-    """
-
-    def begin(images: Tensor, sample: Sample) -> Tensor:
-        sample(1)  # one number a step, the first included
-        return images
-
-    return dataclasses.replace(fault_models.frozen_frames(rate), begin=begin)
 
 
 class SharedStream:

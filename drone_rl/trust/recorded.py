@@ -8,7 +8,7 @@ from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.trust.judge import Judgement, identify
 from drone_rl.trust.results import Verdict
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import make_folder
+from drone_rl.utils.files import make_folder, newest_first
 from drone_rl.utils.run_result import read_result
 from drone_rl.utils.text import rate
 
@@ -63,9 +63,8 @@ def read_verdicts(outputs: str | Path) -> list[tuple[float, Judgement]]:
     """Return the newest verdicts in folders of commands below `outputs`, with their times."""
     folders = ("*/runs/*", "*/runs/*/*", "*/multiruns/*/*")
     paths = (path for folder in folders for path in Path(outputs).glob(f"{folder}/{NAME}"))
-    times = sorted(((path.stat().st_mtime, path) for path in paths), reverse=True)
     verdicts = []
-    for when, path in times[:MAX_FILES]:
+    for path in newest_first(paths)[:MAX_FILES]:
         with suppress(InputError):
-            verdicts.append((when, Judgement.read_json(path)))
+            verdicts.append((path.stat().st_mtime, Judgement.read_json(path)))
     return verdicts

@@ -121,11 +121,6 @@ class Repetition(Stored):
         """Whether no run differs in more than `MAX_DIFFERENT` episodes."""
         return self.worst.different <= MAX_DIFFERENT
 
-    @property
-    def is_enough(self) -> bool:
-        """Whether enough episodes were repeated, and end as before."""
-        return self.is_same and self.episodes >= NEEDED_EPISODES
-
 
 class CameraUse(Stored):
     """What changes if a policy gets the images of other episodes."""

@@ -294,8 +294,8 @@ class Robustness(Seeded, Provenance):
     @property
     def refuted(self) -> dict[str, RangeTest]:
         """Axes with a range that new episodes did not confirm, with these episodes."""
-        tests = {name: found.test for name, found in self.ranges.items()}
-        return {name: of for name, of in tests.items() if of is not None and not of.is_passed}
+        tests = ((name, found.test) for name, found in self.ranges.items())
+        return {NAMES[name]: of for name, of in tests if of and not of.is_passed}
 
     @property
     def uncertain(self) -> list[tuple[str, FailedEnd]]:
@@ -327,10 +327,6 @@ class Robustness(Seeded, Provenance):
         """The axes by name, or their number if there are many."""
         names = [NAMES[name] for name in self.axes]
         return listed(names) if len(names) <= MAX_NAMED else f"{len(names)} axes"
-
-    def label(self, name: str) -> str:
-        """Return the name of an axis in reports."""
-        return NAMES[name]
 
     def at(self, name: str, value: float | None) -> str:
         """Return a value of an axis as text."""
@@ -388,7 +384,7 @@ class Robustness(Seeded, Provenance):
             name: {end: value for end in ("low", "high") if (value := getattr(of, end)) is not None}
             | {"unit": self.axes[name].unit}
             for name, of in self.ranges.items()
-            if of.positions is not None and self.axes[name].is_tested and name not in self.refuted
+            if of.positions and self.axes[name].is_tested and NAMES[name] not in self.refuted
         }
 
     def table(self) -> list[list[str]]:
@@ -413,11 +409,6 @@ class SavedShifts(Stored):
     """The reason, in one line."""
     shifts: Robustness | None = None
     """None if refused."""
-
-    @property
-    def ranges(self) -> Mapping[str, Range]:
-        """Ranges of the operating domain by axis, if there are any."""
-        return {} if self.shifts is None else self.shifts.ranges
 
     def why_not(self, verdict: Verdict) -> str | None:
         """Return why a verdict can't quote it, or None."""

@@ -170,8 +170,9 @@ def apply_rule(
             raise ValueError("policy and baselines have different initial states; use the same")
     quantities = measure(greedy, baselines, rule)
     kind = decide([quantity.level for quantity in quantities.values()], len(rule.strata))
-    certain = len(kinds_of(quantities, rule)) == 1 and _is_oracle_clear(baselines, rule)
-    certain &= repetition is None or repetition.is_enough
+    enough = _enough(greedy, baselines, rule)
+    certain = enough is not None and enough <= len(greedy)
+    certain &= repetition is None or repetition.is_same
     if kind is VerdictKind.GOOD and camera is not None:
         certain &= camera.is_used is not None
         kind = VerdictKind.TRIVIAL if camera.is_used is False else kind
@@ -196,7 +197,7 @@ def apply_rule(
         else mean_bounds(sampled.success - greedy.success, -1.0, 1.0),
         failures=failure_table(greedy),
         quantities=quantities,
-        enough=_enough(greedy, baselines, rule),
+        enough=enough,
         unlike=dict(unlike or {}),
     )
     if camera is None:

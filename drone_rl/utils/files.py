@@ -87,15 +87,19 @@ def last_of(folder: Path) -> Path:
     return folder / "checkpoints" / "last.pt"
 
 
+def newest_first(paths: Iterable[Path]) -> list[Path]:
+    """Return files or folders, the one that was changed last first."""
+    return sorted(paths, key=lambda path: path.stat().st_mtime, reverse=True)
+
+
 def newest(paths: Iterable[Path]) -> Path | None:
     """Return the file or folder that was changed last; None if there are none."""
-    return max(paths, key=lambda path: path.stat().st_mtime, default=None)
+    return next(iter(newest_first(paths)), None)
 
 
 def trained_policies(outputs: str | Path) -> list[Path]:
     """Return last.pt of every training under a folder of outputs, the newest first."""
-    checkpoints = as_path(outputs, "outputs").glob("train/**/checkpoints/last.pt")
-    return sorted(checkpoints, key=lambda path: path.stat().st_mtime, reverse=True)
+    return newest_first(as_path(outputs, "outputs").glob("train/**/checkpoints/last.pt"))
 
 
 def read_json(path: Path, most: int = SMALL_JSON_BYTES) -> Any:

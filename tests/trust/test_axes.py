@@ -70,24 +70,15 @@ def axis(scale=LINEAR, neutral=0.0, **kwargs):
 def test_positions_on_a_scale_of_factors():
     of_factors = axis(FACTORS, 1.0)
     assert of_factors.position(2.0) == -of_factors.position(0.5) == pytest.approx(math.log(2))
-    assert of_factors.between(1.0, 0.25) == pytest.approx(0.5)
+    assert of_factors.at(-math.log(2)) == pytest.approx(0.5)
     assert of_factors.position(1.0) == 0
 
 
 def test_positions_on_an_inverse_scale():
     of_visibility = axis(INVERSE, math.inf)
     assert of_visibility.position(50.0) == pytest.approx(0.02)
-    assert of_visibility.between(math.inf, 50.0) == pytest.approx(100.0)
+    assert of_visibility.at(0.01) == pytest.approx(100.0)
     assert INVERSE.inverse(0.0) == math.inf
-
-
-def test_strengths_between_whole_numbers():
-    steps = axis(whole=True)
-    assert [steps.between(4.0, 8.0, share) for share in (0.0, 0.5, 0.9999)] == [5.0, 6.0, 7.0]
-    assert [steps.between(8.0, 4.0, share) for share in (0.0, 0.9999)] == [7.0, 5.0]
-    assert steps.between(1.0, 2.0) is None
-    assert axis().between(1.0, 2.0) == 1.5
-    assert axis().between(2.0, 1.0, 0.25) == 1.75
 
 
 def test_strength_at_a_position():

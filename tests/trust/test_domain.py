@@ -91,6 +91,15 @@ def test_search_goes_on_to_where_the_policy_is_certainly_not_good(make_prober, m
     assert (found.high, found.failed[0].value, found.high_bad) == (10.0, 2.0, 30.0)
 
 
+def test_search_divides_a_gap_between_whole_strengths(make_prober, monkeypatch):
+    prober = make_prober(subject(), 1)
+    asked = good_at(prober, monkeypatch, lambda s: s <= 6)
+    prober.search(axis((2.0, 8.0), whole=True), lambda _: PASSED)
+    assert asked == [2.0, 8.0, 4.0, 5.0, 6.0]
+    prober.search(axis((6.0, 7.0), whole=True), lambda _: PASSED)
+    assert asked[5:] == [6.0, 7.0]
+
+
 def test_range_that_reaches_the_last_strength_is_open(make_prober, monkeypatch):
     prober = make_prober(subject(), 1)
     good_at(prober, monkeypatch, lambda s: s <= 9)

@@ -239,10 +239,10 @@ def test_task_without_an_oracle():
     assert straight.failing_side is None
 
 
-def repeated(different, successes=50, episodes=50):
+def repeated(different, successes=50):
     run = Repeated(how="one environment at a time", different=different, successes=successes)
     same = Repeated(how="8 environments at a time", different=0, successes=50)
-    made = {"implementation": "PyTorch", "episodes": episodes, "successes": 50}
+    made = {"implementation": "PyTorch", "episodes": 50, "successes": 50}
     return Repetition(**made, runs=(same, run))
 
 
@@ -257,9 +257,10 @@ def test_a_verdict_is_certain_only_if_at_most_one_repeated_episode_differs(
     assert (words in verdict.sentence) != is_certain
 
 
-def test_too_few_repeated_episodes_are_not_certain(judged):
-    verdict = judged(lambda i, side: True, repetition=repeated(0, 49, episodes=49))
-    assert not verdict.certain
+@pytest.mark.parametrize(("number", "is_certain"), [(49, False), (52, True)])
+def test_fewer_than_50_episodes_are_not_certain(judged, number, is_certain):
+    verdict = judged(lambda i, side: False, number)
+    assert (verdict.certain, verdict.enough) == (is_certain, max(50, number))
 
 
 def camera(own, exchanged, low, high, strata=(0.0, 0.0)):
