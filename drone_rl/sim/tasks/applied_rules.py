@@ -165,6 +165,18 @@ def reward_terms(rewards: Mapping[str, TermSettings]) -> tuple[Term, ...]:
     return tuple(REWARDS.by_name[name] for name in rewards)
 
 
+def largest_reward(rewards: Mapping[str, Any], **largest: float) -> float | None:
+    """Return the weighted sum of the terms' largest sums in an episode; None if one is unknown.
+
+    Without any contact that of `contact` is 0.
+    """
+    known = {"contact": 0.0, **largest}
+    weights = {name: of.weight for name, of in rewards.items() if of.weight}
+    if weights.keys() - known:
+        return None
+    return float(sum(weight * known[name] for name, weight in weights.items()))
+
+
 def _warp(tensor: Tensor, kind: Any = None) -> Any:
     """Return a tensor as Warp's array, which shares its memory if it is contiguous."""
     return wp.from_torch(tensor.contiguous(), dtype=kind)
