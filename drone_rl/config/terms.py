@@ -33,7 +33,7 @@ class TermSettings(Settings):
 
 
 class RewardSettings(TermSettings):
-    """The numbers of a reward term; `drone-rl terms` lists all terms."""
+    """The numbers of a reward term."""
 
     weight: Number = 1.0
     """Factor of the term's values."""
@@ -93,6 +93,11 @@ class Terms:
     def __init__(self, kind: str) -> None:
         """Begin without terms; `kind` is the name of the decorator."""
         self.kind, self.by_name = kind, dict[str, Term]()
+
+    @property
+    def words(self) -> str:
+        """The allowed values of a setting in words."""
+        return f"{self.kind} terms by name"
 
     @property
     def registry(self) -> dict[str, type[TermSettings]]:
