@@ -138,7 +138,7 @@ class AppliedRules:
         world.moves_at_once, world.seconds = timestep is None, timestep or SECONDS
         world.step_limit = self._settings.step_limit
         world.weights, world.parameters, world.numbers = constants[3:]
-        world.goal, world.reached = _warp(state.ahead), _warp(state.reached)
+        world.ahead, world.reached = _warp(state.ahead), _warp(state.reached)
         world.sides, world.noted = _warp(state.sides), _warp(state.noted)
         world.actions, world.paid = _warp(state.action, wp.vec4), _warp(state.paid)
         world.steps, world.end_reasons = _warp(steps), _warp(end_reasons)
