@@ -80,7 +80,7 @@ class TermTask(ObjectTask):
             "present": Entry((objects,), torch.bool),
             "touched": Entry((objects,), torch.bool),
             "goal": Entry((1,), torch.int64, 0, objects),
-            "paid": Entry((len(self.rules.compiled.rewards),), torch.float32),
+            "paid": Entry((len(self.reward_terms),), torch.float32),
             "end_reason": Entry((1,), torch.int64, 0, len(self.ends) - 1),
         }
 
