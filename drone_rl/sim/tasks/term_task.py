@@ -2,6 +2,7 @@
 
 import enum
 import math
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -176,7 +177,8 @@ def define_task(name: str, **settings: Any) -> type[TermTaskSettings]:
     """
     checked = TermTaskSettings.read(settings, name)
     hints = {field: TermTaskSettings.model_fields[field].rebuild_annotation() for field in settings}
-    members = {"__annotations__": hints, "__module__": __name__, "name": name}
+    caller = sys._getframe(1).f_globals.get("__name__", __name__)  # as collections.namedtuple does
+    members = {"__annotations__": hints, "__module__": caller, "name": name}
     values = {field: getattr(checked, field) for field in settings}
     kind: Any = type(f"{name}_settings", (TermTaskSettings,), {**members, **values})
     register_task(kind, TermTask)
