@@ -24,6 +24,7 @@ from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
 from drone_rl.sim.rendering.raytrace.renderer import Raytracer
 from drone_rl.sim.rendering.raytrace.structs_kernel import Images
 from drone_rl.sim.tasks import State
+from drone_rl.sim.tasks.fused import fused_rules
 
 EPISODE, REWARD = ("collector", "traj_ids"), ("next", "reward")
 END_REASON = ("next", "info", "end_reason")
@@ -101,7 +102,7 @@ class FusedEpisodes:
         """
         reasons = [*_not_fused(env), *_not_fused_policy(env, actor)]
         worlds = env.worlds
-        rules = worlds.task.fused_rules(worlds.dynamics, worlds.num_envs)
+        rules = fused_rules(worlds.task, worlds.dynamics, worlds.state)
         if rules is None:
             names = f"{type(worlds.task).__name__} with {type(worlds.dynamics).__name__}"
             reasons.append(f"task {names} is not fused")

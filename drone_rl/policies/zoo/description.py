@@ -74,9 +74,9 @@ class TaskDescription(Model):
 
     name: Name
     parameters: BaseTaskSettings
-    """Its settings."""
+    """Its settings, those of its reward by default: a policy is judged without it."""
     rewards: dict[Name, float] = {}
-    """Weights of the reward's terms; empty for a task that computes its reward as a whole."""
+    """Weights of the reward's terms in training; empty for a task without terms."""
     scene: Source | None = None
     """The scene's file; None for a scene that the task composes."""
     code: Source | None = None
@@ -85,7 +85,11 @@ class TaskDescription(Model):
     @classmethod
     def of(cls, settings: BaseTaskSettings) -> Self:
         """Return the description of a task with some settings."""
-        return cls(name=settings.name, parameters=settings)
+        terms: Mapping[str, Any] = getattr(settings, "reward", {})
+        weights = {name: term.weight for name, term in terms.items()}
+        if weights:
+            settings = settings.replace(reward=type(settings).model_fields["reward"].default)
+        return cls(name=settings.name, parameters=settings, rewards=weights)
 
     @pydantic.field_validator("parameters", mode="before")
     @classmethod
@@ -98,11 +102,12 @@ class TaskDescription(Model):
 
     @pydantic.field_serializer("parameters")
     def _without_name(self, parameters: BaseTaskSettings) -> dict[str, Any]:
-        return Settings.values(parameters)
+        values = Settings.values(parameters)
+        return {name: value for name, value in values.items() if name != "reward"}
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> Self:
-        if unsupported := [n for n in ("rewards", "scene", "code") if getattr(self, n)]:
+        if unsupported := [n for n in ("scene", "code") if getattr(self, n)]:
             raise InputError(
                 f"{unsupported[0]} is not supported; use the version of drone_rl that wrote it"
             )

@@ -1,4 +1,4 @@
-"""Environments of a task of terms for the fused episode kernel."""
+"""Environments of tasks of objects for the fused episode kernel."""
 
 from typing import Any
 
@@ -8,25 +8,41 @@ import warp as wp
 from drone_rl.sim.dynamics import ComputerVision, Dynamics, FlightState, Quadrotor
 from drone_rl.sim.dynamics.control import Moves
 from drone_rl.sim.dynamics.moves_kernel import make_fleet
-from drone_rl.sim.dynamics.state import LEVEL, NUMBERS
+from drone_rl.sim.dynamics.state import NUMBERS
 from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, PoseArrays
-from drone_rl.sim.terms.rules_kernel import Episodes, place
-from drone_rl.utils.batch import Batch
+from drone_rl.sim.tasks.geometry_kernel import OBSTACLE
+from drone_rl.sim.tasks.objects import ObjectTask
+from drone_rl.sim.tasks.rules_kernel import Episodes, place
+from drone_rl.sim.tasks.task import State, Task
 
 
-class FusedTerms:
+def fused_rules(task: Task[Any], dynamics: Dynamics, state: State) -> "FusedObjects | None":
+    """Return environments as many as states for the fused kernel, or None if it lacks the rules."""
+    if not isinstance(task, ObjectTask) or not task.has_own_rules:
+        return None
+    is_flown = type(dynamics) is Quadrotor and isinstance(dynamics.steering, Moves)
+    if type(dynamics) is not ComputerVision and (
+        not is_flown or bool((task.roles == OBSTACLE).any())
+    ):
+        return None
+    return FusedObjects(task, dynamics, state)
+
+
+class FusedObjects:
     """States for the fused kernel: `arrays`, `poses`, `steps` and `end_reasons`."""
 
-    def __init__(self, task: Any, dynamics: Dynamics, state: Batch) -> None:
-        """Take a task, and states as large as the batch, whose memory is used; see `supports`."""
-        self.functions = (Episodes, place, task.rules.move)
-        self._state, count = state, len(state)
+    def __init__(self, task: ObjectTask, dynamics: Dynamics, state: State) -> None:
+        """Allocate the arrays of as many environments as states; see `fused_rules`."""
+        self.functions = (Episodes, place, task.rules.compiled.move)
+        """Warp structure of the states; functions that write poses and that step an environment."""
+        self._state: Any = state[torch.arange(len(state))]
+        count = len(state)
         self.steps = torch.zeros(count, dtype=torch.int32)
         self.end_reasons = torch.zeros(count, dtype=torch.int32)
         self._drones = torch.zeros(count, 3, dtype=torch.float64)
-        self._attitudes = torch.tensor(LEVEL).repeat(count, 1)
+        self._attitudes = torch.zeros(count, 4)
         self.arrays: Any = Episodes()
-        self.arrays.world = task.world(state, self.steps, self.end_reasons)
+        self.arrays.world = task.rules.world(self._state, self.steps, self.end_reasons, dynamics)
         self.arrays.drones = wp.from_torch(self._drones, dtype=wp.vec3d)
         self.arrays.attitudes = wp.from_torch(self._attitudes, dtype=wp.vec4)
         self.arrays.steps = wp.from_torch(self.steps)
@@ -40,21 +56,16 @@ class FusedTerms:
         self._numbers = torch.zeros(count if quadrotor else 0, NUMBERS, dtype=torch.float64)
         self.arrays.fleet = make_fleet(quadrotor, self._numbers)
         self.poses: Any = PoseArrays()
-        frames = torch.zeros(count, 1 + DRONE_FRAME + len(task.each), 3)
+        frames = torch.zeros(count, 1 + DRONE_FRAME + len(task.objects), 3)
         self.poses.positions = wp.from_torch(frames, dtype=wp.vec3)
         self.poses.attitudes = wp.from_torch(self._attitudes, dtype=wp.vec4)
-
-    @staticmethod
-    def supports(dynamics: Dynamics) -> bool:
-        """Return whether the kernel implements these dynamics."""
-        is_flown = type(dynamics) is Quadrotor and isinstance(dynamics.steering, Moves)
-        return is_flown or type(dynamics) is ComputerVision
 
     def begin(self, state: Any) -> None:
         """Copy states at the start of episodes."""
         count = len(state)
-        for name in ("places", "present", "touched", "goal", "sides", "action", "paid"):
-            getattr(self._state, name)[:count] = getattr(state, name)
+        for name, values in vars(self._state).items():
+            if name not in ("body", "steps", "end_reason"):
+                values[:count] = getattr(state, name)
         self._drones[:count] = state.drone
         self._attitudes[:count] = state.body.attitude.float()
         if isinstance(state.body, FlightState):
