@@ -90,6 +90,7 @@ class ObjectTask(Task[ObjectState]):
         """Settings of each of the P objects."""
         self.roles = torch.tensor([ROLES.index(of.role) for of in self.each], dtype=torch.int32)
         self.num_goals = len(self.each) if num_goals is None else num_goals
+        self.reward_terms = tuple(term.name for term in rules.compiled.rewards)
         rules.bind(self.each, settings)
 
     def make_dynamics(self) -> Dynamics:
@@ -123,9 +124,7 @@ class ObjectTask(Task[ObjectState]):
             sides=goals.int() - 1,
             noted=torch.full(goals.shape, torch.nan, dtype=torch.float64, device=device),
             action=torch.zeros(count, 4, device=device),
-            paid=torch.zeros(
-                count, len(self.rules.compiled.rewards), dtype=torch.float64, device=device
-            ),
+            paid=torch.zeros(count, len(self.reward_terms), dtype=torch.float64, device=device),
         )
         self.look_ahead(state)
         return state
