@@ -33,7 +33,7 @@ class TermSettings(Settings):
 
 
 class RewardSettings(TermSettings):
-    """The numbers of a reward term."""
+    """The numbers of a reward term; `drone-rl terms` lists all terms."""
 
     weight: Number = 1.0
     """Factor of the term's values."""
