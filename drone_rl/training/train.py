@@ -122,7 +122,7 @@ def learn(
         if confirmation is not None:
             stack.callback(confirmation.close)
         checkpoints = run.checkpoints(settings)
-        collapse = CollapseCheck(target or as_task(settings.task).largest_reward or 0.0)
+        collapse = CollapseCheck(target or as_task(settings.task).largest_reward)
         first = (CsvCallback(folder / "metrics.csv"), checkpoints, collapse)
         trainer = Trainer(
             collector=parts.collector,
