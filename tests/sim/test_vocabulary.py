@@ -3,7 +3,7 @@
 import pytest
 
 from drone_rl.sim import actions
-from drone_rl.sim.vocabulary import CUBES, MOST, SHOWN_MOVES, ShownActions, TaskVocabulary
+from drone_rl.sim.vocabulary import MOST, SHOWN_MOVES, ShownActions, TaskVocabulary, shipped_vocabulary
 from drone_rl.utils.errors import InputError
 
 
@@ -55,6 +55,8 @@ def test_moves_are_the_default_display():
         ({"more": 1}, "unknown"),
     ],
 )
+
+CUBES = shipped_vocabulary("collect_cubes")
 def test_invalid_displays_raise(change, message):
     with pytest.raises(InputError, match=message):
         ShownActions.read({**SHOWN_MOVES.model_dump(), **change})
