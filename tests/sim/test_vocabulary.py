@@ -3,8 +3,16 @@
 import pytest
 
 from drone_rl.sim import actions
-from drone_rl.sim.vocabulary import MOST, SHOWN_MOVES, ShownActions, TaskVocabulary, shipped_vocabulary
+from drone_rl.sim.vocabulary import (
+    MOST,
+    SHOWN_MOVES,
+    ShownActions,
+    TaskVocabulary,
+    shipped_vocabulary,
+)
 from drone_rl.utils.errors import InputError
+
+CUBES = shipped_vocabulary("collect_cubes")
 
 
 def test_vocabulary_round_trip():
@@ -55,8 +63,6 @@ def test_moves_are_the_default_display():
         ({"more": 1}, "unknown"),
     ],
 )
-
-CUBES = shipped_vocabulary("collect_cubes")
 def test_invalid_displays_raise(change, message):
     with pytest.raises(InputError, match=message):
         ShownActions.read({**SHOWN_MOVES.model_dump(), **change})
