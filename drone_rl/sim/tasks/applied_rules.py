@@ -1,7 +1,7 @@
 """Rules of tasks of objects with their numbers, applied to states."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NoReturn
+from typing import Any
 
 import torch
 import warp as wp
@@ -71,8 +71,7 @@ class AppliedRules:
             InputError: A reward term is not finite.
         """
         rewards = self._run(state, before, speeds, dynamics, is_start=False)
-        if not bool(rewards.isfinite().all()):
-            self._name_unusable(state.paid)
+        self.check(state.paid)
         return rewards
 
     def _run(
@@ -109,8 +108,10 @@ class AppliedRules:
         state.steps[:], state.end_reason[:] = steps, end_reasons
         return rewards
 
-    def _name_unusable(self, paid: Tensor) -> NoReturn:
-        """Raise an `InputError` that names the reward terms whose values are not finite."""
+    def check(self, paid: Tensor) -> None:
+        """Raise an `InputError` that names the terms whose sums, (N, R), are not finite."""
+        if bool(paid.isfinite().all()):
+            return
         unusable = zip(self.compiled.rewards, ~paid.isfinite().all(0), strict=True)
         named = ", ".join(term.name for term, is_unusable in unusable if is_unusable)
         raise InputError(

@@ -4,6 +4,7 @@ from typing import Any
 
 import torch
 import warp as wp
+from torch import Tensor
 
 from drone_rl.sim.dynamics import ComputerVision, Dynamics, FlightState, Quadrotor
 from drone_rl.sim.dynamics.control import Moves
@@ -11,14 +12,14 @@ from drone_rl.sim.dynamics.moves_kernel import make_fleet
 from drone_rl.sim.dynamics.state import NUMBERS
 from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, PoseArrays
 from drone_rl.sim.tasks.geometry_kernel import OBSTACLE
-from drone_rl.sim.tasks.objects import ObjectTask
+from drone_rl.sim.tasks.objects import ObjectTask, follows_rules
 from drone_rl.sim.tasks.rules_kernel import Episodes, place
 from drone_rl.sim.tasks.task import State, Task
 
 
 def fused_rules(task: Task[Any], dynamics: Dynamics, state: State) -> "FusedObjects | None":
     """Return environments as many as states for the fused kernel, or None if it lacks the rules."""
-    if not isinstance(task, ObjectTask) or not task.has_own_rules:
+    if not isinstance(task, ObjectTask) or not follows_rules(task):
         return None
     is_flown = type(dynamics) is Quadrotor and isinstance(dynamics.steering, Moves)
     if type(dynamics) is not ComputerVision and (
@@ -33,6 +34,7 @@ class FusedObjects:
 
     def __init__(self, task: ObjectTask, dynamics: Dynamics, state: State) -> None:
         """Allocate the arrays of as many environments as states; see `fused_rules`."""
+        self._rules = task.rules
         self.functions = (Episodes, place, task.rules.compiled.move)
         """Warp structure of the states; functions that write poses and that step an environment."""
         self._state: Any = state[torch.arange(len(state))]
@@ -59,6 +61,16 @@ class FusedObjects:
         frames = torch.zeros(count, 1 + DRONE_FRAME + len(task.objects), 3)
         self.poses.positions = wp.from_torch(frames, dtype=wp.vec3)
         self.poses.attitudes = wp.from_torch(self._attitudes, dtype=wp.vec4)
+
+    def paid(self, count: int) -> Tensor:
+        """Return the sum of each reward term in the first episodes. Shape: (count, R), float32.
+
+        Raises:
+            InputError: A term is not finite.
+        """
+        sums = self._state.paid[:count]
+        self._rules.check(sums)
+        return sums.float()
 
     def begin(self, state: Any) -> None:
         """Copy states at the start of episodes."""

@@ -2,6 +2,7 @@
 
 import enum
 import math
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -80,7 +81,7 @@ class TermTask(ObjectTask):
             "present": Entry((objects,), torch.bool),
             "touched": Entry((objects,), torch.bool),
             "goal": Entry((1,), torch.int64, 0, objects),
-            "paid": Entry((len(self.rules.compiled.rewards),), torch.float32),
+            "paid": Entry((len(self.reward_terms),), torch.float32),
             "end_reason": Entry((1,), torch.int64, 0, len(self.ends) - 1),
         }
 
@@ -176,7 +177,8 @@ def define_task(name: str, **settings: Any) -> type[TermTaskSettings]:
     """
     checked = TermTaskSettings.read(settings, name)
     hints = {field: TermTaskSettings.model_fields[field].rebuild_annotation() for field in settings}
-    members = {"__annotations__": hints, "__module__": __name__, "name": name}
+    caller = sys._getframe(1).f_globals.get("__name__", __name__)  # as collections.namedtuple does
+    members = {"__annotations__": hints, "__module__": caller, "name": name}
     values = {field: getattr(checked, field) for field in settings}
     kind: Any = type(f"{name}_settings", (TermTaskSettings,), {**members, **values})
     register_task(kind, TermTask)
