@@ -84,7 +84,8 @@ def _settings_class(name: str, numbers: Mapping[str, float]) -> type[TermSetting
     hints = dict.fromkeys(numbers, Number)
     members = {"__annotations__": hints, "__module__": __name__, **numbers}
     base = RewardSettings if "weight" in numbers else TermSettings
-    return type(f"{name}_settings", (base,), members)
+    kind: Any = type(f"{name}_settings", (base,), members)
+    return kind
 
 
 class Terms:
