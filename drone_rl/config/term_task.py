@@ -1,6 +1,9 @@
 """Settings of a task of terms: objects, starts, bounds, rewards, ends and success."""
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Self
+
+from pydantic import BeforeValidator
 
 from drone_rl.config.task import BaseTaskSettings, Color, ObjectRegion
 from drone_rl.config.terms import Ends, Rewards, Success
@@ -12,6 +15,20 @@ Coordinate = Annotated[Any, Span(Real(-1000.0, 1000.0, unit="m"))]
 Size = Real(0.01, 1000.0, unit="m")
 ROLES = ("goal", "obstacle", "decoration")
 SHAPES = ("ball", "cylinder", "box")
+
+
+def _dotted(given: Any) -> Any:
+    """Return a mapping whose names have dots instead of mappings inside of it."""
+    if not isinstance(given, Mapping):
+        return given
+    flat: dict[Any, Any] = {}
+    for name, value in given.items():
+        inner = _dotted(value)
+        is_nested = isinstance(inner, Mapping)
+        flat |= (
+            {f"{name}.{key}": item for key, item in inner.items()} if is_nested else {name: value}
+        )
+    return flat
 
 
 class ObjectSettings(Settings):
@@ -89,7 +106,7 @@ class TermTaskSettings(BaseTaskSettings):
     """Reasons to end an episode, by name; earlier ones precede later ones and success."""
     success: Success = {}
     """The one meaning of success, by name."""
-    curriculum: dict[str, Coordinate] = {}
+    curriculum: Annotated[dict[str, Coordinate], BeforeValidator(_dotted)] = {}
     """Ranges in which a training begins, such as objects.ball.x: [5, 6]. As success rises, each
     widens to the range of its setting, which everything but training uses from the start."""
     margin: Annotated[float, Real(0.0, 1000.0, unit="m")] = 10.0
