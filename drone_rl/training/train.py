@@ -130,7 +130,7 @@ def learn(
         if confirmation is not None:
             stack.callback(confirmation.close)
         checkpoints = run.checkpoints(settings)
-        collapse = CollapseCheck(target or as_task(settings.task).largest_reward or 0.0)
+        collapse = CollapseCheck(target or as_task(settings.task).largest_reward)
         first = [CsvCallback(folder / "metrics.csv"), checkpoints, collapse, UnpaidTerms()]
         if as_task(settings.task).curriculum is not None:
             if not parts.tasks:
