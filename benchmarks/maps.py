@@ -21,7 +21,8 @@ from drone_rl.policies import ImageNetwork, SmallCNN
 from drone_rl.policies.environment import make_env
 from drone_rl.policies.zoo import policy_names, policy_path, read_policy
 from drone_rl.sim.tasks import State
-from drone_rl.sim.tasks.collect_cubes import CollectCubes, WorldState
+from drone_rl.sim.tasks.collect_cubes import CollectCubes
+from drone_rl.sim.tasks.objects import ObjectState
 
 NUM_METHODS = 5
 """Number of methods of an explanation, for the correction for multiple tests."""
@@ -113,7 +114,7 @@ def trusted_adversarial(trial: Trial, absent: Tensor) -> tuple[list[str], int]:
     return [name for name, method in methods.items() if method.trusted], len(candidates)
 
 
-def imagined(scenes: Scenes, episodes: int, frames: int) -> tuple[WorldState, np.ndarray]:
+def imagined(scenes: Scenes, episodes: int, frames: int) -> tuple[ObjectState, np.ndarray]:
     """Return states with the drone at random positions, several of each episode.
 
     Args:
@@ -129,17 +130,18 @@ def imagined(scenes: Scenes, episodes: int, frames: int) -> tuple[WorldState, np
     settings = task.settings
     random_state = np.random.RandomState(0)
     cubes = torch.stack([CollectCubes(settings).sample(random_state) for _ in range(episodes)])
-    state = CollectCubes(settings).start(cubes.repeat_interleave(frames, 0))
+    state = task.start(cubes.repeat_interleave(frames, 0))
     where = torch.from_numpy(random_state.uniform(size=(len(state.drone), 2)))
     state.drone[:, 0] = where[:, 0] * (settings.last_distance - settings.touch_distance)
     state.drone[:, 1] = (2 * where[:, 1] - 1) * settings.lateral_bound
-    state.passed = state.cubes[..., 0] <= state.drone[:, None, 0] + settings.touch_distance
+    state.present = state.places[..., 0] > state.drone[:, None, 0] + settings.touch_distance
+    task.look_ahead(state)
     return state.to(scenes.worlds.device), np.repeat(np.arange(episodes), frames)
 
 
-def expert(scenes: Scenes, state: WorldState) -> Tensor:
+def expert(scenes: Scenes, state: ObjectState) -> Tensor:
     """Return the action that approaches the next cube. Shape: (T,)."""
-    return scenes.needed(scenes.task.next_offset(state))
+    return scenes.needed(scenes.task.edits.next_offset(state))
 
 
 def shipped(absent: Tensor) -> dict[str, ImageNetwork]:

@@ -32,6 +32,9 @@ if TYPE_CHECKING:
     from drone_rl.config.registry import register_returns as register_returns
     from drone_rl.config.registry import register_transform as register_transform
     from drone_rl.config.sensors import SensorSettings as SensorSettings
+    from drone_rl.config.terms import end as end
+    from drone_rl.config.terms import reward as reward
+    from drone_rl.config.terms import success as success
     from drone_rl.config.training import CloningSettings as CloningSettings
     from drone_rl.config.training import TrainerSettings as TrainerSettings
     from drone_rl.config.training import TrainSettings as TrainSettings
@@ -70,11 +73,8 @@ if TYPE_CHECKING:
     from drone_rl.policies.sb3 import Sb3Trunk as Sb3Trunk
     from drone_rl.sim.sensors import Sensors as Sensors
     from drone_rl.sim.tasks import register_task as register_task
-    from drone_rl.sim.terms.step_kernel import Step as Step
-    from drone_rl.sim.terms.term_task import define_task as define_task
-    from drone_rl.sim.terms.terms import end as end
-    from drone_rl.sim.terms.terms import reward as reward
-    from drone_rl.sim.terms.terms import success as success
+    from drone_rl.sim.tasks.step_kernel import Step as Step
+    from drone_rl.sim.tasks.term_task import define_task as define_task
     from drone_rl.training.demonstrations import Demonstration as Demonstration
     from drone_rl.training.demonstrations import FlightConditions as FlightConditions
     from drone_rl.training.demonstrations import add_demonstration as add_demonstration

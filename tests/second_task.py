@@ -6,7 +6,6 @@ post; touching one ends the episode. Nothing is collected or removed.
 
 import dataclasses
 import enum
-import types
 
 import torch
 from torch import Tensor
@@ -68,9 +67,6 @@ class Posts(Task[PostsState]):
     strata = ("left", "right")
     blind_baselines = ("random", "forward")
     scored = ("passed", "sides")
-    remembered = types.MappingProxyType(
-        {"posts": "positions of the posts (T, 2, 3)", "next_target": "number of the next post (T,)"}
-    )
     oracle = OracleRule(("end_reason",), lambda end: torch.zeros_like(end[..., 0]), MOVES)
     largest_reward = float(NUM_POSTS)
 
@@ -134,28 +130,24 @@ class Posts(Task[PostsState]):
         sides = info["sides"]
         return Goals(reached=info["passed"], stratum=sides, world=sides.double())
 
-    def remember(self, info):
-        """Return the positions of the posts and the number of passed ones."""
-        return {"posts": info["posts"], "next_target": info["passed"].sum(-1)}
-
-    def tally(self, info):
-        passed = info["passed"].sum(-1)
-        return passed, torch.zeros_like(passed)
-
-    def recall(self, kept, body):
-        """Restore a state from recorded positions."""
-        index = torch.arange(NUM_POSTS)
-        return PostsState(
-            body=body,
-            posts=kept["posts"].double(),
-            passed=index < kept["next_target"][:, None],
-            steps=kept["step"].clone(),
-            end_reason=torch.zeros(len(kept["step"]), dtype=torch.int64),
-        )
+    @property
+    def edits(self):
+        """How explanations change its scenes, as of `SceneEdits`."""
+        return self
 
     def next_target(self, state):
         """Return the index of the nearest post ahead."""
         return state.passed.sum(-1)
+
+    def next_offset(self, state):
+        """Return where the next post stands, seen from the drone."""
+        target = self.next_target(state).clamp(max=NUM_POSTS - 1)
+        away = state.posts[torch.arange(len(state)), target] - state.body.position
+        return torch.where(state.passed.all(-1)[:, None], torch.nan, away)
+
+    def is_behind(self, state, target):
+        """Return whether a post is behind the drone."""
+        return state.body.position[:, 0] > state.posts[torch.arange(len(state)), target, 0]
 
     def is_reached(self, state, target):
         """Return whether the target was passed."""
@@ -194,7 +186,7 @@ class Posts(Task[PostsState]):
 
     def without_next(self, state):
         """Place the next post far behind the drone."""
-        following = self._is_next(state)
+        following = is_next(self, state)
         posts = state.posts - 100.0 * following[..., None]
         return dataclasses.replace(state, posts=posts, passed=state.passed | following)
 
@@ -202,7 +194,7 @@ class Posts(Task[PostsState]):
         """Move the next post to the left."""
         posts = state.posts.clone()
         move = torch.as_tensor(metres).expand(len(state))[:, None]
-        posts[..., 1] += move * self._is_next(state)
+        posts[..., 1] += move * is_next(self, state)
         return dataclasses.replace(state, posts=posts)
 
     def elsewhere(self, state, camera, generator):
@@ -212,3 +204,8 @@ class Posts(Task[PostsState]):
         posts = state.posts.clone()
         posts[..., :2] = state.body.position[:, None, :2] + away
         return dataclasses.replace(state, posts=posts, passed=torch.zeros_like(state.passed))
+
+
+def is_next(task, state):
+    """Return which post is the next target. Shape: (N, NUM_POSTS)."""
+    return torch.arange(NUM_POSTS) == task.next_target(state)[:, None]

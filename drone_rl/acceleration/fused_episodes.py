@@ -24,9 +24,11 @@ from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
 from drone_rl.sim.rendering.raytrace.renderer import Raytracer
 from drone_rl.sim.rendering.raytrace.structs_kernel import Images
 from drone_rl.sim.tasks import State
+from drone_rl.sim.tasks.fused import fused_rules
 
 EPISODE, REWARD = ("collector", "traj_ids"), ("next", "reward")
-END_REASON = ("next", "info", "end_reason")
+END_REASON, PAID = ("next", "info", "end_reason"), ("next", "info", "paid")
+"""`PAID` are sums of the reward's terms, in the last step of an episode; 0 in others."""
 _MAX_STEPS = 64
 """Steps of one launch of the kernel; most episodes end within them."""
 _MAX_PIXELS = 2**23
@@ -101,7 +103,7 @@ class FusedEpisodes:
         """
         reasons = [*_not_fused(env), *_not_fused_policy(env, actor)]
         worlds = env.worlds
-        rules = worlds.task.fused_rules(worlds.dynamics, worlds.num_envs)
+        rules = fused_rules(worlds.task, worlds.dynamics, worlds.state)
         if rules is None:
             names = f"{type(worlds.task).__name__} with {type(worlds.dynamics).__name__}"
             reasons.append(f"task {names} is not fused")
@@ -116,8 +118,8 @@ class FusedEpisodes:
 
         Returns:
             The steps, one episode after the other: `EPISODE`, 0 to k - 1, `REWARD`, `END_REASON`,
-            the action, and what the actor reads and writes if it is kept, (T_total, *). None if
-            actions are chosen in another way than by sampling or greedily.
+            `PAID` of several terms, the action, and what the actor reads and writes if it is
+            kept, (T_total, *). None if actions are chosen otherwise than by sampling or greedily.
         """
         if self._actor.exploration not in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC):
             return None
@@ -141,6 +143,10 @@ class FusedEpisodes:
         envs, rows = (torch.cat(column) for column in zip(*parts, strict=True))
         order = envs.argsort(stable=True)
         envs, rows = envs[order], rows[order]
+        terms, paid = {}, self._rules.paid(count)
+        if paid.shape[1] > 1:
+            terms[PAID] = paid.new_zeros(len(envs), paid.shape[1])
+            terms[PAID][envs.bincount().cumsum(0) - 1] = paid
         logged = self._buffer.read(rows, names)
         if self._keeps_inputs:
             if self._visible != slice(0, self._env.observer.view.height):
@@ -150,6 +156,7 @@ class FusedEpisodes:
             EPISODE: envs,
             REWARD: logged.pop("reward"),
             END_REASON: logged.pop("end_reason").long(),
+            **terms,
             **logged,
             "action": logged["action"].long(),
         }

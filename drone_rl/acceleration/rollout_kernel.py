@@ -1,6 +1,6 @@
 """Whole episodes in one kernel on a CPU: rendering, forward pass, action, step and rules.
 
-The kernel is built for the rules of a task, which `Task.fused_rules` gives. A few environments take
+The kernel is built for the rules of a task, which `fused_rules` gives. A few environments take
 each step together, so that the weights of linear layers are read once for all of them.
 """
 
@@ -97,7 +97,7 @@ def choose(logits: wp.array[float], at: int, count: int, draw: float) -> int:
 
 @functools.cache
 def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (functions that Warp compiles)
-    """Return the kernel for the rules of a task; see `Task.fused_rules`.
+    """Return the kernel for the rules of a task; see `drone_rl.sim.tasks.fused.fused_rules`.
 
     Args:
         states: Warp structure of the environments, with "end_reasons".

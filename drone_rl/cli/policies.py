@@ -15,7 +15,7 @@ from drone_rl.utils.text import plural
 
 _LONGEST_NAME = 18
 """Characters of a path above which its figures are on a line of their own."""
-_NO_RUN_FOLDER = (
+NO_RUN_FOLDER = (
     *("hydra.run.dir=.", "hydra.output_subdir=null", "hydra.job_logging.root.handlers=[console]"),
     "++hydra.job_logging.handlers.file.delay=true",
 )
@@ -34,7 +34,7 @@ class PoliciesCommand(CommandSettings):
     @classmethod
     def prepare(cls, overrides: Sequence[str]) -> list[str]:
         """Return the command line of a command that writes no files."""
-        return [*super().prepare(overrides), *_NO_RUN_FOLDER]
+        return [*super().prepare(overrides), *NO_RUN_FOLDER]
 
     def run(self, folder: Path) -> tuple[int, None]:
         """List the shipped and the trained policies; return the exit status."""
@@ -72,7 +72,7 @@ class ConvertCommand(CommandSettings):
     @classmethod
     def prepare(cls, overrides: Sequence[str]) -> list[str]:
         """Translate `drone-rl convert FILE` to `file=FILE`; the command has no folder."""
-        return [*with_name(overrides, "file"), *_NO_RUN_FOLDER]
+        return [*with_name(overrides, "file"), *NO_RUN_FOLDER]
 
     def run(self, folder: Path) -> tuple[int, None]:
         """Convert; print the new files and return the exit status."""

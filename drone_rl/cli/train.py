@@ -26,7 +26,7 @@ _log = logging.getLogger(__name__)
 _TRAIN_LONGER = {
     "frames": "to train longer, give a larger trainer.total_frames",
     "episodes": "to train longer, give a larger trainer.total_episodes",
-    "solved": "to train longer, give a larger trainer.target_share, or null",
+    "solved": "to train longer, give a larger trainer.target_share or trainer.confirm_share",
 }
 """What to do about a run that has stopped, by the reason."""
 

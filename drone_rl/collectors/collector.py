@@ -13,9 +13,11 @@ from torch import nn
 from torchrl.collectors import BaseCollector
 from torchrl.envs import EnvBase
 
+from drone_rl.acceleration.fused_episodes import PAID
 from drone_rl.envs import base_env
 from drone_rl.envs.drone_env import Entries
 from drone_rl.envs.rollout import Agent, Step, as_agent
+from drone_rl.sim.tasks import ObjectState
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.threads import set_torch_threads
 
@@ -68,9 +70,13 @@ class BatchedCollector(BaseCollector):
             )
 
     def _kept_info(self, step: Step) -> Entries:
-        """Return the requested entries of ("next", "info") of a step. Shapes: (k, *)."""
-        every = self.base_env.worlds.info(step.after) if self._info else {}
-        return {("next", "info", name): every[name] for name in self._info}
+        """Return the requested entries of ("next", "info") of a step, and `PAID`. (k, *)."""
+        worlds, after = self.base_env.worlds, step.after
+        every = worlds.info(after) if self._info else {}
+        entries: Entries = {("next", "info", name): every[name] for name in self._info}
+        if isinstance(after, ObjectState) and len(worlds.task.reward_terms) > 1:
+            entries[PAID] = (after.paid * (after.end_reason != 0)[:, None]).float()
+        return entries
 
     @abc.abstractmethod
     def collect(self) -> TensorDictBase:

@@ -172,6 +172,11 @@ class Parts(Annotation):
     most: int
 
     @property
+    def registry(self) -> dict[str, Any]:
+        """The variants by name."""
+        return self.of.registry
+
+    @property
     def hint(self) -> Any:
         """See `Annotation`."""
         return Annotated[

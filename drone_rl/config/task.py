@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar
 
 from drone_rl.config.parts import Named
+from drone_rl.config.terms import Rewards
 from drone_rl.config.values import Steps
 from drone_rl.utils.schema import Real, Several, Whole
 
@@ -95,6 +96,8 @@ class TaskSettings(BaseTaskSettings):
     """Length of one move."""
     step_limit: Steps = 300
     """Steps after which an episode is truncated."""
+    reward: Rewards = {"reached": {"weight": 1.0}}  # pyright: ignore[reportAssignmentType] (read)
+    """Terms of the reward by name, each with a weight and parameters of its own."""
     front_margin: Length = 11.0
     """How far behind the last cube the front boundary stands."""
     side_margin: Length = 20.0
@@ -184,8 +187,6 @@ class PillarsSettings(BaseTaskSettings):
     """Red, green, blue in [0, 1]."""
     finish_margin: Length = 4.0
     """How far behind the last row the line is that the drone must cross."""
-    collision_penalty: Annotated[float, Real(0.0, 1000.0)] = 0.5
-    """Penalty of a collision; reaching the line is worth 1."""
     drone_size: Length = 0.8
     """Edge of the box around the drone that must touch no pillar."""
     altitude: Length = 2.5
@@ -194,6 +195,8 @@ class PillarsSettings(BaseTaskSettings):
     """Length of one move."""
     step_limit: Steps = 120
     """Steps after which an episode is truncated."""
+    reward: Rewards = {"progress": {"weight": 1.0}, "contact": {"weight": -0.5}}  # pyright: ignore[reportAssignmentType]
+    """Terms of the reward by name; reaching the line is worth the weight of `progress`."""
 
     @property
     def row_size(self) -> int:

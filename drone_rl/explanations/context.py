@@ -14,7 +14,7 @@ from drone_rl.envs import base_env
 from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.hooks import feature_layer, features
 from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frames, select_frames
-from drone_rl.explanations.scenes import Scenes, has_objects
+from drone_rl.explanations.scenes import Scenes
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import ImageNetwork, make_actor
 from drone_rl.trust.results import Proof
@@ -138,4 +138,4 @@ def find_lacking(sections: Mapping[str, Any], context: Context) -> dict[str, str
 def objects(context: Context) -> str | None:
     """Need objects that can be removed and moved."""
     task = context.scenes.task
-    return None if has_objects(task) else f"Task {task.name} has no objects that can be moved."
+    return None if task.edits is not None else f"Task {task.name} has no objects that can be moved."

@@ -62,7 +62,7 @@ def response_map(
     num_forward: int = 31,
     seed: int | None = None,
 ) -> ResponseMap:
-    """Evaluate the policy with one target at each place of `Task.grid`; for `seed` see `shrink`."""
+    """Evaluate the policy with one target at each place of its grid; for `seed` see `shrink`."""
     fields, probs = _over_grid(
         scenes,
         (num_forward, num_lateral),
@@ -86,7 +86,7 @@ def _over_grid(
     evaluate: Callable[[State], Tensor],
 ) -> tuple[dict[str, NDArray], Tensor]:
     """Return the fields that both maps share, and results by place. Shape: (Z, F, L, ...)."""
-    grid, (root, number) = scenes.task.grid(*shape), seed
+    grid, (root, number) = scenes.task.edits.grid(*shape), seed
     height, forward, lateral = grid if root is None else shrink(grid, root, number)
     ahead, aside = (one.flatten() for one in torch.meshgrid(forward, lateral, indexing="ij"))
     layers = [evaluate(place_target(scenes, ahead, aside, up)) for up in height.tolist()]
@@ -97,7 +97,7 @@ def _over_grid(
         "forward": forward,
         "lateral": lateral,
         "oracle": scenes.needed(offsets),
-        "stratum": scenes.task.stratum_at(offsets),
+        "stratum": scenes.task.edits.stratum_at(offsets),
     }
     return {n: one.numpy() for n, one in fields.items()}, torch.stack(layers).unflatten(1, shape)
 
@@ -148,8 +148,8 @@ def outcome_map(
     task = scenes.task
 
     def reached(state: State) -> Tensor:
-        target = task.next_target(state)
-        return task.is_reached(run_to_end(scenes, network, state), target)
+        target = task.edits.next_target(state)
+        return task.edits.is_reached(run_to_end(scenes, network, state), target)
 
     shape = (num_forward, num_lateral)
     fields, collected = _over_grid(scenes, shape, (seed, _OUTCOME), reached)

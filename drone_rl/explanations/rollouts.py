@@ -21,7 +21,7 @@ from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.envs import worlds_of
 from drone_rl.envs.rollout import ActorAgent, Recording, Step, steps
 from drone_rl.explanations.hooks import entries_of, features, memory_in, probabilities
-from drone_rl.explanations.scenes import Scenes, has_objects
+from drone_rl.explanations.scenes import Scenes
 from drone_rl.policies import ImageNetwork, RecurrentNetwork, greedy_agent
 from drone_rl.sim.dynamics.state import heading_of
 from drone_rl.sim.rendering import Appearance
@@ -65,10 +65,10 @@ class RolloutDataset:
 
         Metres; NaN if there is none.
         """
-        if not has_objects(worlds.task):
+        if worlds.task.edits is None:
             return np.full((len(self), 2), np.nan)
         state = self.state(worlds)
-        x, y, _ = worlds.task.next_offset(state).unbind(-1)
+        x, y, _ = worlds.task.edits.next_offset(state).unbind(-1)
         heading = heading_of(state.body.attitude)
         cos, sin = heading.cos(), heading.sin()
         return torch.stack([cos * x + sin * y, cos * y - sin * x], -1).cpu().numpy()
@@ -126,8 +126,8 @@ def collect(
     if (memory := memory_in(dict(batch.items()))) is not None:
         arrays["memory"] = memory
     dataset = RolloutDataset({name: value.cpu().numpy() for name, value in arrays.items()})
-    if has_objects(task):
-        dataset.arrays["next_target"] = task.next_target(dataset.state(worlds)).cpu().numpy()
+    if task.edits is not None:
+        dataset.arrays["next_target"] = task.edits.next_target(dataset.state(worlds)).cpu().numpy()
     before, now = (
         task.score({name: of[name].cpu() for name in task.scored}) for of in (info, after)
     )
@@ -246,7 +246,7 @@ def run_to_end(scenes: Scenes, network: ImageNetwork, state: State) -> State:
         if previous is not None and not (scenes.memory or isinstance(network, RecurrentNetwork)):
             is_back = ((_pose(after) - previous).abs() < _SAME).all(-1)
             after.end_reason[is_back & ~is_new] = task.truncation
-        active = (after.end_reason == 0) & ~task.next_offset(after)[:, 0].isnan()
+        active = (after.end_reason == 0) & ~task.edits.next_offset(after)[:, 0].isnan()
         is_new = (step.reward != 0)[active]  # with one target less, the scene is a new one
         previous = _pose(step.context.state)[active]
         return active

@@ -3,7 +3,6 @@
 import dataclasses
 import enum
 import functools
-from typing import Any
 
 import numpy as np
 import torch
@@ -22,7 +21,7 @@ from drone_rl.envs import (
 )
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
-from drone_rl.sim.tasks import State, Task
+from drone_rl.sim.tasks import State
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.utils.seeding import plain_generator
 
@@ -42,11 +41,6 @@ class Region(enum.IntEnum):
     HORIZON = 2
     GROUND = 3
     SKY = 4
-
-
-def has_objects(task: Task[Any]) -> bool:
-    """Return whether a task has objects that can be removed, moved and added."""
-    return type(task).one_target is not Task.one_target
 
 
 class Scenes:
@@ -140,7 +134,7 @@ class Scenes:
         if not set(defaults) <= set(names):
             return torch.full(offset.shape[:1], -1)
         same = torch.tensor([*(names.index(name) for name in defaults), -1], device=offset.device)
-        return same[self.task.needed(offset)]  # -1 reads the last entry
+        return same[self.task.edits.needed(offset)]  # -1 reads the last entry
 
     def regions(self, state: State) -> Tensor:
         """Return the `Region` of each pixel. Shape: (T, H, W), uint8.
@@ -161,8 +155,8 @@ class Scenes:
         regions[sky] = Region.SKY
         regions[border] = Region.HORIZON
         regions[is_target] = Region.OTHER_TARGET
-        if has_objects(self.task):
-            next_target = self.task.next_target(state)[:, None, None]
+        if self.task.edits is not None:
+            next_target = self.task.edits.next_target(state)[:, None, None]
             regions[is_target & (target == next_target)] = Region.NEXT_TARGET
         return regions.to(torch.uint8)
 
@@ -175,7 +169,7 @@ def place_target(scenes: Scenes, forward: Tensor, lateral: Tensor, height: float
     worlds = scenes.worlds
     ahead, aside = forward.double(), lateral.double()
     offset = torch.stack([ahead, aside, torch.full_like(ahead, height)], -1)
-    return worlds.task.one_target(worlds.bodies(len(offset)), offset).to(worlds.device)
+    return worlds.task.edits.one_target(worlds.bodies(len(offset)), offset).to(worlds.device)
 
 
 def alternatives(scenes: Scenes, state: State, seed: int = 0) -> dict[str, Tensor]:
@@ -188,8 +182,8 @@ def alternatives(scenes: Scenes, state: State, seed: int = 0) -> dict[str, Tenso
     generator = plain_generator(seed)
     observations = {"no objects": scenes.observe_empty(state)}
     for i in range(PLACEMENTS):
-        if has_objects(scenes.task):
-            other = scenes.task.elsewhere(state, scenes.worlds.camera, generator)
+        if scenes.task.edits is not None:
+            other = scenes.task.edits.elsewhere(state, scenes.worlds.camera, generator)
         else:
             other = state[torch.randperm(len(state), generator=generator).to(state.steps.device)]
         observations[f"objects elsewhere {i}"] = scenes.observe(other)

@@ -13,7 +13,7 @@ from drone_rl.explanations.context import Context, needs, objects
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.results import Outcomes, Truth
 from drone_rl.explanations.rollouts import Step, run_from, spread_frames
-from drone_rl.explanations.scenes import DARK_GROUND, Region, Scenes, has_objects
+from drone_rl.explanations.scenes import DARK_GROUND, Region, Scenes
 from drone_rl.policies import ImageNetwork
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
@@ -29,7 +29,7 @@ def section(context: Context) -> Truth:
     state = data.state(scenes.worlds)
     trial = trust.make_trial(context)
     changes, outcomes = [], None
-    if has_objects(scenes.task):
+    if scenes.task.edits is not None:
         regions = data.tensor("regions")
         changes = intervene(scenes, network, state, regions, seed, data.memory)
         outcomes = measure_outcomes(scenes, network, state, episode, data.memory)
@@ -84,7 +84,7 @@ def intervene(
     repainted = scenes.frames(state, DARK_GROUND)
     moved = scenes.frames(to_the_middle(scenes, state))
     changes = {
-        "target taken away": (scenes.frames(scenes.task.without_next(state)), visible),
+        "target taken away": (scenes.frames(scenes.task.edits.without_next(state)), visible),
         "target moved": (moved, (moved != before).any(-1)),
         "target recolored": (torch.where(visible[..., None], recolored, before), visible),
         "ground patch changed": (torch.where(ground[..., None], repainted, before), ground),
@@ -111,8 +111,8 @@ def clear_frame(change: Intervention) -> int:
 
 def to_the_middle(scenes: Scenes, state: State) -> State:
     """Move the next target sideways by up to `MOVED_METRES` towards the middle of the frame."""
-    lateral = scenes.task.next_offset(state)[:, 1].nan_to_num()
-    return scenes.task.next_moved(state, -lateral.clamp(-MOVED_METRES, MOVED_METRES))
+    lateral = scenes.task.edits.next_offset(state)[:, 1].nan_to_num()
+    return scenes.task.edits.next_moved(state, -lateral.clamp(-MOVED_METRES, MOVED_METRES))
 
 
 def _patches(ground: Tensor, size: Tensor, seed: int) -> Tensor:
@@ -153,15 +153,15 @@ def measure_outcomes(
     from T states of the data set; `episode` has shape (T,). For `memory` see `hooks`.
     """
     task = scenes.task
-    ahead = (~task.next_offset(state)[:, 0].isnan()).nonzero()[:, 0].cpu().numpy()
+    ahead = (~task.edits.next_offset(state)[:, 0].isnan()).nonzero()[:, 0].cpu().numpy()
     rows = ahead[spread_frames(episode[ahead], FLIGHTS_AN_EPISODE)]
     start, group = state[torch.from_numpy(rows)].to(scenes.worlds.device), episode[rows]
-    target = task.next_target(start)
+    target = task.edits.next_target(start)
     memory = None if memory is None else memory[torch.from_numpy(rows)]
     variants = {
         "as it was": start,
-        "moved left": task.next_moved(start, MOVED_METRES),
-        "moved right": task.next_moved(start, -MOVED_METRES),
+        "moved left": task.edits.next_moved(start, MOVED_METRES),
+        "moved right": task.edits.next_moved(start, -MOVED_METRES),
     }
     run = functools.partial(run_to_target, scenes, network, target=target, memory=memory)
     runs = {name: run(changed) for name, changed in variants.items()}
@@ -193,12 +193,12 @@ def run_to_target(
         decided[step.rows] += 1
         lateral.append(lateral[-1].clone())
         lateral[-1][step.rows] = after.body.position[:, 1]
-        is_over = task.is_behind(after, goal) | task.is_reached(after, goal)
+        is_over = task.edits.is_behind(after, goal) | task.edits.is_reached(after, goal)
         return ~is_over & (after.end_reason == 0) & (len(lateral) <= PATIENCE)
 
     end = run_from(scenes, network, state, goes_on, appearance, memory)
     return TargetRollouts(
-        task.is_reached(end, target).cpu().numpy(),
+        task.edits.is_reached(end, target).cpu().numpy(),
         decided.cpu().numpy(),
         torch.stack(lateral, 1).cpu().numpy(),
     )

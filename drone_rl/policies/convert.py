@@ -45,6 +45,8 @@ _OVERRIDES = (
     (r"^(appearance=.*?)\brandomised\b", r"\1randomized"),
 )
 """Patterns of the names of settings and choices until version 0.1, and the present names."""
+_PENALTY = "collision_penalty"
+"""Setting of pillars, before it became the weight of a term."""
 _DESCRIBED = {"certificate.json": "policy", "shifts.json": "network"}
 """The entry with the policy's description, by the end of the name of a file."""
 _FOLDERS = 100
@@ -164,12 +166,20 @@ def _converted_result(path: Path) -> bytes:
     return json.dumps(content).encode()
 
 
+def _with_reward_terms(task: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings of a task in which the penalty of former pillars is the weight of a term."""
+    present = dict(task)
+    if _PENALTY in present:
+        present["reward"] = {"progress": 1.0, "contact": -float(present.pop(_PENALTY))}
+    return present
+
+
 def _converted_description(former: Mapping[str, Any]) -> PolicyDescription:
     """Return the description that was laid out as version 2."""
     if former.get("format_version") == FORMAT_VERSION:
         raise _PresentError
     try:
-        task, camera = dict(former["task"]), former["camera"]
+        task, camera = _with_reward_terms(former["task"]), former["camera"]
         image = {
             "camera": {"horizontal_fov": camera["horizontal_fov"]},
             "size": [camera["height"], camera["width"]],
@@ -177,7 +187,11 @@ def _converted_description(former: Mapping[str, Any]) -> PolicyDescription:
         }
         optional = {n: former[n] for n in ("appearance", "dynamics") if n in former}
         present = {
-            "task": {"name": task.pop("name", DEFAULT_TASK), "parameters": task},
+            "task": {
+                "name": task.pop("name", DEFAULT_TASK),
+                "rewards": task.pop("reward", {}),
+                "parameters": task,
+            },
             "inputs": {IMAGE: image},
             "actions": ActionSpace.of(ActionSettings.read(former.get("actions", {}), "actions")),
             "network": former["network"],
@@ -219,6 +233,7 @@ def _with_present_settings(config: Any) -> dict[str, Any]:
             value = {
                 _with_present_names(f"{group}.{k}").rpartition(".")[2]: v for k, v in value.items()
             }
+            value = _with_reward_terms(value) if group == "task" else value
             if isinstance(choice := value.get("_target_"), str):
                 value["_target_"] = _with_present_names(f"{name}={choice}").partition("=")[2]
         present[name] = value

@@ -25,7 +25,7 @@ from drone_rl.sim.rendering import (
 from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.scene_model import SceneModel
-from drone_rl.sim.tasks import State, Task, as_task
+from drone_rl.sim.tasks import ObjectTask, State, Task, as_task, check_actions
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance
@@ -93,7 +93,7 @@ class Worlds:
         self.task = as_task(task)
         self.camera = camera or CameraSettings()
         self.dynamics = make_dynamics(self.task.make_dynamics, dynamics, actions)
-        self.task.check_actions(self.dynamics.actions)
+        check_actions(self.task, self.dynamics.actions)
         self.device = torch.device(device)
         self._every = torch.arange(num_envs, device=self.device)
         self._make_renderer, self._num_shards = find_renderer(renderer), num_shards
@@ -193,7 +193,10 @@ class Worlds:
         """Return states a step later, and rewards; the environments stay as they are."""
         around = [self.task.obstacles(state)] if self.dynamics.needs_obstacles else []
         body = self.dynamics.step(state.body, action, *around)
-        outcome: Any = self.task.advance(state, body, self.dynamics.actions.speeds_of(action))
+        reads_actions = isinstance(self.task, ObjectTask) and self.task.has_own_rules
+        more: Any = (action, self.dynamics) if reads_actions else ()
+        step: Any = self.task.step
+        outcome = step(state, body, *more)
         reward: Any = outcome[1] if isinstance(outcome, tuple) and len(outcome) == 2 else None
         if getattr(reward, "shape", None) != action.shape[:1]:
             raise InputError(

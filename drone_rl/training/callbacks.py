@@ -37,6 +37,7 @@ class OngoingTraining(Protocol):
         ...
 
 
+_SHARE = "reward_share/"
 _log = logging.getLogger(__name__)
 _MANY = 1000
 """Most callbacks of one training run."""
@@ -211,6 +212,33 @@ class CollapseCheck(Callback):
                 "optimizer.lr, a higher objective.entropy_coeff or another seed",
                 *(episodes, DETERMINISTIC, progress.running_reward),
             )
+
+
+class UnpaidTerms(Callback):
+    """Warn once of reward terms that no episode was paid."""
+
+    EPISODES = 200
+    """Episodes before the warning."""
+
+    def __init__(self) -> None:
+        """Count from here, also in a resumed run."""
+        self._unpaid: set[str] | None = None
+        self._episodes = 0
+
+    def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
+        """Note the terms that are paid; `reward_share/NAME` is logged of several terms."""
+        unpaid = {k.partition("/")[2] for k, v in metrics.items() if k.startswith(_SHARE) and not v}
+        if self._unpaid is None:
+            self._unpaid, self._episodes = unpaid, training.progress.episodes
+        if not self._unpaid:
+            return
+        self._unpaid &= unpaid
+        if self._unpaid and training.progress.episodes - self._episodes >= self.EPISODES:
+            _log.warning(
+                "no episode was paid the reward terms %s; check their functions and parameters",
+                ", ".join(sorted(self._unpaid)),
+            )
+            self._unpaid = set()
 
 
 class LoggerCallback(Callback):

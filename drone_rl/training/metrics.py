@@ -1,7 +1,7 @@
 """Rewards of the episodes in a batch, and the metrics that are logged of them."""
 
 import enum
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import cast
 
 import torch
@@ -45,10 +45,14 @@ def running_mean(old: float, values: Tensor, decay: float) -> float:
     return old
 
 
-def batch_metrics(batch: TensorDictBase, ends: Iterable[enum.IntEnum] = ()) -> dict[str, float]:
+def batch_metrics(
+    batch: TensorDictBase, ends: Iterable[enum.IntEnum] = (), terms: Sequence[str] = ()
+) -> dict[str, float]:
     """Return means over the episodes that end in a batch; NaN where none ends.
 
     With `ends` (`Task.ends`), also the rate of each ("next", "info", "end_reason") but 0, running.
+    With several `terms` (`Task.reward_terms`), also the mean of each, ("next", "info", "paid"), and
+    its share of the sum of absolute values.
     """
     rewards = episode_rewards(batch)
     done, lengths = batch["next", "done"], batch.get(("next", "step_count"), None)
@@ -63,4 +67,10 @@ def batch_metrics(batch: TensorDictBase, ends: Iterable[enum.IntEnum] = ()) -> d
         final = reasons[cast(Tensor, done)]
         for end in named:
             metrics[f"end/{end.name.lower()}"] = float((final == end).float().mean())
+    if len(terms) > 1:
+        paid = cast(Tensor, batch["next", "info", "paid"])[cast(Tensor, done)[..., 0]].double()
+        sizes = paid.abs().sum(0)
+        for name, mean, share in zip(terms, paid.mean(0), sizes / sizes.sum(), strict=True):
+            metrics[f"reward/{name}"] = float(mean)
+            metrics[f"reward_share/{name}"] = float(share)
     return metrics

@@ -27,7 +27,13 @@ from drone_rl.policies.zoo import Checkpoint, describe
 from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.tasks import FailureReplayTask, as_task
 from drone_rl.training import run_folder
-from drone_rl.training.callbacks import Callback, CollapseCheck, CsvCallback, with_progress
+from drone_rl.training.callbacks import (
+    Callback,
+    CollapseCheck,
+    CsvCallback,
+    UnpaidTerms,
+    with_progress,
+)
 from drone_rl.training.cloning import clone
 from drone_rl.training.confirmation import Confirmation
 from drone_rl.training.learners import NotANumberError, ReinforceLearner
@@ -123,7 +129,7 @@ def learn(
             stack.callback(confirmation.close)
         checkpoints = run.checkpoints(settings)
         collapse = CollapseCheck(target or as_task(settings.task).largest_reward or 0.0)
-        first = (CsvCallback(folder / "metrics.csv"), checkpoints, collapse)
+        first = (CsvCallback(folder / "metrics.csv"), checkpoints, collapse, UnpaidTerms())
         trainer = Trainer(
             collector=parts.collector,
             learner=learner,
@@ -137,6 +143,7 @@ def learn(
             total_episodes=limits.total_episodes,
             running_decay=limits.running_decay,
             ends=run_folder.possible_ends(settings),
+            reward_terms=as_task(settings.task).reward_terms,
         )
         own_threads = getattr(learner, "num_threads", None)
         stack.enter_context(torch_threads(own_threads or limits.num_threads))

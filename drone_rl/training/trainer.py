@@ -70,6 +70,8 @@ class Trainer:
     """Weight of the old value in the running mean, per episode."""
     ends: Iterable[enum.IntEnum] = ()
     """Why an episode may end (`Task.ends`), for the metrics."""
+    reward_terms: Sequence[str] = ()
+    """Names of the reward's terms (`Task.reward_terms`), for the metrics."""
     progress: TrainingProgress = dataclasses.field(default_factory=TrainingProgress, init=False)
     stop_signal: signal.Signals | None = dataclasses.field(default=None, init=False)
     stop_request: str = dataclasses.field(default="", init=False)
@@ -155,7 +157,7 @@ class Trainer:
         progress.running_reward = running_mean(progress.running_reward, rewards, self.running_decay)
         logged = {
             "train/running_reward": progress.running_reward,
-            **batch_metrics(batch, self.ends),
+            **batch_metrics(batch, self.ends, self.reward_terms),
             **metrics,
             "time/frames_per_second": batch.numel() / (end - self._begin),
             "time/collect_s": self._collected - self._begin,

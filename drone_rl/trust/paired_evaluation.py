@@ -32,7 +32,7 @@ from drone_rl.policies.baselines import (
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.dynamics import draw_seeds, make_dynamics
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.tasks import as_task
+from drone_rl.sim.tasks import as_task, check_actions
 from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.sim.worlds import Worlds
 from drone_rl.trust.baselines import reference
@@ -144,7 +144,7 @@ class PairedEvaluator:
             task = self.subject.task.replace(**condition.task)
         with prefixed_errors("camera"):
             camera = self.subject.camera.replace(**condition.camera)
-        as_task(task).check_actions(self._dynamics.actions)
+        check_actions(as_task(task), self._dynamics.actions)
         return task, camera
 
     def worlds(self, condition: Condition) -> Worlds:

@@ -33,7 +33,7 @@ _TAKEN_OVER = (
     r"(seed|evaluate_after|renderer)=\w*",
     r"device=(cpu|cuda)(:\d+)?",
     rf"({_SECTIONS}|collector|logger|experiment|sweep)=[A-Za-z][\w-]*",
-    rf"\+{{0,2}}({_SECTIONS})(\.{_NAME}){{1,2}}={_VALUE}",
+    rf"\+{{0,2}}({_SECTIONS})(\.{_NAME}){{1,3}}={_VALUE}",
     rf"~transforms\.{_NAME}",
     rf"collector\.(num_envs|num_threads|num_cpus|max_lost_workers|compiled)={_SCALAR}",
 )

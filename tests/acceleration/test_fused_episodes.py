@@ -14,7 +14,6 @@ from drone_rl.config import (
     AppearanceSettings,
     CameraSettings,
     DynamicsSettings,
-    PillarsSettings,
     TaskSettings,
 )
 from drone_rl.envs import (
@@ -30,6 +29,7 @@ from drone_rl.sim.dynamics import Quadrotor
 from drone_rl.sim.dynamics.state import LOST
 from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from tests.policies.halves import forward_backward, halves
+from tests.second_task import Posts
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
 REASON = ("next", "info", "end_reason")
@@ -214,7 +214,7 @@ def test_observations_are_optional():
             "transform CropRows is not fused",
         ),
         ({"transforms": (RgbPixels,)}, "frames that are not gray are not fused"),
-        ({"task": PillarsSettings(num_rows=1)}, "task Pillars with ComputerVision is not fused"),
+        ({"task": Posts()}, "task Posts with ComputerVision is not fused"),
         ({"network": MLP((1, 25, 64), 3)}, "network MLP is not fused"),
     ],
 )

@@ -83,7 +83,7 @@ def test_state_is_a_copy():
     assert all(torch.equal(state[k], kept[k]) for k in ("episode_reward", "step_count"))
     for part, other in ((state["worlds"]["worlds"], kept["worlds"]["worlds"]),):
         assert torch.equal(part["body"]["position"], other["body"]["position"])
-        assert torch.equal(part["collected"], other["collected"])
+        assert torch.equal(part["reached"], other["reached"])
     env.close()
 
 

@@ -179,7 +179,7 @@ def test_each_episode_has_its_own_appearance_and_the_same_scene():
     for episode in range(2):
         seen, now, single = (env.reset() for env in (plain, foggy, alone))
         assert torch.equal(seen["info", "drone"], now["info", "drone"])
-        assert torch.equal(plain.worlds.state.cubes, foggy.worlds.state.cubes)
+        assert torch.equal(plain.worlds.state.places, foggy.worlds.state.places)
         assert (now["pixels"] != seen["pixels"]).double().mean() > 0.2
         assert torch.equal(now["pixels"][0], single["pixels"][0])
         assert len(foggy.appearances.values[:, 14].unique()) == 3

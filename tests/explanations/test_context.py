@@ -20,7 +20,7 @@ def test_episodes_do_not_depend_on_earlier_rollouts(make_pipeline):
             for _ in range(2):  # somebody flies
                 env.rollout(50, policy)
         flown.append(context.flights)
-    cubes = [flights.arrays["state/cubes"] for flights in flown]
+    cubes = [flights.arrays["state/places"] for flights in flown]
     np.testing.assert_array_equal(*cubes)
     np.testing.assert_array_equal(flown[0].actions, flown[1].actions)
 

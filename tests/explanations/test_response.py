@@ -45,7 +45,7 @@ def test_places_of_the_grid_are_places_in_the_scene(scenes, world):
 
 
 def test_places_of_a_seed_cannot_be_known_beforehand(scenes):
-    task_grid = scenes.task.grid(4, 5)
+    task_grid = scenes.task.edits.grid(4, 5)
     one, other, again, second = (
         shrink(task_grid, s, n) for s, n in ((1, 0), (2, 0), (1, 0), (1, 1))
     )
@@ -64,7 +64,7 @@ def test_places_of_a_seed_cannot_be_known_beforehand(scenes):
 def test_both_maps_use_places_of_their_seed(scenes, world):
     for make, number in ((response_map, 0), (outcome_map, 1)):
         found = make(scenes, Forward(), num_lateral=3, num_forward=2, seed=9)
-        expected = shrink(scenes.task.grid(2, 3), 9, number)
+        expected = shrink(scenes.task.edits.grid(2, 3), 9, number)
         assert found.forward.tolist() == expected.forward.tolist()
         assert found.lateral.tolist() == expected.lateral.tolist()
 
@@ -75,7 +75,7 @@ def test_heights_are_those_of_the_task(make_pipeline):
     found = response_map(scenes, network, num_lateral=3, num_forward=2)
     assert found.height.tolist() == [-1.2, 0.0, 1.2]
     at = place_target(scenes, torch.tensor([15.0]), torch.tensor([12.0]), 1.2)
-    assert at.cubes[0, 0].tolist() == [15.0, 12.0, 2.5 + 1.2]
+    assert at.places[0, 0].tolist() == [15.0, 12.0, 2.5 + 1.2]
     expected = probabilities(network, scenes.observe(at))[0].numpy()
     np.testing.assert_allclose(found.probabilities[2, 1, 0], expected, atol=1e-6)
     assert not np.allclose(found.probabilities[0], found.probabilities[2], atol=1e-6)

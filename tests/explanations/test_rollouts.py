@@ -29,19 +29,19 @@ def test_the_file_holds_every_step_of_the_flights(dataset, world, tmp_path):
     dataset.save(tmp_path / "data.npz", flights)
     with np.load(tmp_path / "data.npz") as file:
         np.testing.assert_array_equal(file["flights/actions"], flights.actions)
-        assert {"frames", "features/relu1", "flights/state/cubes"} < set(file.files)
+        assert {"frames", "features/relu1", "flights/state/places"} < set(file.files)
 
 
 def test_offset_is_seen_from_the_drone(dataset, scenes):
     t = int(np.flatnonzero(dataset.next_target == 0)[0])
-    expected = dataset.arrays["state/cubes"][t, 0, :2] - dataset.drone[t, :2]
+    expected = dataset.arrays["state/places"][t, 0, :2] - dataset.drone[t, :2]
     np.testing.assert_allclose(dataset.offset(scenes.worlds)[t], expected)
     near = np.flatnonzero((dataset.next_target == 0) & (dataset.step < 5))
     assert (dataset.regions == Region.NEXT_TARGET).any((1, 2))[near].all()
 
 
 def test_without_a_next_cube_there_is_no_offset(dataset, scenes):
-    dataset.arrays["state/passed"][:] = True
+    dataset.arrays["state/ahead"][:] = -1
     assert np.isnan(dataset.offset(scenes.worlds)).all()
 
 
@@ -59,7 +59,7 @@ def test_recorded_states_go_on_as_the_episodes_did(world):
 
 def test_offset_follows_the_heading_of_a_turned_drone(dataset, scenes):
     t = int(np.flatnonzero(dataset.next_target == 0)[0])
-    x, y = (dataset.arrays["state/cubes"][t, 0] - dataset.drone[t])[:2]
+    x, y = (dataset.arrays["state/places"][t, 0] - dataset.drone[t])[:2]
     dataset.arrays["state/body/attitude"][t] = [0.5**0.5, 0.0, 0.0, 0.5**0.5]  # it looks left
     np.testing.assert_allclose(dataset.offset(scenes.worlds)[t], (y, -x), atol=1e-5)
 
@@ -141,7 +141,7 @@ def test_flying_forward_collects_what_it_touches(two_scenes):
     )
     network = Always(F)
     ends = run_to_end(two_scenes, network, starts)
-    assert ends.collected[:, 0].tolist() == [True, True, False]
+    assert ends.reached[:, 0].tolist() == [True, True, False]
     assert ends.steps.tolist() == [4, 4, 6]  # touches at 3.35 m, and has passed at 6 m
     assert [len(seen) for seen in network.seen] == [3, 3, 3, 3, 1, 1]  # what is settled rests
     assert starts.steps.tolist() == [0, 0, 0]  # where they started is left as it was
@@ -152,16 +152,16 @@ def test_a_loop_ends_the_episode(two_scenes):
     ends = run_to_end(
         two_scenes, network, place_target(two_scenes, torch.tensor([9.0]), torch.tensor([0.0]))
     )
-    assert ends.end_reason.tolist() == [CubesEnd.STEP_LIMIT] and not ends.collected.any()
+    assert ends.end_reason.tolist() == [CubesEnd.STEP_LIMIT] and not ends.reached.any()
     assert len(network.seen) == 3
 
 
 def test_turning_back_after_a_cube_is_no_loop(two_scenes):
     starts = place_target(two_scenes, torch.tensor([1.0]), torch.tensor([2.0]))
-    starts.passed[:, 1] = False  # a second cube, 9 m on
-    starts.cubes[:, 1, :2] = torch.tensor([10.0, 0.0])
+    starts.present[:, 1] = True  # a second cube, 9 m on
+    starts.places[:, 1, :2] = torch.tensor([10.0, 0.0])
     ends = run_to_end(two_scenes, Always(L, R, F), starts)
-    assert ends.collected[0, :2].tolist() == [True, True]
+    assert ends.reached[0, :2].tolist() == [True, True]
 
 
 def test_a_policy_with_memory_gets_earlier_frames():
@@ -172,7 +172,7 @@ def test_a_policy_with_memory_gets_earlier_frames():
     starts = place_target(two_scenes, torch.tensor([9.0]), torch.tensor([0.0]))
     ends = run_to_end(two_scenes, network, starts)
     env.close()
-    assert two_scenes.memory == 1 and ends.collected[0, 0]
+    assert two_scenes.memory == 1 and ends.reached[0, 0]
     first, second = network.seen[:2]
     assert torch.equal(first[:, 0], first[:, 1])  # a flight starts with a still
     assert torch.equal(second[:, 0], first[:, 1]) and not torch.equal(second[:, 1], first[:, 1])

@@ -77,7 +77,7 @@ def test_alternatives_of_a_scene(scenes, world):
     state = world[0].base_env.worlds.state
     world[0].reset()
     state = scenes.worlds.state
-    before = state.passed.clone()
+    before = state.present.clone()
     found = alternatives(scenes, state)
     assert list(found) == [
         "no objects", "objects elsewhere 0", "objects elsewhere 1", "objects elsewhere 2",
@@ -89,7 +89,7 @@ def test_alternatives_of_a_scene(scenes, world):
     assert (found["darker"][:, 0, 0] < x[:, 0, 0]).all()  # the sky
     assert (found["brighter"][:, 0, -1] > x[:, 0, -1]).all()
     assert not torch.equal(found["objects elsewhere 0"], found["objects elsewhere 1"])
-    assert torch.equal(state.passed, before)
+    assert torch.equal(state.present, before)
     torch.testing.assert_close(scenes.observe(state), x)  # the worlds are as they were
     again = alternatives(scenes, state)
     assert all(torch.equal(found[name], again[name]) for name in found)

@@ -58,11 +58,11 @@ def test_the_effect_is_the_distance_of_the_probabilities(scenes, world):
 def test_a_cube_is_moved_to_the_middle_and_never_away_from_it(scenes, lateral, moved):
     state = place_target(scenes, torch.tensor([9.0]), torch.tensor([lateral]))
     state.drone[:, 1] += 7.0
-    state.cubes[..., 1] += 7.0
+    state.places[..., 1] += 7.0
     after = to_the_middle(scenes, state)
-    assert after.cubes[0, 0, 1].item() == pytest.approx(7.0 + moved)
-    assert torch.equal(after.cubes[0, 1:], state.cubes[0, 1:])
-    assert state.cubes[0, 0, 1] == 7.0 + lateral
+    assert after.places[0, 0, 1].item() == pytest.approx(7.0 + moved)
+    assert torch.equal(after.places[0, 1:], state.places[0, 1:])
+    assert state.places[0, 0, 1] == 7.0 + lateral
 
 
 class Follower(ImageNetwork):
@@ -119,7 +119,7 @@ def test_a_constant_policy_follows_nothing(scenes, starts, action):
     assert found.ground_changed.upper95 < 0.5  # twelve rollouts show no more than that
     # straight on gets what stands ahead; moved by 2 m, half of that leaves the way
     if action is Move.FORWARD:
-        ahead = (starts.cubes[:, 0, 1].abs() <= scenes.worlds.task.settings.touch_distance).float()
+        ahead = (starts.places[:, 0, 1].abs() <= scenes.worlds.task.settings.touch_distance).float()
         assert found.collected["as it was"].mean == pytest.approx(float(ahead.mean()))
     else:
         assert found.collected["as it was"].mean < 0.5
@@ -145,11 +145,11 @@ def test_a_policy_that_responds_to_the_ground_has_another_outcome(scenes, starts
 
 def test_rollouts_end_when_the_target_is_reached_or_passed(scenes):
     state = place_target(scenes, torch.tensor([5.0, 5.0]), torch.tensor([0.0, 4.0]))
-    flown = run_to_target(scenes, Always(Move.FORWARD), state, state.next_cube)
+    flown = run_to_target(scenes, Always(Move.FORWARD), state, state.ahead.long())
     # touched at 5 - 1.65, that is after four steps; passed after six
     assert (flown.collected.tolist(), flown.decided.tolist()) == ([True, False], [4, 6])
     assert flown.lateral.shape == (2, 7) and (flown.lateral == 0).all()
-    dither = run_to_target(scenes, Always(Move.LEFT), state, state.next_cube)
+    dither = run_to_target(scenes, Always(Move.LEFT), state, state.ahead.long())
     assert (dither.decided < PATIENCE).all() and not dither.collected.any()  # out at the side
 
 

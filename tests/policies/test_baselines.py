@@ -16,7 +16,7 @@ from tests.second_task import Posts
 def acted(agent, num_envs=3, lateral=0.0, **options):
     """Return what an agent does at the start of episodes, with cubes metres to the left."""
     worlds = Worlds(num_envs, TaskSettings(num_cubes=1), **options)
-    worlds.state.cubes[:, 0, 1] = torch.as_tensor(lateral, dtype=torch.float64)
+    worlds.state.places[:, 0, 1] = torch.as_tensor(lateral, dtype=torch.float64)
     rows = torch.arange(num_envs)
     context = StepContext(Observer(worlds), worlds.state, rows, torch.ones(num_envs).bool())
     return agent.act(context).action

@@ -21,6 +21,10 @@ def former_description(policy):
     """Return a description as version 2 laid it out."""
     described = policy.description
     task = described.task.parameters.values()
+    weights = described.task.rewards
+    del task["reward"]
+    if described.task.name == "pillars":
+        task["collision_penalty"] = -weights["contact"]
     parts = {"transforms": described.image.transforms, "network": [described.network]}
     parts = {name: [part.model_dump(mode="json") for part in of] for name, of in parts.items()}
     former = {

@@ -114,7 +114,7 @@ def test_the_step_limit_truncates_with_discount_one():
 def test_externally_moved_drone_collects_a_cube_which_is_then_hidden(env):
     env.reset()
     task, physics = env.task, env.physics
-    cube = task.state.cubes[0, 0].numpy()
+    cube = task.state.places[0, 0].numpy()
     task.drone.set_pose(physics, cube - (1.0, 0.0, 0.0), (1, 0, 0, 0))
     timestep = env.step(Move.FORWARD)
     assert timestep.reward == 1.0

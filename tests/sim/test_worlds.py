@@ -20,7 +20,7 @@ def test_indexed_and_whole_batches_step_alike():
     turned.step(torch.tensor([1, 0]), torch.tensor([Move.FORWARD, Move.LEFT]))
     assert worlds.state.drone.tolist() == [[0.0, 1.0, 2.5], [1.0, 0.0, 2.5]]
     assert torch.equal(worlds.state.drone, turned.state.drone)
-    assert torch.equal(worlds.state.cubes, turned.state.cubes)
+    assert torch.equal(worlds.state.places, turned.state.places)
 
 
 def test_a_task_whose_step_returns_no_pair_is_named(monkeypatch):
@@ -33,7 +33,9 @@ def test_a_task_whose_step_returns_no_pair_is_named(monkeypatch):
         worlds.step(*ahead)
     for spoiled in (lambda r: r[:, None], lambda r: r.mean(), lambda r: 0.5):
         monkeypatch.setattr(
-            worlds.task, "step", lambda *given, of=spoiled: (step(*given)[0], of(step(*given)[1]))
+            worlds.task,
+            "step",
+            lambda *given, of=spoiled: (step(*given)[0], of(step(*given)[1])),
         )
         with pytest.raises(InputError, match="a tensor with one number for each environment"):
             worlds.step(*ahead)

@@ -46,7 +46,12 @@ def test_each_update_confirms_in_new_environments(monkeypatch):
         base = env.base_env
         base.reset()
         calls.append(
-            (base.stream, base.first_world, len(base.worlds.state), base.worlds.state.cubes.clone())
+            (
+                base.stream,
+                base.first_world,
+                len(base.worlds.state),
+                base.worlds.state.places.clone(),
+            )
         )
         base.set_seed(SETTINGS.seed)
         return fly(actor, env, episodes, **how)

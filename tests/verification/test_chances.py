@@ -52,7 +52,7 @@ def test_held_out_placements_are_those_of_an_evaluation(good):
         env.reset()
         placed = [p.cubes for p in done.placements]
         assert torch.equal(
-            torch.tensor(placed, dtype=torch.float64), env.base_env.worlds.state.cubes
+            torch.tensor(placed, dtype=torch.float64), env.base_env.worlds.state.places
         )
     fixed = drone_rl.chances(good, placements=1, seed=0, task=ONE, progress=silent)
     assert fixed.placements[0].cubes != placed[0] and fixed.seed == 0

@@ -15,6 +15,7 @@ from drone_rl.cli.hydra.mistakes import choices, composed, flattened, similar
 from drone_rl.config import TASKS
 from drone_rl.config.configuration import Changes
 from drone_rl.config.parts import Named, Parts
+from drone_rl.config.terms import Terms
 from drone_rl.sweeps.manifest import path_argument
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import (
@@ -135,10 +136,10 @@ def _inner(kind: Any, values: Mapping[str, Any]) -> Iterator[tuple[Any, str, Any
     if isinstance(kind, Changes):
         for of in (kind.of,) if kind.of else reversed(TASKS.values()):  # the default one wins
             yield of, "", {}
-    elif isinstance(kind, Parts):
+    elif isinstance(kind, Parts | Terms):
         for name, below in values.items():
-            if name in kind.of.registry:
-                yield kind.of.registry[name], f".{name}", below
+            if name in kind.registry:
+                yield kind.registry[name], f".{name}", below
     elif isinstance(kind, type) and issubclass(kind, Named):
         name = values.get("name", kind.default_name)
         yield from (

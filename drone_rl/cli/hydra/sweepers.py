@@ -142,7 +142,7 @@ class SearchSweeper(CombiningSweeper):
         """Refuse ranges in which the metric is not comparable, and runs without the metric."""
         is_success = self.metric == "success"
         for key in space:
-            name = key if is_success else key.partition(".")[0]
+            name = key if is_success else key.lstrip("+").partition(".")[0]
             if name in ("task", "experiment"):
                 other = "" if is_success else ", or add hydra.sweeper.metric=success"
                 raise InputError(
@@ -173,7 +173,8 @@ class SearchSweeper(CombiningSweeper):
         if any(trial.state == states.COMPLETE for trial in study.trials):
             best = study.best_trial
             what = METRICS[self.metric]
-            _log.info("best: run %d, %s %.3f, %s", best.number, what, best.value, best.params)
+            found = {name.lstrip("+"): value for name, value in best.params.items()}
+            _log.info("best: run %d, %s %.3f, %s", best.number, what, best.value, found)
 
 
 def check_params(params: Mapping[str, Any], space: Mapping[str, Any]) -> None:

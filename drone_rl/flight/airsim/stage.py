@@ -25,6 +25,7 @@ from drone_rl.sim.entities import KINDS
 from drone_rl.sim.rendering import Appearance, Distractors
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.rendering.view import Modality
+from drone_rl.sim.tasks import ObjectTask
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
@@ -116,7 +117,10 @@ class Stage:
             Names of what it touches, with its position there, and the point nearest to that.
         """
         start = None if before is None else before[None]
-        contacts = self.task.touch(self.worlds.state, position[None], start)
+        contacts = None
+        if isinstance(self.task, ObjectTask):
+            state: Any = self.worlds.state
+            contacts = self.task.touch(state, position[None], start)
         if contacts is None:
             return []
         touches, ways = [], contacts[0].tolist()

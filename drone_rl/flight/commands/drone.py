@@ -37,7 +37,7 @@ from drone_rl.sim.entities import FRONT_CENTER, find_camera
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.sensors import Sensors
 from drone_rl.sim.tasks import State
-from drone_rl.sim.tasks.common import PropTask
+from drone_rl.sim.tasks.objects import ObjectState
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.schema import Instance, OneOf, Several, Whole
@@ -350,10 +350,10 @@ class Drone:
         """
         worlds, index = self._object(name)
         place = checks.numbers(position, "position", 3)
-        task = worlds.task
-        if not isinstance(task, PropTask):
-            raise PilotError(f"set_object_position: task {task.name} does not let objects move")
-        getattr(worlds.state, task.props)[0, index] = torch.tensor(place, dtype=torch.float64)
+        if not isinstance(worlds.state, ObjectState):
+            name = worlds.task.name
+            raise PilotError(f"set_object_position: task {name} does not let objects move")
+        worlds.state.places[0, index] = torch.tensor(place, dtype=torch.float64)
 
     def _object(self, name: str) -> tuple[Worlds, int]:
         if self.worlds is None:

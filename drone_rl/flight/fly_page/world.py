@@ -20,6 +20,7 @@ from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import BodyState, ComputerVision, FlightState, Quadrotor
 from drone_rl.sim.entities import CHASE
 from drone_rl.sim.rendering import Appearance
+from drone_rl.sim.tasks import ObjectTask
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.trust.video import probabilities, render_chase
 from drone_rl.utils.settings import Settings
@@ -190,7 +191,9 @@ class World:
         """Put the drone somewhere. No time passes; contact is the only rule that applies."""
         self._forget()
         self._place(body)
-        self.task.touch(self.worlds.state, body.position)
+        if isinstance(self.task, ObjectTask):
+            state: Any = self.worlds.state
+            self.task.touch(state, body.position)
 
     def set_light(self, light: float) -> None:
         """Set the factor by which cameras multiply all colors."""

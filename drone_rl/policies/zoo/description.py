@@ -4,8 +4,12 @@ Checkpoints, exported files and run folders contain the same description. It is 
 to build a policy, and all that a file can request.
 """
 
+import hashlib
+import logging
 import math
+import sys
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self, Unpack
 
 import pydantic
@@ -41,6 +45,7 @@ from drone_rl.utils.schema import Text, shown
 from drone_rl.utils.seeding import Stream, as_global_stream, plain_generator
 from drone_rl.utils.settings import Settings
 
+_log = logging.getLogger(__name__)
 FORMAT = "drone_rl policy"
 FORMAT_VERSION = 3
 MAX_PARAMETERS = 2**24
@@ -69,23 +74,38 @@ class Source(Model):
     """SHA-256 of its content."""
 
 
+def source_of(task: type[BaseTaskSettings]) -> Source | None:
+    """Return the user's file that registers a task; None for shipped tasks and notebooks."""
+    module = sys.modules.get(task.__module__)
+    file = getattr(module, "__file__", None)
+    if file is None or task.__module__.partition(".")[0] == "drone_rl":
+        return None
+    content = Path(file).read_bytes()
+    return Source(name=Path(file).name, hash=hashlib.sha256(content).hexdigest())
+
+
 class TaskDescription(Model):
     """A task: its registered name, its settings, and what else it is built from."""
 
     name: Name
     parameters: BaseTaskSettings
-    """Its settings."""
+    """Its settings, those of its reward by default: a policy is judged without it."""
     rewards: dict[Name, float] = {}
-    """Weights of the reward's terms; empty for a task that computes its reward as a whole."""
+    """Weights of the reward's terms in training; empty for a task without terms."""
     scene: Source | None = None
     """The scene's file; None for a scene that the task composes."""
     code: Source | None = None
-    """The file that registers the task; None for a task of an imported module."""
+    """The user's file that registers the task; None for a shipped one."""
 
     @classmethod
     def of(cls, settings: BaseTaskSettings) -> Self:
         """Return the description of a task with some settings."""
-        return cls(name=settings.name, parameters=settings)
+        terms: Mapping[str, Any] = getattr(settings, "reward", {})
+        weights = {name: term.weight for name, term in terms.items()}
+        if weights:
+            settings = settings.replace(reward=type(settings).model_fields["reward"].default)
+        code = source_of(type(settings))
+        return cls(name=settings.name, parameters=settings, rewards=weights, code=code)
 
     @pydantic.field_validator("parameters", mode="before")
     @classmethod
@@ -98,13 +118,19 @@ class TaskDescription(Model):
 
     @pydantic.field_serializer("parameters")
     def _without_name(self, parameters: BaseTaskSettings) -> dict[str, Any]:
-        return Settings.values(parameters)
+        values = Settings.values(parameters)
+        return {name: value for name, value in values.items() if name != "reward"}
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> Self:
-        if unsupported := [n for n in ("rewards", "scene", "code") if getattr(self, n)]:
-            raise InputError(
-                f"{unsupported[0]} is not supported; use the version of drone_rl that wrote it"
+        if self.scene is not None:
+            raise InputError("scene is not supported; use the version of drone_rl that wrote it")
+        if self.code is not None and self.code != source_of(type(self.parameters)):
+            _log.warning(
+                "%s, which registers task=%s, is not the file of this policy's training; it is "
+                "judged by the rules of the present one",
+                self.code.name,
+                self.name,
             )
         return self
 

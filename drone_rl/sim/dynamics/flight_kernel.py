@@ -100,7 +100,8 @@ def is_plausible(goal: Goal, start: wp.vec3d) -> bool:
 
 
 @wp.func
-def _three(numbers: wp.array2d[wp.float64], world: int, first: int) -> wp.vec3:
+def three(numbers: wp.array2d[wp.float64], world: int, first: int) -> wp.vec3:
+    """Return three of a drone's numbers."""
     return wp.vec3(
         float(numbers[world, first]),
         float(numbers[world, first + 1]),
@@ -129,11 +130,11 @@ def loaded(before: wp.array2d[wp.float64], world: int) -> CommandedDrone:
     flight.past = wp.int64(before[world, fs.TICKS])
     flight.motion = rigid.Motion()
     flight.motion.attitude = four(before, world, fs.ATTITUDE)
-    flight.motion.velocity = _three(before, world, fs.VELOCITY)
-    flight.motion.rates = _three(before, world, fs.RATES)
+    flight.motion.velocity = three(before, world, fs.VELOCITY)
+    flight.motion.rates = three(before, world, fs.RATES)
     flight.rotors = four(before, world, fs.ROTORS)
     flight.climb = float(before[world, fs.CLIMB_INTEGRAL])
-    flight.gust = _three(before, world, fs.GUST)
+    flight.gust = three(before, world, fs.GUST)
     flight.touch = Touch()
     flight.touch.thing = fs.NOTHING
     return flight

@@ -8,55 +8,30 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.config import CameraSettings, TaskSettings
-from drone_rl.sim.actions import DOWN, MOVES, MOVES_3D, UP, Actions, Entry, Move
-from drone_rl.sim.dynamics import BodyState, Dynamics
-from drone_rl.sim.entities import Cube
+from drone_rl.config import TaskSettings
+from drone_rl.config.term_task import ObjectSettings
+from drone_rl.sim.actions import DOWN, MOVES, MOVES_3D, UP, Entry, Move
+from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.tasks.applied_rules import AppliedRules, reward_terms
 from drone_rl.sim.tasks.collect_cubes_kernel import (
+    ALL_CUBES,
+    ENDS,
     CubesEnd,
-    FusedCubes,
-    launch,
-    start_all,
-    step_all,
+    choose_first,
+    touch_cubes,
 )
 from drone_rl.sim.tasks.common import (
-    PropTask,
     Side,
     first_contact,
     interval_classes,
     number_classes,
-    place_in_view,
     side_of,
 )
-from drone_rl.sim.tasks.task import Goals, Grid, OracleRule, State, register_task
+from drone_rl.sim.tasks.objects import ObjectState, ObjectTask
+from drone_rl.sim.tasks.rules_kernel import make_rules
+from drone_rl.sim.tasks.scene_edits import Range, SceneEdits
+from drone_rl.sim.tasks.task import Goals, OracleRule, register_task
 from drone_rl.sim.vocabulary import CUBES
-from drone_rl.utils.errors import InputError
-
-
-@dataclasses.dataclass
-class WorldState(State):
-    """State of N environments with C cubes each."""
-
-    cubes: Tensor  # (N, C, 3) float64
-    """Positions at which the cubes were placed, metres, in the order of their x."""
-    collected: Tensor  # (N, C) bool
-    """Cubes that the drone has touched."""
-    passed: Tensor  # (N, C) bool
-    """Cubes that the drone has left behind untouched."""
-    side: Tensor  # (N, C) int64
-    """`Side` of each cube when it became the next one; -1 before that."""
-    lateral: Tensor  # (N, C) float64
-    """Metres to the left of the drone at which it stood then; NaN before that."""
-
-    @property
-    def present(self) -> Tensor:
-        """Cubes that still stand. Shape: (N, C)."""
-        return ~(self.collected | self.passed)
-
-    @property
-    def next_cube(self) -> Tensor:
-        """Index of the nearest standing cube, C when none is left. Shape: (N,)."""
-        return (~self.present).long().cumprod(-1).sum(-1)
 
 
 @dataclasses.dataclass
@@ -69,7 +44,7 @@ class CubeGoals(Goals):
     """Metres by which each stands higher than the drone at the start of the episode."""
 
 
-class CollectCubes(PropTask[WorldState]):
+class CollectCubes(ObjectTask):
     """Move until every cube is touched. The reward is 1 a cube."""
 
     name = TaskSettings.name
@@ -78,27 +53,53 @@ class CollectCubes(PropTask[WorldState]):
     success_end = CubesEnd.ALL_CUBES
     expected_end = CubesEnd.FRONT_BOUNDARY
     observed = ("cubes", "collected", "side", "end_reason")
-    props = "cubes"
     scored = ("collected", "side", "lateral", "cube_positions")
-    remembered: Mapping[str, str] = {
-        "cubes": "positions of the cubes, metres, in order of x (T, C, 3)",
-        "present": "whether each cube still stands, bool (T, C)",
-        "collected": "whether each cube has been collected, bool (T, C)",
-        "next_target": "index of the nearest standing cube, C if none (T,)",
-    }
 
     def __init__(self, settings: TaskSettings | None = None) -> None:
-        self.settings = settings = settings or TaskSettings()
-        self.largest_reward = float(settings.num_cubes)
-        self.drone_size = settings.drone_size
-        self.origin = (0.0, 0.0, settings.altitude)
-        self.vocabulary = CUBES.replace(tested=_some_cubes(settings))
-        actions = MOVES_3D if settings.must_climb else MOVES
+        s = settings or TaskSettings()
+        cube = ObjectSettings(shape="box", role="goal", size=(s.cube_size,) * 3, color=s.cube_color)
+        rules = make_rules(
+            reward_terms(s.reward),
+            ENDS,
+            ALL_CUBES,
+            touch=touch_cubes,
+            choose=choose_first,
+            success_first=True,
+        )
+        bounds = (s.front_bound, s.side_bound, s.altitude, s.height_bound)
+        super().__init__(
+            s,
+            {f"cube_{i}": cube for i in range(s.num_cubes)},
+            AppliedRules(rules, rewards=s.reward, parameters=bounds),
+        )
+        self.largest_reward = float(s.num_cubes)
+        self.origin = (0.0, 0.0, s.altitude)
+        if s.must_climb:
+            self.needed_actions = {
+                "up": f"task.vertical_bound={s.vertical_bound} puts cubes where a drone that "
+                f"keeps its altitude never touches them; give at most {s.touch_distance} (half of "
+                "cube_size + drone_size), or actions=moves_3d"
+            }
+        self.vocabulary = CUBES.replace(tested=_some_cubes(s))
+        actions = MOVES_3D if s.must_climb else MOVES
         self.oracle = OracleRule(("drone", "cube_positions", "next_cube"), self.line_up, actions)
+        reach, bound = s.touch_distance, s.vertical_bound
+        widest = 2.0 * s.lateral_bound
+        self.edits = SceneEdits(
+            task=self,
+            reach=reach,
+            ahead=Range(reach + 0.5 * s.step_length, s.first_distance, widest or 2.0 * reach),
+            around=Range(reach + s.cube_size, s.first_distance, widest),
+            heights=(-bound, 0.0, bound) if bound else (0.0,),
+            is_sorted=True,
+        )
 
     @property
     def entries(self) -> Mapping[str, Entry]:
-        """Algorithm 3's info: "cubes" is the number collected; see `WorldState` for the others."""
+        """Algorithm 3's info; see `ObjectState`.
+
+        "cubes" is the number collected, "lateral" how far to its left each cube came up, metres.
+        """
         cubes = self.settings.num_cubes
         return {
             "cubes": Entry((1,), torch.int64, 0, cubes),
@@ -110,23 +111,6 @@ class CollectCubes(PropTask[WorldState]):
             "cube_positions": Entry((cubes, 3), torch.float32),
         }
 
-    def make_props(self) -> list[Cube]:
-        """Return the cubes, nearest first."""
-        size, color = self.settings.cube_size, self.settings.cube_color
-        return [Cube(size, color, name=f"cube_{i}") for i in range(self.settings.num_cubes)]
-
-    def check_actions(self, actions: Actions) -> None:
-        """Refuse cubes that drones without moves up and down never touch."""
-        if self.settings.must_climb and not {"up", "down"} <= {*actions.names}:
-            raise InputError(
-                f"task.vertical_bound={self.settings.vertical_bound} puts cubes where a drone that "
-                f"keeps its altitude never touches them; give at most "
-                f"{self.settings.touch_distance} (half of cube_size + drone_size), or "
-                "actions=moves_3d"
-            )
-
-    # Reset and rules
-
     def sample(self, random_state: np.random.RandomState) -> Tensor:
         """Sample the positions of the cubes (Algorithm 2). Shape: (C, 3), metres."""
         s = self.settings
@@ -136,59 +120,33 @@ class CollectCubes(PropTask[WorldState]):
         x = s.first_distance + s.spacing * np.arange(s.num_cubes)
         return torch.from_numpy(np.column_stack([x, offsets]))
 
-    def start(self, sampled: Tensor, body: BodyState | None = None) -> WorldState:
+    def start(self, sampled: Tensor, body: BodyState | None = None) -> ObjectState:
         """Return states at the start of episodes, at rest by default; `sampled` are the cubes."""
         if body is None:
             body = BodyState.at_rest(sampled.new_tensor(self.origin).repeat(len(sampled), 1))
-        no_cube = torch.zeros_like(sampled[..., 0], dtype=torch.bool)
-        state = WorldState(
-            body=body,
-            cubes=sampled,
-            collected=no_cube,
-            passed=no_cube.clone(),
-            side=no_cube.long() - 1,
-            lateral=torch.full_like(sampled[..., 1], torch.nan),
-            steps=no_cube[:, 0].long(),
-            end_reason=no_cube[:, 0].long(),
-        )
-        launch(start_all, self.settings, state)
-        return state
+        return self.begun(body, sampled)
 
-    def step(self, state: WorldState, body: BodyState) -> tuple[WorldState, Tensor]:
-        """Apply Algorithms 1 and 3, see `collect_cubes_kernel.step`."""
-        written = ("collected", "passed", "side", "lateral")
-        copies = {name: getattr(state, name).clone() for name in written}
-        end = torch.empty_like(state.steps)
-        new = dataclasses.replace(state, body=body, steps=state.steps + 1, end_reason=end, **copies)
-        reward = torch.empty(len(state), dtype=torch.float64, device=new.steps.device)
-        others = (body.is_lost, new.steps, new.end_reason, reward)
-        launch(step_all, self.settings, new, *others)
-        return new, reward
-
-    def touch(self, state: WorldState, position: Tensor, before: Tensor | None = None) -> Tensor:
+    def touch(self, state: ObjectState, position: Tensor, before: Tensor | None = None) -> Tensor:
         """Collect the cubes that the drones touch, see `Task.touch`."""
         before, reach = position if before is None else before, self.settings.touch_distance
-        contact = first_contact(reach, before, position, state.cubes)
+        contact = first_contact(reach, before, position, state.places)
         contact = contact.masked_fill(~state.present, torch.inf)
-        state.collected |= contact.isfinite()
+        is_touched = contact.isfinite()
+        state.touched |= is_touched
+        state.reached |= is_touched
+        state.present &= ~is_touched
         return contact
 
-    def fused_rules(self, dynamics: Dynamics, num_envs: int) -> FusedCubes | None:
-        """See `Task.fused_rules`."""
-        fused = ("step", "places", "obstacles")
-        is_own = all(getattr(type(self), name) is getattr(CollectCubes, name) for name in fused)
-        if is_own and FusedCubes.supports(dynamics):
-            return FusedCubes(self.settings, dynamics, num_envs)
-        return None
-
-    def info(self, state: WorldState) -> dict[str, Tensor]:
+    def info(self, state: ObjectState) -> dict[str, Tensor]:
         """See `entries`."""
         return {
-            "cubes": state.collected.sum(-1, keepdim=True),
-            **{name: getattr(state, name) for name in ("collected", "side", "lateral")},
-            "next_cube": state.next_cube[:, None],
+            "cubes": state.reached.sum(-1, keepdim=True),
+            "collected": state.reached,
+            "side": state.sides.long(),
+            "lateral": state.noted,
+            "next_cube": (~state.present).long().cumprod(-1).sum(-1, keepdim=True),
             "end_reason": state.end_reason[:, None],
-            "cube_positions": state.cubes.float(),
+            "cube_positions": state.places.float(),
         }
 
     # Oracle and goals
@@ -236,95 +194,6 @@ class CollectCubes(PropTask[WorldState]):
         touch, bound = self.settings.touch_distance, self.settings.lateral_bound
         edges = [round(2 * edge) / 2 for edge in ((touch + bound) / 2, bound, 1.5 * bound)]
         return [touch, *sorted({edge for edge in edges if edge > touch})]
-
-    # Explanations
-
-    def remember(self, info: Mapping[str, Tensor]) -> dict[str, Tensor]:
-        """See `remembered`."""
-        next_cube, collected = info["next_cube"][:, 0], info["collected"]
-        index = torch.arange(collected.shape[-1], device=next_cube.device)
-        # cubes stand in order of x, so a standing cube is the next one or one behind it
-        return {
-            "cubes": info["cube_positions"],
-            "present": ~collected & (index >= next_cube[:, None]),
-            "collected": collected,
-            "next_target": next_cube,
-        }
-
-    def tally(self, info: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
-        """Return the number of cubes collected, and of cubes left behind."""
-        collected, next_cube = info["collected"], info["next_cube"]
-        is_behind = torch.arange(collected.shape[-1], device=next_cube.device) < next_cube
-        return collected.sum(-1), (is_behind & ~collected).sum(-1)
-
-    def recall(self, kept: Mapping[str, Tensor], body: BodyState) -> WorldState:
-        """Return states as they were, except side and lateral, which are not kept."""
-        present, collected = kept["present"], kept["collected"]
-        state = self.start(kept["cubes"].double(), body)
-        return dataclasses.replace(
-            state,
-            collected=collected,
-            passed=~present & ~collected,
-            side=torch.full_like(state.side, -1),
-            lateral=torch.full_like(state.lateral, torch.nan),
-            steps=kept["step"].clone(),
-        )
-
-    def next_target(self, state: WorldState) -> Tensor:
-        """Return the next cube."""
-        return state.next_cube
-
-    def is_reached(self, state: WorldState, target: Tensor) -> Tensor:
-        """Return whether it is collected."""
-        return state.collected[torch.arange(len(state), device=target.device), target]
-
-    def needed(self, offset: Tensor) -> Tensor:
-        """Return a turn where flying straight on would miss."""
-        return turn_towards(offset[..., 1], self.settings.touch_distance)
-
-    def stratum_at(self, offset: Tensor) -> Tensor:
-        """Return its side."""
-        return side_of(offset[..., 1], self.settings.touch_distance)
-
-    def grid(self, num_forward: int, num_lateral: int) -> Grid:
-        """Return where next cubes can stand: ahead up to an episode's first cube."""
-        s = self.settings
-        reach = 2.0 * s.lateral_bound or s.touch_distance * 2
-        nearest, bound = s.touch_distance + 0.5 * s.step_length, s.vertical_bound
-        height = torch.tensor([-bound, 0.0, bound] if bound else [0.0], dtype=torch.float64)
-        forward = torch.linspace(nearest, s.first_distance, num_forward).double()
-        return Grid(height, forward, torch.linspace(reach, -reach, num_lateral).double())
-
-    def one_target(self, body: BodyState, offset: Tensor) -> WorldState:
-        """Return states with a single cube; the others are passed."""
-        cubes = body.position[:, None].repeat(1, self.settings.num_cubes, 1)
-        cubes[:, 0] += offset.to(cubes)
-        state = self.start(cubes, body)
-        state.passed[:, 1:] = True
-        return state
-
-    def without_targets(self, state: WorldState) -> WorldState:
-        """Remove all cubes."""
-        return dataclasses.replace(state, passed=torch.ones_like(state.passed))
-
-    def without_next(self, state: WorldState) -> WorldState:
-        """Remove the next cube."""
-        return dataclasses.replace(state, passed=state.passed | self._is_next(state))
-
-    def elsewhere(
-        self, state: WorldState, camera: CameraSettings, generator: torch.Generator
-    ) -> WorldState:
-        """Put all cubes at random positions in view, as far ahead and aside as cubes ever are."""
-        s = self.settings
-        draw = torch.rand(*state.cubes.shape, generator=generator, dtype=torch.float64)
-        nearest, widest = s.touch_distance + s.cube_size, 2 * s.lateral_bound
-        away = place_in_view(draw[..., :2], camera, nearest, s.first_distance, widest)
-        up = (2 * draw[..., 2:] - 1) * s.vertical_bound
-        cubes = state.drone[:, None] + torch.cat([away, up], -1).to(state.drone)
-        nearest_first = cubes[..., :1].argsort(1).expand_as(cubes)
-        cubes = cubes.gather(1, nearest_first)
-        standing = torch.zeros_like(state.passed)
-        return dataclasses.replace(state, cubes=cubes, passed=standing, collected=standing.clone())
 
 
 register_task(TaskSettings, CollectCubes)

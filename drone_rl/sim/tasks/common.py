@@ -1,17 +1,14 @@
 """Parts that several tasks use: props, sides, classes of goals, views."""
 
-import dataclasses
 import enum
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import torch
 from torch import Tensor
 
 from drone_rl.config import CameraSettings
-from drone_rl.sim.dynamics import ComputerVision
-from drone_rl.sim.tasks.task import Goals, S, Task
+from drone_rl.sim.tasks.task import Goals
 from drone_rl.utils.text import ordinal
 
 HIDDEN_DEPTH = 100.0
@@ -33,32 +30,6 @@ def side_of(lateral: Tensor, tolerance: float) -> Tensor:
     """Return the `Side` of metres to the left; AHEAD within `tolerance` metres. Shape kept."""
     right = torch.where(lateral < -tolerance, Side.RIGHT.value, Side.AHEAD.value)
     return torch.where(lateral > tolerance, Side.LEFT.value, right)
-
-
-class PropTask(Task[S]):
-    """A task whose state has positions, (N, P, 3), and presence, (N, P), of its props."""
-
-    strata = SIDES
-    props: str
-    """Field of the state that holds the positions; `present` is the other one."""
-    settings: Any
-
-    def make_dynamics(self) -> ComputerVision:
-        """Return computer-vision dynamics with three moves (Table 1 of Luo et al., 2018)."""
-        return ComputerVision(self.settings.step_length)
-
-    def places(self, state: S) -> Tensor:
-        """Return the props' positions, those of absent ones under the floor."""
-        props_state: Any = state
-        hidden = (~props_state.present).double() * HIDDEN_DEPTH
-        return getattr(state, self.props) - torch.nn.functional.pad(hidden[..., None], (2, 0))
-
-    def next_moved(self, state: S, metres: Tensor | float) -> S:
-        """Return the state with the next prop moved by metres to the left."""
-        moved = getattr(state, self.props).clone()
-        metres = torch.as_tensor(metres, dtype=moved.dtype, device=moved.device)
-        moved[..., 1] += metres.expand(len(moved))[:, None] * self._is_next(state)
-        return dataclasses.replace(state, **{self.props: moved})
 
 
 def first_contact(reach: float | Tensor, before: Tensor, now: Tensor, places: Tensor) -> Tensor:

@@ -11,7 +11,6 @@ from torch import Tensor
 
 from drone_rl.config import PillarsSettings
 from drone_rl.sim.actions import Move
-from drone_rl.sim.tasks.common import first_contact
 
 EDGE = 1e-6
 """Metres by which rounding may move a lane at the field's edge, also in float32."""
@@ -61,34 +60,6 @@ class Lanes:
         away = (rows[:, :, None] - lane[:, None, :, None]).abs().amin(-1)
         return offsets, (away > self.settings.touch_distance) & (lane <= edge)[:, None]
 
-    def nearest(self, rows: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
-        """Find the nearest open lane of rows; of two, that whose gap's middle is nearer.
-
-        From y of pillars, (n, K), and drones, (n,): metres to the left and width of the gap, (n,).
-        """
-        step = self.settings.step_length
-        offsets, is_open = self.lanes_from(rows[:, None], y)
-        is_shut = ~is_open[:, 0].any(-1)
-        if bool(is_shut.any()):  # in flight, between lanes: take those of the field
-            at = torch.where(is_shut, step * torch.round(y / step), y)
-            offsets, is_open = self.lanes_from(rows[:, None], at)
-            offsets = offsets + (at - y)[:, None]
-        left, right = self._gap(rows, y[:, None] + offsets)
-        off_centre = (0.5 * (left + right) - y[:, None]).abs()
-        cost = offsets.abs() + 1e-3 * off_centre / self.settings.spread
-        best = torch.where(is_open[:, 0], cost, torch.inf).argmin(-1, keepdim=True)
-        width = (left - right).gather(-1, best)[:, 0] - self.settings.width
-        return offsets.gather(-1, best)[:, 0], width
-
-    def _gap(self, rows: Tensor, lane: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the middles of the pillars, or the field's ends, next to lanes. (n, L) each."""
-        edge = self.settings.spread + 0.5 * self.settings.width
-        there = rows[:, None].expand(*lane.shape, rows.shape[-1])
-        is_left = there >= lane[..., None]
-        left = torch.where(is_left, there, torch.inf).amin(-1).clamp(max=edge)
-        right = torch.where(is_left, -torch.inf, there).amax(-1).clamp(min=-edge)
-        return left, right
-
     def first_sidestep(self, rows: Tensor, y: Tensor, next_row: Tensor) -> Tensor:
         """Plan the path through all rows with the shortest sidesteps, by Bellman's recursion.
 
@@ -125,24 +96,3 @@ class Lanes:
         move[(sidestep > 0.5 * s.step_length) & ~is_beside] = Move.LEFT
         move[(sidestep < -0.5 * s.step_length) & ~is_beside] = Move.RIGHT
         return move
-
-
-def nearest_pillar(rows: Tensor, y: Tensor, next_row: Tensor) -> Tensor:
-    """Return the standing pillar of the next row that is nearest to a drone's lane.
-
-    The y of pillars, (N, R, K), infinite where none stands, and of drones, (N,), and the first row
-    not passed or R, (N,), to an index among all pillars, their number if there is none, (N,).
-    """
-    env, (_, count, size) = torch.arange(len(rows), device=rows.device), rows.shape
-    aside = (rows[env, next_row.clamp(max=count - 1)] - y[:, None]).abs()
-    is_none = (next_row >= count) | aside.isinf().all(-1)
-    return torch.where(is_none, count * size, next_row * size + aside.argmin(-1))
-
-
-def meets(touch: float, before: Tensor, now: Tensor, pillars: Tensor) -> Tensor:
-    """Return whether drones that fly straight between positions, (N, 3), touch pillars, (N, P, 3).
-
-    A drone touches a pillar if its centre is at most `touch` metres away along x and y.
-    Shape: (N, P).
-    """
-    return first_contact(touch, before[:, :2], now[:, :2], pillars[..., :2]).isfinite()

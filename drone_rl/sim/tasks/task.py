@@ -8,13 +8,13 @@ import abc
 import dataclasses
 import enum
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, Generic, NamedTuple, NoReturn, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from drone_rl.config import TASKS, BaseTaskSettings, CameraSettings, TaskSettings
+from drone_rl.config import TASKS, BaseTaskSettings, TaskSettings
 from drone_rl.sim.actions import Actions, Entry
 from drone_rl.sim.dynamics import BodyState, ComputerVision, Dynamics, Obstacles
 from drone_rl.sim.quiet_dm_control import mjcf
@@ -110,19 +110,10 @@ class OracleRule(NamedTuple):
         return same.to(action.device)[self.actions.part(action)]
 
 
-class Grid(NamedTuple):
-    """Positions at which targets can stand, metres from the drone, as three axes of float64."""
-
-    height: Tensor  # (Z,)
-    forward: Tensor  # (F,)
-    lateral: Tensor  # (L,)
-
-
 class Task(abc.ABC, Generic[S]):
     """Something to do. A subclass defines `name`, `sample` and `step`; all else has a default.
 
     With the defaults a task has one goal, which is reached where the episode ends by `success_end`.
-    Explanations need the methods from `remember` on, most of which have no default.
     """
 
     name: str
@@ -153,11 +144,12 @@ class Task(abc.ABC, Generic[S]):
     """Entries of an episode's last information that `score` reads."""
     oracle: OracleRule | None = None
     """The best action given the true state; None if it is unknown."""
-    remembered: Mapping[str, str] = {}
-    """Entries that data sets keep of each frame, with descriptions.
-
-    "next_target" is the index of the next target, their number if none is left.
-    """
+    reward_terms: tuple[str, ...] = ()
+    """Names of the reward's terms; empty if it is computed as a whole."""
+    needed_actions: Mapping[str, str] = {}
+    """Names of actions without which no policy can do the task, and what to say then."""
+    edits: Any = None
+    """How explanations change its scenes, `SceneEdits`; None if they can't."""
 
     @property
     def entries(self) -> Mapping[str, Entry]:
@@ -171,9 +163,6 @@ class Task(abc.ABC, Generic[S]):
     def make_dynamics(self) -> Dynamics:
         """Return the default dynamics of the drone: moves of a metre."""
         return ComputerVision()
-
-    def check_actions(self, actions: Actions) -> None:
-        """Raise an `InputError` if no policy could do the task by these actions."""
 
     def make_props(self) -> Sequence[Prop]:
         """Return new entities besides field and drone, positioned by `places`."""
@@ -198,27 +187,6 @@ class Task(abc.ABC, Generic[S]):
 
         `state` is that before the step and stays as it is; `body` are the drones after it.
         """
-
-    def advance(self, state: S, body: BodyState, speeds: Tensor) -> tuple[S, Tensor]:
-        """Return `step`; a task whose rules depend on the commanded speeds overrides this.
-
-        `speeds` are forward, left, up and turning left, as fractions of the greatest. (N, 4).
-        """
-        return self.step(state, body)
-
-    def touch(self, state: S, position: Tensor, before: Tensor | None = None) -> Tensor | None:
-        """Apply the rules of contact in place, without a step or reward; by default there are none.
-
-        `position` is that of each drone, metres, and `before` where it comes from, if it touches
-        what is on the straight path. Shapes: (num_envs, 3).
-
-        Returns:
-            Fraction of the path before each prop was touched; inf without contact, (N, P). Without
-            any contact it may be None.
-        """
-
-    def fused_rules(self, dynamics: Dynamics, num_envs: int) -> Any:
-        """Return arrays for the fused episode kernel, such as `FusedCubes`, or None."""
 
     def places(self, state: S) -> Tensor:
         """Return where the props are, metres; below the ground if absent. Shape: (N, P, 3)."""
@@ -246,86 +214,19 @@ class Task(abc.ABC, Generic[S]):
         for number, stratum in enumerate(self.strata):
             yield "side", stratum, goals.stratum == number
 
-    # Explanations. A target is a prop to which the drone flies or which it avoids, known by its
-    # index. Methods that take a state return a new one.
 
-    def remember(self, info: Mapping[str, Tensor]) -> dict[str, Tensor]:
-        """Return the entries `remembered`, from the information before actions. Shapes: (T, *)."""
-        self._lacks("remember")
-
-    def tally(self, info: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
-        """Return how many goals are reached, and how many missed for good. int64, (T,)."""
-        self._lacks("tally")
-
-    def recall(self, kept: Mapping[str, Tensor], body: BodyState) -> S:
-        """Return states again from the entries `remembered`, "step", and the drones."""
-        self._lacks("recall")
-
-    def next_target(self, state: S) -> Tensor:
-        """Return the target that calls for action now; their number if none does. (N,)."""
-        self._lacks("next_target")
-
-    def next_offset(self, state: S) -> Tensor:
-        """Return the next target's offset from the drone, metres; NaN if there is none. (N, 3)."""
-        target, places = self.next_target(state), self.places(state)
-        last, env = places.shape[1] - 1, torch.arange(len(state), device=places.device)
-        away = places[env, target.clamp(max=last)] - state.body.position
-        return torch.where((target <= last)[:, None], away, torch.nan)
-
-    def is_reached(self, state: S, target: Tensor) -> Tensor:
-        """Return whether a target of each environment is done. Shape of both: (N,)."""
-        self._lacks("is_reached")
-
-    def is_behind(self, state: S, target: Tensor) -> Tensor:
-        """Return whether a target, or its place, lies behind the drone. Shape of both: (N,)."""
-        env = torch.arange(len(state), device=target.device)
-        return state.body.position[:, 0] > self.places(state)[env, target, 0]
-
-    def needed(self, offset: Tensor) -> Tensor:
-        """Return the action for a target at an offset from the drone. (N, 3) to (N, *)."""
-        self._lacks("needed")
-
-    def stratum_at(self, offset: Tensor) -> Tensor:
-        """Return the stratum of a target at an offset from the drone. (N, 3) to (N,)."""
-        self._lacks("stratum_at")
-
-    def grid(self, num_forward: int, num_lateral: int) -> Grid:
-        """Return where next targets can stand, seen from the drone; symmetric sideways."""
-        self._lacks("grid")
-
-    def one_target(self, body: BodyState, offset: Tensor) -> S:
-        """Return states with a single target, at that offset from each drone. Shape: (N, 3)."""
-        self._lacks("one_target")
-
-    def without_targets(self, state: S) -> S:
-        """Remove all targets."""
-        self._lacks("without_targets")
-
-    def without_next(self, state: S) -> S:
-        """Remove the next target, if there is one."""
-        self._lacks("without_next")
-
-    def next_moved(self, state: S, metres: Tensor | float) -> S:
-        """Move the next target to the left. Shape of `metres`: (N,), or a number."""
-        self._lacks("next_moved")
-
-    def elsewhere(self, state: S, camera: CameraSettings, generator: torch.Generator) -> S:
-        """Move all targets to random positions in view of the camera."""
-        self._lacks("elsewhere")
-
-    def _is_next(self, state: S) -> Tensor:
-        target = self.next_target(state)[:, None]
-        return torch.arange(self.places(state).shape[1], device=target.device) == target
-
-    def _lacks(self, method: str) -> NoReturn:
-        raise InputError(f"task={self.name} cannot be explained; define {method} in its class")
+def check_actions(task: Task[Any], actions: Actions) -> None:
+    """Raise an `InputError` if no policy could do a task by these actions."""
+    for name, problem in task.needed_actions.items():
+        if name not in actions.names:
+            raise InputError(problem)
 
 
 MAKERS: dict[type[BaseTaskSettings], Callable[[Any], Task[Any]]] = {}
 """What makes a task, by the class of its settings."""
 
 
-class ObjectSettings(BaseTaskSettings):
+class NoSettings(BaseTaskSettings):
     """Settings of a task that is registered as an object: none."""
 
 
@@ -377,9 +278,9 @@ def as_settings(task: Any) -> Any:
     if type(settings) in MAKERS and type(as_task(settings)) is type(task):
         return settings
     kind = TASKS.get(task.name)
-    if kind is None or not issubclass(kind, ObjectSettings):  # else a notebook's cell ran again
+    if kind is None or not issubclass(kind, NoSettings):  # else a notebook's cell ran again
         names = {"name": task.name, "__module__": type(task).__module__}
-        kind = type("ObjectSettings", (ObjectSettings,), names)
+        kind = type("NoSettings", (NoSettings,), names)
     register_task(kind, lambda _: task)
     return kind()
 

@@ -16,7 +16,8 @@ from torch import Tensor
 from drone_rl.envs import base_env, worlds_of
 from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.tasks import State
-from drone_rl.sim.tasks.collect_cubes import CubesEnd, WorldState
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
+from drone_rl.sim.tasks.objects import ObjectState
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.models import Stored
 from drone_rl.verification.checker.certificate import (
@@ -155,7 +156,7 @@ class Simulator:
             done[flying], repeats[flying] = now, (repeats[flying] + 1) * is_same
             on = now.end_reason == 0
             flying, now, before = flying[on], now[on], before[on]
-        ended = (done.end_reason, done.collected, done.steps, repeats)
+        ended = (done.end_reason, done.reached, done.steps, repeats)
         return EpisodeEnds(*(value.cpu().numpy() for value in ended))
 
     def _start(self, lateral: Tensor) -> State:
@@ -165,14 +166,14 @@ class Simulator:
         up = torch.full_like(lateral, task.altitude)
         return self._worlds.start(torch.stack([ahead.expand_as(lateral), lateral, up], -1))
 
-    def _choose(self, state: WorldState) -> Tensor:
+    def _choose(self, state: ObjectState) -> Tensor:
         """Return the argmax actions."""
         seen = TensorDict({"pixels": self._worlds.render(state)}, [len(state)])
         for transform in self._transforms:
             seen = transform(seen)
         return self._network(seen["pixels"]).argmax(-1)
 
-    def _is_same(self, one: WorldState, other: WorldState) -> Tensor:
+    def _is_same(self, one: ObjectState, other: ObjectState) -> Tensor:
         """Return whether states are equal: same position, same cubes standing."""
         moved = (one.drone - other.drone).abs().amax(-1) > self._task.step_length / 2
         return ~moved & (one.present == other.present).all(-1)

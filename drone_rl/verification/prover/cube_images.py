@@ -23,7 +23,7 @@ from torch import Tensor
 
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.sim.entities import FRONT_CENTER
-from drone_rl.sim.tasks.collect_cubes import WorldState
+from drone_rl.sim.tasks.objects import ObjectState
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.lattice import Lattice
@@ -192,9 +192,9 @@ class CubeImages:
         hidden = self._gone(cubes, places) if hidden is None else hidden
         x = np.broadcast_to(self.lattice.cubes, cubes.shape)
         where = np.stack([x, cubes, np.full(cubes.shape, task.altitude)], -1)
-        state = cast(WorldState, self._worlds.start(torch.from_numpy(where)))
+        state = cast(ObjectState, self._worlds.start(torch.from_numpy(where)))
         state.body.position[:, :2] = torch.from_numpy(places[:, :2] * task.step_length)
-        state.passed[:] = torch.from_numpy(hidden.copy())
+        state.present[:] = torch.from_numpy(~hidden)
         return self._worlds.render(state)
 
     def closed_form(

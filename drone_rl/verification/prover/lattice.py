@@ -16,7 +16,8 @@ from torch import Tensor
 from drone_rl.config import TaskSettings
 from drone_rl.sim.actions import DIRECTIONS
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.tasks.collect_cubes import CollectCubes, CubesEnd, WorldState
+from drone_rl.sim.tasks.collect_cubes import CollectCubes, CubesEnd
+from drone_rl.sim.tasks.objects import ObjectState
 from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.boxes import Boxes, cut
@@ -178,7 +179,7 @@ class Graph:
     reason: Tensor  # (K, A) int64; `CubesEnd`; never the step limit
     collected: Tensor  # (K, A) int64; cubes collected after the move, as in `Nodes`
 
-    def states(self) -> WorldState:
+    def states(self) -> ObjectState:
         """Return the nodes as states that can be rendered."""
         return _states(self.settings, self.cubes, self.nodes)
 
@@ -232,17 +233,17 @@ def _follow(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> tuple[Nodes,
     moved = dataclasses.replace(before, ahead=before.ahead + ahead, aside=before.aside + aside)
     body = BodyState.at_rest(_positions(settings, moved))
     after, _ = CollectCubes(settings).step(_states(settings, cubes, before), body)
-    moved.collected = _as_bits(after.collected)
+    moved.collected = _as_bits(after.reached)
     return moved, after.end_reason.view(len(nodes), len(moves))
 
 
-def _states(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> WorldState:
+def _states(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> ObjectState:
     """Convert nodes to states; steps are -1, so that the step limit is never met."""
     body = BodyState.at_rest(_positions(settings, nodes))
     state = CollectCubes(settings).start(cubes[nodes.placement], body)
     bit = torch.arange(cubes.shape[1])
-    state.collected = (nodes.collected[:, None] >> bit & 1).bool()
-    state.passed = ~state.collected & (state.drone[:, None, 0] > state.cubes[..., 0])
+    state.reached = (nodes.collected[:, None] >> bit & 1).bool()
+    state.present = ~state.reached & (state.drone[:, None, 0] <= state.places[..., 0])
     state.steps = state.steps - 1
     return state
 

@@ -10,7 +10,8 @@ from torch import Tensor, nn
 from torchrl.envs import EnvBase
 
 from drone_rl.envs import base_env, worlds_of
-from drone_rl.sim.tasks.collect_cubes import CubesEnd, WorldState
+from drone_rl.sim.tasks.collect_cubes import CubesEnd
+from drone_rl.sim.tasks.objects import ObjectState
 from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.bounds import Crop, ImageRanges
@@ -144,7 +145,7 @@ class NodeEvaluator:
         return evaluate
 
     @torch.no_grad()
-    def _probabilities(self, states: WorldState) -> Tensor:
+    def _probabilities(self, states: ObjectState) -> Tensor:
         """Return the action probabilities. Shape: (N, A), float64, on the CPU."""
         self.num_images += len(states)
         logits = []

@@ -69,7 +69,7 @@ def test_a_journal_sets_only_what_is_searched():
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["task.collision_penalty=interval(0,1)"], "add hydra.sweeper.metric=success"),
+        (["task.reward.contact.weight=interval(-1,0)"], "add hydra.sweeper.metric=success"),
         (["experiment=smoke,pillars", "optimizer.lr=1,2"], "it changes the task"),
         (["hydra.sweeper.metric=success", "task=collect_cubes,pillars"], "it changes the task"),
         (["hydra.sweeper.metric=loss", "seed=0,1"], "metric='loss': it must be"),

@@ -193,7 +193,7 @@ def make_one():
 
 def put(env, lateral):
     """Set the lateral positions of the cubes of the running episode in meters to the left."""
-    env.unwrapped.batch.worlds.state.cubes[0, :, 1] = lateral
+    env.unwrapped.batch.worlds.state.places[0, :, 1] = lateral
 
 
 @pytest.mark.parametrize(

@@ -72,9 +72,9 @@ def test_task_without_settings_rejects_task_options():
 def test_state_observation_concatenates_the_true_state():
     stage = WorldBatch(1, TASK, {"observations": "state", "num_cubes": 2})
     stage.reset(torch.tensor([0]), streams(0))
-    stage.worlds.state.cubes[0, :, 1] = torch.tensor([4.0, -5.0])
-    stage.worlds.state.lateral[0] = torch.tensor([4.0, torch.nan])
-    stage.worlds.state.side[0] = torch.tensor([0, -1])
+    stage.worlds.state.places[0, :, 1] = torch.tensor([4.0, -5.0])
+    stage.worlds.state.noted[0] = torch.tensor([4.0, torch.nan])
+    stage.worlds.state.sides[0] = torch.tensor([0, -1])
     stage.step(torch.tensor([1]))
     (seen,) = stage.observe(False)
     wanted = {

@@ -106,6 +106,6 @@ def collected(policy):
             worlds.step(one, torch.tensor([policy.act(image)]))
             if worlds.state.end_reason[0]:
                 break
-        found.append(worlds.state.collected[0].tolist())
+        found.append(worlds.state.reached[0].tolist())
     worlds.close()
     return found

@@ -76,7 +76,7 @@ def test_objects_have_names_and_positions(pilot):
     assert pilot.object_names == ("cube_0", "cube_1", "cube_2")
     pilot.set_object_position("cube_1", [9, 8, 7])
     assert pilot.object_position("cube_1") == (9.0, 8.0, 7.0)
-    pilot.worlds.state.collected[0, 1] = True
+    pilot.worlds.state.present[0, 1] = False
     assert all(map(math.isnan, pilot.object_position("cube_1")))
     with pytest.raises(InputError, match="did you mean cube_1"):
         pilot.object_position("cube1")

@@ -1,21 +1,25 @@
 """Descriptions are strict and complete, and build the described policy."""
 
 import copy
+import hashlib
+from pathlib import Path
 
 import pytest
 import torch
 
-from drone_rl.config import COMPUTER_VISION, ActionSettings, AppearanceSettings
+from drone_rl.config import COMPUTER_VISION, ActionSettings, AppearanceSettings, TaskSettings
 from drone_rl.config.registry import register_network, register_transform
 from drone_rl.envs.transforms import PixelTransform
 from drone_rl.policies import SmallCNN
 from drone_rl.policies.zoo import PolicyDescription
-from drone_rl.policies.zoo.description import ActionSpace
+from drone_rl.policies.zoo.description import ActionSpace, TaskDescription
 from drone_rl.sim.dynamics import ComputerVision
+from drone_rl.sim.tasks import as_settings
 from drone_rl.utils.errors import InputError
 from tests.fake_flight import FLIGHT, floating
 from tests.forked import run_forked
 from tests.second_dynamics import Turning
+from tests.second_task import Posts
 
 DEFAULT = {
     "format": "drone_rl policy",
@@ -343,3 +347,16 @@ def test_values_that_are_no_weights_survive_loading(registered):
     described = parse({**DEFAULT, "network": {"name": "own"}})
     built = described.build_network(torch.Generator().manual_seed(0))
     assert torch.equal(described.load_network(built.state_dict()).tilt, built.tilt)
+
+
+def test_the_file_of_a_users_task_is_named_and_another_one_reported(caplog):
+    described = TaskDescription.of(as_settings(Posts()))
+    content = Path("tests/second_task.py").read_bytes()
+    assert (described.code.name, described.rewards) == ("second_task.py", {})
+    assert described.code.hash == hashlib.sha256(content).hexdigest()
+    stored = described.model_dump(mode="json")
+    assert TaskDescription.read(stored) == described and not caplog.messages
+    TaskDescription.read({**stored, "code": {"name": "older.py", "hash": "0" * 64}})
+    assert "older.py" in caplog.text
+    shipped = TaskDescription.of(TaskSettings())
+    assert shipped.code is None and shipped.rewards == {"reached": 1.0}

@@ -62,7 +62,7 @@ def test_random_dynamics_are_seeded_by_the_environments_stream():
         worlds = Worlds(2, dynamics=dynamics)
         worlds.reset(torch.arange(2), [world_random_state(0, i) for i in range(2)])
         states[name] = worlds.state
-    assert torch.equal(states["gusty"].cubes, states["calm"].cubes)  # the task samples first
+    assert torch.equal(states["gusty"].places, states["calm"].places)  # the task samples first
     expected = []
     for i in range(2):
         stream = world_random_state(0, i)
@@ -70,7 +70,7 @@ def test_random_dynamics_are_seeded_by_the_environments_stream():
         expected.append(stream.randint(2**31 - 1))
     assert states["gusty"].body.seed.tolist() == expected
     assert states["calm"].body.seed.tolist() == [0, 0]
-    assert worlds.start(states["calm"].cubes).body.seed.tolist() == [0, 0]
+    assert worlds.start(states["calm"].places).body.seed.tolist() == [0, 0]
 
 
 @pytest.mark.parametrize("mount", ["gimbal", "body"])

@@ -53,7 +53,7 @@ def test_shards_render_the_same_images(worlds, renderer):
 
 def test_depth_of_the_cube_ahead(worlds):
     state = worlds.state[torch.tensor([0])]
-    state.cubes[0, :, 1] = 0.0
+    state.places[0, :, 1] = 0.0
     depth = worlds.render(state, worlds.view(modality="depth"))
     # the camera is 0.4 m ahead of the drone's center, the front face 1.25 m before the cube's
     assert depth[0, 12, 32].item() == pytest.approx(15.0 - 1.25 - 0.4, abs=1e-3)
@@ -108,7 +108,7 @@ def test_invalid_views_raise(worlds):
 def ahead(worlds):
     """Return two environments, each with a cube in front of the camera."""
     state = worlds.state[torch.tensor([0, 0])]
-    state.cubes[:, 0, 1] = 0.0
+    state.places[:, 0, 1] = 0.0
     return state
 
 

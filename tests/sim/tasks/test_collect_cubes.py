@@ -11,7 +11,7 @@ from hypothesis import settings
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.sim.actions import DOWN, MOVES_3D, UP, Move
 from drone_rl.sim.dynamics import BodyState, ComputerVision
-from drone_rl.sim.tasks import FailureReplayTask
+from drone_rl.sim.tasks import FailureReplayTask, check_actions
 from drone_rl.sim.tasks.collect_cubes import (
     CollectCubes,
     CubeGoals,
@@ -24,6 +24,7 @@ from drone_rl.utils.errors import InputError
 from tests.fake_flight import FLIGHT, Floating
 
 SETTINGS = TaskSettings()  # contact up to 1.65 m on each axis
+ONE = CollectCubes(TaskSettings(num_cubes=1))
 
 
 def at(*ys, settings=SETTINGS):
@@ -63,8 +64,8 @@ def test_reward_is_one_per_collected_cube():
     assert reward.tolist() == [1.0]
     assert reward.dtype == torch.float64
     assert state.steps.tolist() == [1]
-    assert state.collected.tolist() == [[True, False, False]]
-    assert state.next_cube.tolist() == [1]
+    assert state.reached.tolist() == [[True, False, False]]
+    assert state.ahead.tolist() == [1]
     _, again = fly(state, 14.0, 1.0)
     assert again.tolist() == [0.0]
 
@@ -81,30 +82,28 @@ def test_contact_distance_is_exact(axis, sign):
     for distance, touches in ((1.65, True), (beyond(1.65), False)):
         cube = torch.zeros(1, 1, 3).double()
         cube[..., axis] = sign * distance
-        state = CollectCubes(SETTINGS).start(cube)
-        state, reward = CollectCubes(SETTINGS).step(state, body(0, 0, 0))
-        assert state.collected.item() == touches
+        state, reward = ONE.step(ONE.start(cube), body(0, 0, 0))
+        assert state.reached.item() == touches
         assert reward.item() == float(touches)
 
 
 def test_contact_needs_all_three_axes():
     corner = torch.tensor([[[1.6, -1.6, 1.6]]]).double()
-    assert CollectCubes(SETTINGS).step(CollectCubes(SETTINGS).start(corner), body(0, 0, 0))[1] == 1
+    assert ONE.step(ONE.start(corner), body(0, 0, 0))[1] == 1
     for axis in range(3):
         aside = corner.clone()
         aside[..., axis] *= 1.1
-        state = CollectCubes(SETTINGS).start(aside)
-        assert CollectCubes(SETTINGS).step(state, body(0, 0, 0))[1] == 0
+        assert ONE.step(ONE.start(aside), body(0, 0, 0))[1] == 0
 
 
 def test_a_touch_collects_what_stands_without_a_step():
     """Drones at (15, 0) and elsewhere: the first cube of the first environment, 1.65 m aside."""
-    task, height = CollectCubes(SETTINGS), SETTINGS.altitude
+    task, height = CollectCubes(TaskSettings(num_cubes=2)), SETTINGS.altitude
     state = task.start(torch.tensor([[[15.0, 1.65, height], [15.0, -1.0, height]]] * 2).double())
-    state.passed[0, 1] = True  # removed: it can't be touched
+    state.present[0, 1] = False  # removed: it can't be touched
     steps = state.steps.tolist()
     task.touch(state, torch.tensor([[15.0, 0.0, height], [15.0, 9.0, height]]).double())
-    assert state.collected.tolist() == [[True, False], [False, False]]
+    assert state.reached.tolist() == [[True, False], [False, False]]
     assert state.steps.tolist() == steps and state.end_reason.tolist() == [0, 0]
 
 
@@ -112,13 +111,13 @@ def test_reward_is_two_for_two_simultaneous_cubes():
     cubes = torch.tensor([[[1.0, 0.0, 0.0], [1.5, 0.0, 0.0], [1.7, 0.0, 0.0]]]).double()
     state, reward = CollectCubes(SETTINGS).step(CollectCubes(SETTINGS).start(cubes), body(0, 0, 0))
     assert reward.tolist() == [2.0] and reward.dtype == torch.float64
-    assert state.collected.tolist() == [[True, True, False]]
+    assert state.reached.tolist() == [[True, True, False]]
 
 
 def test_cube_is_passed_strictly_behind_the_drone():
     for x, passed in ((15.0, False), (beyond(15.0), True)):
-        state, _ = fly(at(5.0, 0.0), x, 0.0)
-        assert state.passed.tolist() == [[passed, False]]
+        state, _ = fly(at(5.0, 0.0, 0.0), x, 0.0)
+        assert state.present.tolist() == [[not passed, True, True]]
 
 
 def test_passed_cubes_are_removed_without_reward():
@@ -126,7 +125,6 @@ def test_passed_cubes_are_removed_without_reward():
     assert state.present.tolist() == [[True, True, True]]  # a cube next to the drone is not passed
     state, reward = fly(state, 16.0, 0.0)
     assert reward.item() == 0.0
-    assert state.passed.tolist() == [[True, False, False]]
     assert state.present.tolist() == [[False, True, True]]
     _, reward = fly(state, 16.0, 5.0)
     assert reward.item() == 0.0  # no reward for a removed cube
@@ -134,12 +132,12 @@ def test_passed_cubes_are_removed_without_reward():
 
 def test_side_is_recorded_when_the_cube_becomes_next():
     state = at(5.0, -5.0, 0.5)
-    assert state.side.tolist() == [[Side.LEFT, -1, -1]]
+    assert state.sides.tolist() == [[Side.LEFT, -1, -1]]
     state, _ = fly(state, 14.0, 5.0)  # collects the first; the second is 10 m to the right
-    assert state.side.tolist() == [[Side.LEFT, Side.RIGHT, -1]]
+    assert state.sides.tolist() == [[Side.LEFT, Side.RIGHT, -1]]
     state, _ = fly(state, 25.0, 1.0)  # passes the second
-    assert state.side.tolist() == [[Side.LEFT, Side.RIGHT, Side.AHEAD]]
-    assert state.lateral.tolist() == [[5.0, -10.0, -0.5]]  # meters to the left at that time
+    assert state.sides.tolist() == [[Side.LEFT, Side.RIGHT, Side.AHEAD]]
+    assert state.noted.tolist() == [[5.0, -10.0, -0.5]]  # meters to the left at that time
 
 
 def test_side_is_ahead_up_to_the_contact_distance():
@@ -147,7 +145,7 @@ def test_side_is_ahead_up_to_the_contact_distance():
         for sign in (1, -1):
             cubes = torch.tensor([[[15.0, sign * y, 0.0]]], dtype=torch.float64)
             mirrored = {Side.LEFT: Side.RIGHT, Side.AHEAD: Side.AHEAD}[side] if sign < 0 else side
-            assert CollectCubes(SETTINGS).start(cubes).side.tolist() == [[mirrored]]
+            assert ONE.start(cubes).sides.tolist() == [[mirrored]]
 
 
 def test_end_conditions_of_algorithm_3():
@@ -167,7 +165,7 @@ def test_end_conditions_of_algorithm_3():
 def test_first_of_simultaneous_end_conditions_counts(coinciding):
     all_cubes, front, side, limit = coinciding
     state = at(0.0, 0.0, 0.0)
-    state.collected[:] = all_cubes
+    state.reached[:] = all_cubes
     state.steps[:] = 299 if limit else 0
     ended, _ = fly(state, 45.0 if front else 0.0, 27.0 if side else 0.0)
     order = ("ALL_CUBES", "FRONT_BOUNDARY", "SIDE_BOUNDARY", "STEP_LIMIT")
@@ -179,12 +177,12 @@ def test_lost_drone_ends_only_its_own_episode():
     cubes = torch.zeros(2, 3, 3).double()
     cubes[..., 0] = 50.0
     state = CollectCubes(SETTINGS).start(cubes)
-    state.collected[:] = True
+    state.reached[:] = True
     body = Floating(FLIGHT, None).start(torch.zeros(2, 3).double())
     body.lost[1] = True
     ended, _ = CollectCubes(SETTINGS).step(state, body)
     assert ended.end_reason.tolist() == [CubesEnd.ALL_CUBES, CubesEnd.LOST_CONTROL]
-    state.collected[:] = False
+    state.reached[:] = False
     body.position[:, 1] = 1000.0
     ended, _ = CollectCubes(SETTINGS).step(state, body)
     assert ended.end_reason.tolist() == [CubesEnd.SIDE_BOUNDARY, CubesEnd.LOST_CONTROL]
@@ -221,8 +219,8 @@ TALL = TaskSettings(vertical_bound=6.0, altitude=10.0)  # out of bounds beyond 7
 def test_drones_without_moves_up_and_down_are_refused_if_cubes_are_out_of_reach():
     with pytest.raises(InputError, match=r"vertical_bound=6.0 puts cubes .* or actions=moves_3d"):
         Worlds(1, TALL)
-    CollectCubes(TALL).check_actions(MOVES_3D)
-    CollectCubes(SETTINGS).check_actions(ComputerVision().actions)
+    check_actions(CollectCubes(TALL), MOVES_3D)
+    check_actions(CollectCubes(SETTINGS), ComputerVision().actions)
 
 
 @pytest.mark.parametrize(
@@ -270,7 +268,7 @@ def test_info_matches_hand_computed_values():
     info = TWO_CUBES.info(state)
     assert info["cubes"].tolist() == [[0]] and info["next_cube"].tolist() == [[0]]
     assert info["side"].tolist() == [[1, -1]] and info["lateral"][0, 0] == 1.0
-    state.collected[0, 0] = True
+    state.reached[0, 0], state.present[0, 0] = True, False
     info = TWO_CUBES.info(state)
     assert info["cubes"].tolist() == [[1]] and info["next_cube"].tolist() == [[1]]
 
@@ -374,11 +372,11 @@ def test_elsewhere_places_cubes_at_valid_positions():
     task, camera = TaskSettings(vertical_bound=1.0, altitude=4.0), CameraSettings()
     state = CollectCubes(task).start(torch.zeros(400, 3, 3, dtype=torch.float64))
     state.drone[:] = torch.tensor([5.0, -2.0, 4.0])
-    state.collected[:, 0] = True
-    moved = CollectCubes(task).elsewhere(state, camera, torch.Generator().manual_seed(0))
-    assert moved.present.all() and state.collected[:, 0].all()
-    assert (moved.cubes[..., 0].diff(dim=1) >= 0).all()  # as in every state, the nearest first
-    ahead, aside, up = (moved.cubes - state.drone[:, None]).flatten(0, 1).unbind(-1)
+    state.reached[:, 0] = True
+    moved = CollectCubes(task).edits.elsewhere(state, camera, torch.Generator().manual_seed(0))
+    assert moved.present.all() and state.reached[:, 0].all()
+    assert (moved.places[..., 0].diff(dim=1) >= 0).all()  # as in every state, the nearest first
+    ahead, aside, up = (moved.places - state.drone[:, None]).flatten(0, 1).unbind(-1)
     nearest, edge = 1.65 + 2.5, math.tan(math.radians(camera.horizontal_fov / 2))
     assert nearest <= ahead.min() < nearest + 0.5 and 14.5 < ahead.max() <= 15.0
     slope = aside / ahead
@@ -392,34 +390,17 @@ def test_elsewhere_places_cubes_at_valid_positions():
 THREE_CUBES = CollectCubes()
 
 
-def test_passed_and_collected_cubes_are_absent():
-    """The first is collected and the second passed, so the third is next."""
-    info = {
-        "next_cube": torch.tensor([[2], [0]]),
-        "collected": torch.tensor([[True, False, False], [False] * 3]),
-        "cube_positions": torch.arange(18.0).view(2, 3, 3),
-    }
-    kept = THREE_CUBES.remember(info)
-    assert kept["present"].tolist() == [[False, False, True], [True] * 3]
-    assert kept["next_target"].tolist() == [2, 0]
-    body = BodyState.at_rest(torch.zeros(2, 3, dtype=torch.float64))
-    state = THREE_CUBES.recall({**kept, "step": torch.tensor([7, 0])}, body)
-    assert state.passed.tolist() == [[False, True, False], [False] * 3]
-    assert state.next_cube.tolist() == [2, 0] and state.steps.tolist() == [7, 0]
-    assert state.cubes.dtype == torch.float64 and not state.end_reason.any()
-
-
 def test_needed_action_and_stratum_follow_from_the_offset():
     """Flying straight ahead touches cubes within 1.65 m."""
     aside = torch.tensor([3.0, 1.6, -1.6, -3.0])
     offset = torch.stack([torch.full((4,), 9.0), aside, torch.zeros(4)], -1)
-    assert THREE_CUBES.needed(offset).tolist() == [
+    assert THREE_CUBES.edits.needed(offset).tolist() == [
         Move.LEFT,
         Move.FORWARD,
         Move.FORWARD,
         Move.RIGHT,
     ]
-    assert THREE_CUBES.stratum_at(offset).tolist() == [
+    assert THREE_CUBES.edits.stratum_at(offset).tolist() == [
         Side.LEFT,
         Side.AHEAD,
         Side.AHEAD,

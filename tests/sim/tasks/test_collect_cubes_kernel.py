@@ -11,22 +11,20 @@ from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.rendering.raytrace.structs_kernel import PoseArrays
 from drone_rl.sim.tasks import CollectCubes, Pillars
 from drone_rl.sim.tasks.collect_cubes import CubesEnd, Side
-from drone_rl.sim.tasks.collect_cubes_kernel import (
-    EnvArrays,
-    move,
-    place,
-)
+from drone_rl.sim.tasks.fused import fused_rules
+from drone_rl.sim.tasks.rules_kernel import Episodes, place
 from drone_rl.sim.worlds import Worlds
 
 start_warp("cpu")
 
 
 WORLDS = 60
+move = CollectCubes().rules.compiled.move
 
 
 @wp.kernel(enable_backward=False)
 def step(
-    envs: EnvArrays, poses: PoseArrays, actions: wp.array(dtype=int), rewards: wp.array(dtype=float)
+    envs: Episodes, poses: PoseArrays, actions: wp.array(dtype=int), rewards: wp.array(dtype=float)
 ) -> None:
     env = wp.tid()
     if envs.end_reasons[env] == 0:
@@ -47,7 +45,7 @@ def test_random_episodes_follow_the_reference_rules(settings, ends):
     task = TaskSettings(**settings)
     worlds, draws = Worlds(WORLDS, task), torch.Generator().manual_seed(0)
     worlds.reset(torch.arange(WORLDS), [RandomState(i) for i in range(WORLDS)])
-    fused = worlds.task.fused_rules(worlds.dynamics, WORLDS)
+    fused = fused_rules(worlds.task, worlds.dynamics, worlds.state)
     fused.begin(worlds.state)
     places = wp.to_torch(fused.poses.positions)
     state, going, seen = worlds.state, torch.arange(WORLDS), set()
@@ -65,9 +63,10 @@ def test_random_episodes_follow_the_reference_rules(settings, ends):
             torch.testing.assert_close(getattr(state, name), value, rtol=0, atol=0, equal_nan=True)
         assert torch.equal(rewards[going].double(), reward)
         assert torch.equal(wp.to_torch(fused.arrays.drones)[going], state.drone)
-        for name in ("collected", "passed", "side", "lateral"):
-            found, expected = getattr(fused.state, name)[going], getattr(state, name)
-            torch.testing.assert_close(found, expected, rtol=0, atol=0, equal_nan=True)
+        for name in ("reached", "sides", "noted"):
+            found = wp.to_torch(getattr(fused.arrays.world, name))[going]
+            torch.testing.assert_close(found, getattr(state, name), rtol=0, atol=0, equal_nan=True)
+        assert torch.equal(wp.to_torch(fused.arrays.world.objects.present)[going], state.present)
         assert torch.equal(fused.steps[going].long(), state.steps)
         assert torch.equal(fused.end_reasons[going].long(), state.end_reason)
         assert torch.equal(places[going, 1], state.drone.float())
@@ -82,11 +81,11 @@ def test_random_episodes_follow_the_reference_rules(settings, ends):
 def reference_step(settings, state, body):
     """Return the fields of the state after a step, and the reward."""
     drone = body.position
-    away = (drone[:, None] - state.cubes).abs().amax(-1)  # (N, C)
+    away = (drone[:, None] - state.places).abs().amax(-1)  # (N, C)
     touched = state.present & (away <= settings.touch_distance)
-    collected = state.collected | touched
-    passed = state.passed | (~collected & (drone[:, None, 0] > state.cubes[..., 0]))
-    side, lateral = sightings(settings, state, drone, ~(collected | passed))
+    collected = state.reached | touched
+    present = state.present & ~touched & (drone[:, None, 0] <= state.places[..., 0])
+    side, lateral = sightings(settings, state, drone, present)
     x, y, _ = drone.unbind(-1)
     reason = (
         torch.zeros_like(state.steps)
@@ -96,18 +95,18 @@ def reference_step(settings, state, body):
         .masked_fill(collected.all(-1), CubesEnd.ALL_CUBES)
         .masked_fill(body.is_lost, CubesEnd.LOST_CONTROL)
     )
-    new = {"collected": collected, "passed": passed, "side": side, "lateral": lateral}
+    new = {"reached": collected, "present": present, "sides": side.int(), "noted": lateral}
     return {**new, "end_reason": reason}, touched.sum(-1, dtype=torch.float64)
 
 
 def sightings(settings, state, drone, present):
     """Return side and lateral offset recorded for each cube up to the next one."""
-    offset = state.cubes[..., 1] - drone[:, None, 1]
+    offset = state.places[..., 1] - drone[:, None, 1]
     right = torch.where(offset < -settings.touch_distance, Side.RIGHT.value, Side.AHEAD.value)
     side = torch.where(offset > settings.touch_distance, Side.LEFT.value, right)
     next_cube = (~present).long().cumprod(-1).sum(-1)
-    is_new = (state.side < 0) & (torch.arange(side.shape[-1]) <= next_cube[:, None])
-    return torch.where(is_new, side, state.side), torch.where(is_new, offset, state.lateral)
+    is_new = (state.sides < 0) & (torch.arange(side.shape[-1]) <= next_cube[:, None])
+    return torch.where(is_new, side, state.sides), torch.where(is_new, offset, state.noted)
 
 
 class Windy(ComputerVision):
@@ -142,8 +141,10 @@ FLIGHT, VELOCITIES = DynamicsSettings(mode="simple_flight"), ActionSettings(kind
         (Strict, ComputerVision(), False),
         (Raised, ComputerVision(), False),
         (Solid, Quadrotor(FLIGHT), False),
-        (Pillars, ComputerVision(), False),
+        (Pillars, ComputerVision(), True),
+        (Pillars, Quadrotor(FLIGHT), False),
     ],
 )
 def test_only_unchanged_rules_and_moves_are_fused(task, dynamics, is_supported):
-    assert (task().fused_rules(dynamics, 1) is not None) == is_supported
+    worlds = Worlds(1, task(), dynamics=dynamics)
+    assert (fused_rules(worlds.task, dynamics, worlds.state) is not None) == is_supported

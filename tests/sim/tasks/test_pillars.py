@@ -11,14 +11,14 @@ from drone_rl.sim.actions import Move
 from drone_rl.sim.dynamics import BodyState, Quadrotor
 from drone_rl.sim.tasks.common import Side
 from drone_rl.sim.tasks.pillars import Pillars, PillarsEnd, RowGoals
-from drone_rl.sim.tasks.pillars_lanes import Lanes, meets
+from drone_rl.sim.tasks.pillars_lanes import Lanes
 from tests.fake_flight import FLIGHT, Floating
 
 
 @pytest.fixture
 def settings():
     """Return settings with rows of two pillars at x = 9 and 16 and the finish line at x = 20."""
-    return PillarsSettings(num_rows=2, density=0.125, width=1.2, collision_penalty=0.0)
+    return PillarsSettings(num_rows=2, density=0.125, width=1.2, reward={"progress": 1.0})
 
 
 @pytest.fixture
@@ -34,6 +34,9 @@ def field(settings):
 def body(x, y):
     """Return one drone at rest."""
     return BodyState.at_rest(torch.tensor([[x, y, 2.5]], dtype=torch.float64))
+
+
+TASK = Pillars(PillarsSettings(num_rows=2, density=0.125, width=1.2))
 
 
 L, A, R = Side.LEFT, Side.AHEAD, Side.RIGHT
@@ -54,8 +57,8 @@ def fly(settings, state, *places):
 
 def test_pillars_are_in_rows(field):
     state = field((5.0, -5.0), (1.0, 2.0))
-    assert state.pillars[0].tolist() == [[9, 5, 3], [9, -5, 3], [16, 1, 3], [16, 2, 3]]
-    assert state.present.all() and not state.touched.any() and not state.passed.any()
+    assert state.places[0].tolist() == [[9, 5, 3], [9, -5, 3], [16, 1, 3], [16, 2, 3]]
+    assert state.present.all() and not state.touched.any() and not state.reached.any()
 
 
 def test_reward_is_progress_as_a_fraction_of_the_path(settings, field):
@@ -74,7 +77,7 @@ def test_touching_a_pillar_ends_the_episode_with_a_penalty(settings, field):
     state, reward = fly(settings, field((0.9, -6.0), FAR, x=7.0), (8.0, 0.0))
     assert state.end_reason == PillarsEnd.PILLAR_TOUCHED and reward == 1 / 20
     assert state.touched[0].tolist() == [True, False, False, False]
-    penalized = settings.replace(collision_penalty=3.0)
+    penalized = settings.replace(reward={"progress": 1.0, "contact": -3.0})
     assert fly(penalized, field((0.9, -6.0), FAR, x=7.0), (8.0, 0.0))[1] == 1 / 20 - 3
 
 
@@ -84,12 +87,10 @@ def test_contact_distance_is_one_meter(settings, field):
         assert bool(state.touched.any()) is touches
 
 
-def test_long_moves_touch_pillars_on_their_path(settings):
-    pillars = torch.tensor([[[9.0, 0.0, 3.0]]]).double()
-
+def test_long_moves_touch_pillars_on_their_path(settings, field):
     def touches(x, y, to_x, to_y):
-        at = [torch.tensor([[a, b, 2.5]]).double() for a, b in ((x, y), (to_x, to_y))]
-        return bool(meets(settings.touch_distance, *at, pillars))
+        state, _ = fly(settings, field((0.0, 6.0), (6.0, 6.0), x=x, y=y), (to_x, to_y))
+        return bool(state.touched[0, 0])
 
     assert touches(0, 0, 20, 0) and touches(20, 0, 0, 0)
     assert touches(9, -5, 9, 5) and not touches(7.9, -5, 7.9, 5)
@@ -129,57 +130,60 @@ def test_lost_control_precedes_contact(settings, field):
     assert state.end_reason == PillarsEnd.LOST_CONTROL and state.touched.any()
 
 
+def next_row(state):
+    return int(TASK.info(state)["next_row"])
+
+
 def test_rows_are_passed_in_order(settings, field):
     state = field(FAR, FAR)
-    assert state.next_row == 0 and state.side[0].tolist() == [A, -1]
+    assert next_row(state) == 0 and state.sides[0].tolist() == [A, -1]
     state, _ = fly(settings, state, (10.0, 0.0))
-    assert state.next_row == 0  # still next to the row
+    assert next_row(state) == 0  # still next to the row
     state, _ = fly(settings, state, (10.1, 0.0))
-    assert state.next_row == 1 and state.side[0].tolist() == [A, A]
+    assert next_row(state) == 1 and state.sides[0].tolist() == [A, A]
     state, _ = fly(settings, state, (19.9, 0.0))
-    assert state.passed[0].tolist() == [True, False]  # the last one is passed at the finish line
+    assert state.reached[0].tolist() == [True, False]  # the last one is passed at the finish line
     state, _ = fly(settings, state, (20.0, 0.0))
-    assert state.passed.all() and state.next_row == 2
+    assert state.reached.all() and next_row(state) == 2
 
 
 def test_nearest_lane_has_a_side_and_a_gap(field):
     # the pillar at 0.9 blocks lanes 0 and 1; -1 is nearer than 2, between pillars at 0.9 and -6.0
     state = field((0.9, -6.0), FAR)
-    assert state.side[0, 0] == R
-    assert abs(float(state.gap[0, 0]) - (6.9 - 1.2)) < 1e-9
+    assert state.sides[0, 0] == R
+    assert abs(float(state.noted[0, 0]) - (6.9 - 1.2)) < 1e-9
     # the pillar at 0.0 blocks lanes -1, 0, 1; 2 and -2 are tied, and the narrower gap's center wins
     state = field((0.0, 5.0), FAR)
-    assert state.side[0, 0] == L and abs(float(state.gap[0, 0]) - 3.8) < 1e-9
+    assert state.sides[0, 0] == L and abs(float(state.noted[0, 0]) - 3.8) < 1e-9
     state = field((0.0, -5.0), FAR)
-    assert state.side[0, 0] == R
-    assert field((3.0, -3.0), FAR).side[0, 0] == A
+    assert state.sides[0, 0] == R
+    assert field((3.0, -3.0), FAR).sides[0, 0] == A
     # the field ends at 8, so a pillar at 7.5 leaves no lane on its left
-    assert field((7.5, 5.4), FAR, y=7.0).side[0, 0] == R
-
-
-TASK = Pillars()
+    assert field((7.5, 5.4), FAR, y=7.0).sides[0, 0] == R
 
 
 def test_next_target_is_the_nearest_pillar_of_the_next_row(field):
-    assert TASK.next_target(field((5.0, -2.0), FAR)) == 1
-    assert TASK.next_target(field((5.0, -2.0), FAR, y=4.0)) == 0
+    assert TASK.edits.next_target(field((5.0, -2.0), FAR)) == 1
+    assert TASK.edits.next_target(field((5.0, -2.0), FAR, y=4.0)) == 0
     state = field((5.0, -2.0), (1.0, 7.0))
-    state.passed[:, 0] = True
-    assert TASK.next_target(state) == 2
-    assert TASK.next_offset(state)[0].tolist() == [16.0, 1.0, 0.0]
-    state.passed[:] = True
-    assert TASK.next_target(state) == 4 and TASK.next_offset(state).isnan().all()
+    state.reached[:, 0] = True
+    TASK.look_ahead(state)
+    assert TASK.edits.next_target(state) == 2
+    assert TASK.edits.next_offset(state)[0].tolist() == [16.0, 1.0, 0.0]
+    state.reached[:] = True
+    TASK.look_ahead(state)
+    assert TASK.edits.next_target(state) == 4 and TASK.edits.next_offset(state).isnan().all()
 
 
 def test_absent_pillars_are_ignored(field):
-    state = TASK.without_next(field((5.0, -2.0), FAR))
+    state = TASK.edits.without_next(field((5.0, -2.0), FAR))
     assert state.present[0].tolist() == [True, False, True, True]
-    assert TASK.next_target(state) == 0
-    assert TASK.next_target(TASK.without_next(state)) == 4
+    assert TASK.edits.next_target(state) == 0
+    assert TASK.edits.next_target(TASK.edits.without_next(state)) == 4
 
 
 def test_grid_covers_the_field(settings):
-    grid = Pillars(settings).grid(3, 5)
+    grid = Pillars(settings).edits.grid(3, 5)
     assert grid.forward.tolist() == [1.5, 5.25, 9.0]
     assert grid.lateral.tolist() == [8.0, 4.0, 0.0, -4.0, -8.0]
 
@@ -187,7 +191,7 @@ def test_grid_covers_the_field(settings):
 def test_needed_action_turns_away_from_a_pillar_ahead(settings):
     lateral = torch.tensor([3.0, 1.1, 1.0, 0.5, -0.5, -1.0, -1.1])
     offset = torch.stack([torch.full_like(lateral, 5.0), lateral, torch.zeros(7)], -1)
-    task = Pillars(settings)
+    task = Pillars(settings).edits
     f, left, right = Move.FORWARD, Move.LEFT, Move.RIGHT
     assert task.needed(offset).tolist() == [f, f, right, right, left, left, f]
     a, le, r = Side.AHEAD, Side.LEFT, Side.RIGHT
@@ -195,7 +199,7 @@ def test_needed_action_turns_away_from_a_pillar_ahead(settings):
 
 
 def test_pillar_is_reached_when_passed_untouched(settings, field):
-    task, target = Pillars(settings), torch.tensor([0])
+    task, target = Pillars(settings).edits, torch.tensor([0])
     state = field((5.0, -5.0), (5.0, -5.0), x=9.0)
     assert not task.is_behind(state, target) and not task.is_reached(state, target)
     state.body = body(9.5, 0.0)
@@ -324,7 +328,7 @@ def test_open_rows_are_kept_and_fields_are_seeded():
 
 
 def test_the_nearest_lane_of_a_drone_between_lanes_is_one_of_the_field():
-    """No lane a whole number of steps from y = 0.5 m is open; that at 0 m is."""
-    rows, y = torch.tensor([[-1.5, 1.5]]).double(), torch.tensor([0.5]).double()
-    offset, _ = NARROW_LANES.nearest(rows, y)
-    assert offset.tolist() == [-0.5]
+    """No lane a whole number of steps from y = 0.6 m is open; that at 0 m is, to the right."""
+    task = Pillars(NARROW.replace(num_rows=1))
+    state = task.start(torch.tensor([[[-1.5, 1.5]]]).double(), body(0.0, 0.6))
+    assert state.sides.tolist() == [[R]] and state.noted.tolist() == [[pytest.approx(1.8)]]

@@ -95,9 +95,8 @@ def test_base_class_has_defaults():
     assert task.score(one).world.shape == (3, 1)  # of a single number
     (by, value, of) = next(iter(task.classes(goals)))
     assert (by, value) == ("side", "anywhere") and of.all()
-    assert task.vocabulary.goals == "goals" and task.fused_rules(task.make_dynamics(), 3) is None
-    with pytest.raises(InputError, match="task=minimal cannot be explained; define next_target in"):
-        task.next_target(env.worlds.state)
+    assert task.vocabulary.goals == "goals"
+    assert task.edits is None
     env.close()
 
 

@@ -83,7 +83,7 @@ def test_random_walks_on_the_lattice():
             state, _ = CollectCubes(TASK).step(state, body)
             boxes = np.stack([y, np.nextafter(y, 9)], -1)[None]
             ((place, _),) = moves(place, action, boxes, lattice).items()
-            collected = sum(int(c) << k for k, c in enumerate(state.collected[0]))
+            collected = sum(int(c) << k for k, c in enumerate(state.reached[0]))
             assert place.collected == collected
             ending = lattice.ending(place)
             assert (0 if ending is None else ending.reason) == int(state.end_reason)
@@ -143,13 +143,13 @@ def test_random_walks_on_the_graph(settings):
     for _ in range(settings.step_limit - 1):
         shown = every[node]
         assert torch.allclose(shown.drone, state.drone, atol=1e-12, rtol=0)
-        for name in ("cubes", "collected", "passed", "next_cube", "end_reason"):
+        for name in ("places", "reached", "present", "end_reason"):
             assert torch.equal(getattr(shown, name), getattr(state, name)), name
         action = torch.from_numpy(random.choice(3, len(state), p=[0.4, 0.35, 0.25]))
         state, _ = CollectCubes(settings).step(state, dynamics.step(state.body, action))
         assert torch.equal(graph.reason[node, action], state.end_reason)
         collected = (graph.collected[node, action][:, None] >> bit & 1).bool()
-        assert torch.equal(collected, state.collected)
+        assert torch.equal(collected, state.reached)
         ends += torch.bincount(state.end_reason, minlength=5)
         going = state.end_reason == 0
         node, state = graph.target[node, action][going], state[going]

@@ -12,6 +12,7 @@ from drone_rl.config.task import TASKS, BaseTaskSettings
 from drone_rl.sim.tasks import as_task
 from drone_rl.sim.tasks.task import MAKERS
 from drone_rl.sim.worlds import Worlds
+from drone_rl.training.metrics import batch_metrics
 from tests.acceleration.test_fused_episodes import make
 
 FORWARD, LEFT, RIGHT = 0, 1, 2
@@ -146,6 +147,12 @@ def test_objects_without_room_are_named():
         task.sample(np.random.RandomState(0))
 
 
+@reward("test_velocity")
+def sideways(step: Step) -> float:
+    """Metres a second to the left."""
+    return step.velocity[1]
+
+
 @reward("test_undefined")
 def undefined(step: Step) -> float:
     """Not finite."""
@@ -166,11 +173,30 @@ def test_unusable_terms_are_named(term):
 
 @pytest.mark.parametrize("objects", [{"ball": {**BALL, "y": [-3.0, 3.0]}, "post": POST}])
 def test_fused_episodes_are_the_stepped_ones(objects):
-    task = BaseTaskSettings.read({"name": "test_reach", "objects": objects})
+    rewards = {"progress": 0.5, "contact": -1.0, "test_velocity": 0.1}
+    task = BaseTaskSettings.read({"name": "test_reach", "objects": objects, "reward": rewards})
     collectors = [make(task=task, num_envs=32, compiled=fused) for fused in (True, False)]
     assert isinstance(collectors[0].fused, FusedEpisodes)
     with set_exploration_type(ExplorationType.DETERMINISTIC):
         one, other = (collector.collect() for collector in collectors)
-    for key in ("pixels", "action", ("next", "reward"), ("next", "info", "end_reason")):
+    info = ("next", "info")
+    for key in ("pixels", "action", ("next", "reward"), (*info, "end_reason"), (*info, "paid")):
         assert torch.equal(one[key], other[key]), key
     assert len(one["next", "info", "end_reason"].unique()) > 2
+    logged = batch_metrics(one, terms=as_task(task).reward_terms)
+    sums = [logged[f"reward/{name}"] for name in rewards]
+    assert sum(sums) == pytest.approx(logged["train/reward"], abs=1e-5)
+    shares = [logged[f"reward_share/{name}"] for name in rewards]
+    assert sum(shares) == pytest.approx(1.0) and min(shares) > 0.0
+
+
+def test_velocity_of_a_move_is_its_length_over_the_steps_time():
+    made = worlds(reward={"test_velocity": 1.0})
+    assert fly(made, FORWARD, LEFT, RIGHT)[0] == pytest.approx([0.0, 10.0, -10.0])
+
+
+def test_fused_episodes_name_unusable_terms():
+    task = BaseTaskSettings.read({"name": "test_reach", "reward": {"test_undefined": 1.0}})
+    collector = make(task=task, num_envs=4, compiled=True)
+    with pytest.raises(InputError, match="undefined"):
+        collector.collect()

@@ -7,13 +7,16 @@ from typing import Any
 
 import warp as wp
 
+from drone_rl.config.terms import Term
+from drone_rl.sim.dynamics.flight_kernel import four, three
 from drone_rl.sim.dynamics.moves_kernel import Fleet, camera_attitude, fly_move, is_flying, is_lost
-from drone_rl.sim.dynamics.state import VELOCITY
+from drone_rl.sim.dynamics.rigid_body_kernel import axes_of
+from drone_rl.sim.dynamics.state import ATTITUDE, VELOCITY
 from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, PoseArrays
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
-from drone_rl.sim.terms.step_kernel import Motion, Step, World, observe
-from drone_rl.sim.terms.terms import Term
+from drone_rl.sim.tasks.geometry_kernel import NOTHING
+from drone_rl.sim.tasks.step_kernel import Motion, Step, World, choose_nearest, see, touch_solid
 from drone_rl.utils.errors import InputError
 
 _OPTIONS = {"enable_backward": False, "fuse_fp": False}
@@ -41,40 +44,53 @@ class Episodes:
     end_reasons: wp.array[int]
 
 
+@wp.func
+def _exact(numbers: wp.array[wp.float64], i: int) -> wp.float64:
+    return numbers[i]
+
+
+@wp.func
+def _rounded(numbers: wp.array[wp.float64], i: int) -> float:
+    return float(numbers[i])
+
+
 def bound(term: Term, first: int) -> Any:  # noqa: C901 (functions that Warp compiles)
     """Return a term as a Warp function of a step and all parameters; its own begin at `first`."""
     function = wp.func(term.function)
     count = len(term.parameters)
+    read = _exact if term.is_exact else _rounded
 
     if count == 0:
 
         @wp.func
-        def call(step: Step, p: wp.array[float]):  # noqa: ANN202 (a number or a truth value)
+        def call(step: Step, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
             return function(step)
 
     elif count == 1:
 
         @wp.func
-        def call(step: Step, p: wp.array[float]):  # noqa: ANN202 (a number or a truth value)
-            return function(step, p[first])
+        def call(step: Step, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
+            return function(step, read(p, first))
 
     elif count == 2:
 
         @wp.func
-        def call(step: Step, p: wp.array[float]):  # noqa: ANN202 (a number or a truth value)
-            return function(step, p[first], p[first + 1])
+        def call(step: Step, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
+            return function(step, read(p, first), read(p, first + 1))
 
     elif count == 3:
 
         @wp.func
-        def call(step: Step, p: wp.array[float]):  # noqa: ANN202 (a number or a truth value)
-            return function(step, p[first], p[first + 1], p[first + 2])
+        def call(step: Step, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
+            return function(step, read(p, first), read(p, first + 1), read(p, first + 2))
 
     else:
 
         @wp.func
-        def call(step: Step, p: wp.array[float]):  # noqa: ANN202 (a number or a truth value)
-            return function(step, p[first], p[first + 1], p[first + 2], p[first + 3])
+        def call(step: Step, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
+            return function(
+                step, read(p, first), read(p, first + 1), read(p, first + 2), read(p, first + 3)
+            )
 
     return call
 
@@ -115,33 +131,68 @@ def _no_end(world: World, step: Step) -> int:
 
 
 @functools.cache
-def make_rules(rewards: tuple[Term, ...], ends: tuple[Term, ...], success: Term) -> "Rules":
-    """Return the rules of a task; compiled when they are first used."""
-    return Rules(rewards, ends, success)
+def make_rules(
+    rewards: tuple[Term, ...],
+    ends: tuple[Term, ...],
+    success: Term,
+    *,
+    touch: Any = touch_solid,
+    choose: Any = choose_nearest,
+    success_first: bool = False,
+) -> "Rules":
+    """Return the rules of a task; compiled when they are first used.
+
+    Args:
+        rewards: Terms of the reward.
+        ends: Reasons to end an episode; earlier ones precede later ones, and success.
+        success: The meaning of success.
+        touch: Rule of contact, see `touch_solid`.
+        choose: Rule of what is ahead, see `choose_nearest`.
+        success_first: Whether success precedes the other ends.
+    """
+    return Rules(rewards, ends, success, touch, choose, success_first)
 
 
 class Rules:
     """Kernel of single steps, and functions for the fused episode kernel; see `make_rules`."""
 
     def __init__(  # noqa: C901 (functions that Warp compiles)
-        self, rewards: tuple[Term, ...], ends: tuple[Term, ...], success: Term
+        self,
+        rewards: tuple[Term, ...],
+        ends: tuple[Term, ...],
+        success: Term,
+        touch: Any,
+        choose: Any,
+        success_first: bool,
     ) -> None:
         """Fold the terms into one function."""
+        self.terms = (*rewards, *ends, success)
+        self.rewards = rewards
         first, pay, find = 0, _no_reward, _no_end
         for number, term in enumerate(rewards):
             pay = _added(pay, bound(term, first), number)
             first += len(term.parameters)
-        for number, term in enumerate(ends):
-            find = _checked(find, bound(term, first), SUCCESS + 1 + number)
+        firsts, numbers = [], [*range(SUCCESS + 1, SUCCESS + 1 + len(ends)), SUCCESS]
+        for term in (*ends, success):
+            firsts.append(first)
             first += len(term.parameters)
-        find = _checked(find, bound(success, first), SUCCESS)
+        order = [*range(len(ends)), len(ends)]
+        for i in [order[-1], *order[:-1]] if success_first else order:
+            find = _checked(find, bound((*ends, success)[i], firsts[i]), numbers[i])
         step_limit = SUCCESS + 1 + len(ends)
         lost_control = step_limit + 1
 
         @wp.func
         def advance(world: World, env: int, motion: Motion) -> wp.float64:
             """Apply all rules; write the end reason and return the reward."""
-            step = observe(world, env, motion)
+            axes = axes_of(motion.attitude)
+            step = see(
+                world,
+                env,
+                motion,
+                axes,
+                choose(world, env, motion, axes, touch(world, env, motion)),
+            )
             reward = pay(world, env, step)
             end = int(find(world, step))
             if end == 0 and world.steps[env] >= world.step_limit:
@@ -154,20 +205,30 @@ class Rules:
         @wp.kernel(module="unique", module_options=_OPTIONS)
         def step_all(
             world: World,
+            is_start: bool,
             before: wp.array[wp.vec3d],
             now: wp.array[wp.vec3d],
             velocity: wp.array[wp.vec3],
             attitude: wp.array[wp.vec4],
             is_lost: wp.array[wp.bool],
+            thing: wp.array[int],
             action: wp.array[wp.vec4],
             rewards: wp.array[wp.float64],
         ) -> None:
-            """Apply all rules to environments, a thread each."""
+            """Apply all rules to environments, a thread each; at a start only choose a goal."""
             env = wp.tid()
-            motion = Motion(
-                before[env], now[env], velocity[env], attitude[env], is_lost[env], action[env]
-            )
-            rewards[env] = advance(world, env, motion)
+            motion = Motion()
+            motion.before = before[env]
+            motion.now = now[env]
+            motion.attitude = attitude[env]
+            if is_start:
+                choose(world, env, motion, axes_of(motion.attitude), Step())
+            else:
+                motion.velocity = velocity[env]
+                motion.is_lost = is_lost[env]
+                motion.thing = thing[env]
+                motion.action = action[env]
+                rewards[env] = advance(world, env, motion)
 
         @wp.func
         def move(envs: Episodes, env: int, action: int) -> float:
@@ -175,11 +236,12 @@ class Rules:
             motion = Motion()
             motion.before = envs.drones[env]
             motion.action = envs.speeds[action]
+            motion.thing = NOTHING
             if is_flying(envs.fleet):
                 motion.now = fly_move(envs.fleet, env, action)
                 motion.is_lost = is_lost(envs.fleet, env)
-                motion.attitude = fleet_attitude(envs.fleet, env)
-                motion.velocity = fleet_velocity(envs.fleet, env)
+                motion.attitude = four(envs.fleet.numbers, env, ATTITUDE)
+                motion.velocity = three(envs.fleet.numbers, env, VELOCITY)
             else:
                 motion.now = motion.before + envs.moves[action]
                 motion.attitude = envs.attitudes[env]
@@ -187,7 +249,6 @@ class Rules:
             return float(advance(envs.world, env, motion))
 
         self.step_all, self.move = step_all, move
-        self._terms = (*rewards, *ends, success)
 
     @functools.cache  # noqa: B019 (rules are kept for ever, see `make_rules`)
     def load(self) -> None:
@@ -200,7 +261,7 @@ class Rules:
         try:
             wp.load_module(self.step_all.module, device="cpu")
         except Exception as error:
-            raise InputError(_compile_error(str(error), self._terms)) from error
+            raise InputError(_compile_error(str(error), self.terms)) from error
 
 
 def _compile_error(text: str, terms: Iterable[Term]) -> str:
@@ -212,21 +273,6 @@ def _compile_error(text: str, terms: Iterable[Term]) -> str:
         return f"the terms {names} can't be compiled by Warp ({reason}); correct them"
     function, file, line = places[-1]
     return f"line {line} of {file}: {function} can't be compiled by Warp ({reason}); correct it"
-
-
-@wp.func
-def fleet_attitude(fleet: Fleet, env: int) -> wp.vec4:
-    """Return the attitude of a drone in flight."""
-    numbers = fleet.numbers[env]
-    return wp.vec4(float(numbers[3]), float(numbers[4]), float(numbers[5]), float(numbers[6]))
-
-
-@wp.func
-def fleet_velocity(fleet: Fleet, env: int) -> wp.vec3:
-    """Return the velocity of a drone in flight, world frame."""
-    numbers = fleet.numbers[env]
-    x, y, z = numbers[VELOCITY], numbers[VELOCITY + 1], numbers[VELOCITY + 2]
-    return wp.vec3(float(x), float(y), float(z))
 
 
 @wp.func

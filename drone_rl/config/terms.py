@@ -15,6 +15,8 @@ import inspect
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, TypeVar
 
+from pydantic import BeforeValidator
+
 from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.plugins import place_of
 from drone_rl.utils.schema import Real, shown
@@ -30,21 +32,59 @@ class TermSettings(Settings):
     """The numbers of a term: its parameters, and the weight of a reward."""
 
 
+class RewardSettings(TermSettings):
+    """The numbers of a reward term; `drone-rl terms` lists all terms."""
+
+    weight: Number = 1.0
+    """Factor of the term's values."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Term:
     """A registered term."""
 
     name: str
-    function: Callable[..., Any]
-    """Maps a `Step` and the parameters to a number, or to whether an episode ends."""
+    function: Callable[..., Any] | None
+    """Maps a `Step` and the parameters to a number, or to whether an episode ends.
+
+    None until the module of a shipped term is imported, so that settings need no simulator.
+    """
     settings: type[TermSettings]
     parameters: tuple[str, ...]
     """Names of the parameters, in order."""
+    is_exact: bool
+    """Whether the parameters are `wp.float64` and not `float`."""
+
+    @classmethod
+    def of(cls, name: str, function: Callable[..., Any], **own: float) -> "Term":
+        """Return a function as a term; see `Terms.register`."""
+        _, *rest = inspect.signature(function).parameters.values()
+        if len(rest) > MOST_PARAMETERS:
+            raise InputError(
+                f"{place_of(function)} has {len(rest)} parameters besides the step; give at "
+                f"most {MOST_PARAMETERS}"
+            )
+        for parameter in rest:
+            if not isinstance(parameter.default, int | float):
+                raise InputError(
+                    f"{place_of(function)}: the parameter {parameter.name} has no number as "
+                    f"default; write {parameter.name}: float = 1.0"
+                )
+        settings = _settings_class(name, {**own, **{p.name: float(p.default) for p in rest}})
+        is_exact = any("float64" in str(p.annotation) for p in rest)
+        return cls(name, function, settings, tuple(p.name for p in rest), is_exact)
 
     @property
     def meaning(self) -> str:
         """First paragraph of the function's docstring."""
         return about(self.function)  # pyright: ignore[reportArgumentType] (of any object)
+
+
+def _settings_class(name: str, numbers: Mapping[str, float]) -> type[TermSettings]:
+    hints = dict.fromkeys(numbers, Number)
+    members = {"__annotations__": hints, "__module__": __name__, **numbers}
+    base = RewardSettings if "weight" in numbers else TermSettings
+    return type(f"{name}_settings", (base,), members)
 
 
 class Terms:
@@ -54,6 +94,11 @@ class Terms:
         """Begin without terms; `kind` is the name of the decorator."""
         self.kind, self.by_name = kind, dict[str, Term]()
 
+    @property
+    def registry(self) -> dict[str, type[TermSettings]]:
+        """Settings of each term by its name."""
+        return {name: term.settings for name, term in self.by_name.items()}
+
     def register(self, name: str, **own: float) -> Callable[[F], F]:
         """Return a decorator that registers a function; `own` are numbers that are not arguments.
 
@@ -62,24 +107,21 @@ class Terms:
         """
 
         def decorate(function: F) -> F:
-            _, *rest = inspect.signature(function).parameters.values()
-            if len(rest) > MOST_PARAMETERS:
-                raise InputError(
-                    f"{place_of(function)} has {len(rest)} parameters besides the step; give at "
-                    f"most {MOST_PARAMETERS}"
-                )
-            for parameter in rest:
-                if not isinstance(parameter.default, int | float):
-                    raise InputError(
-                        f"{place_of(function)}: the parameter {parameter.name} has no number as "
-                        f"default; write {parameter.name}: float = 1.0"
-                    )
-            numbers = {**own, **{p.name: float(p.default) for p in rest}}
-            hints = dict.fromkeys(numbers, Number)
-            members = {"__annotations__": hints, "__module__": __name__, **numbers}
-            settings: Any = type(f"{name}_settings", (TermSettings,), members)
-            names = tuple(p.name for p in rest)
-            self.by_name[name] = Term(name, function, settings, names)
+            self.by_name[name] = Term.of(name, function, **own)
+            return function
+
+        return decorate
+
+    def declare(self, name: str, weight: float, **parameters: float) -> None:
+        """Register a shipped term whose function `implement` adds."""
+        settings = _settings_class(name, {"weight": weight, **parameters})
+        self.by_name[name] = Term(name, None, settings, tuple(parameters), is_exact=False)
+
+    def implement(self, name: str) -> Callable[[F], F]:
+        """Return a decorator that adds the function of a declared term."""
+
+        def decorate(function: F) -> F:
+            self.by_name[name] = dataclasses.replace(self.by_name[name], function=function)
             return function
 
         return decorate
@@ -110,6 +152,24 @@ class Terms:
 
 
 REWARDS, ENDS, SUCCESSES = Terms("reward"), Terms("end"), Terms("success")
+for _name, _weight in {
+    "progress": 1.0,
+    "reached": 1.0,
+    "contact": -1.0,
+    "time": -0.01,
+    "control": -0.01,
+    "smoothness": -0.01,
+    "facing": 0.01,
+}.items():
+    REWARDS.declare(_name, _weight)
+REWARDS.declare("altitude", -0.01, height=2.5)
+_Read = dict[str, TermSettings]
+Rewards = Annotated[_Read, REWARDS, BeforeValidator(REWARDS.read)]
+"""Terms of a reward by name, each with a weight and parameters of its own."""
+Ends = Annotated[_Read, ENDS, BeforeValidator(ENDS.read)]
+"""Reasons to end an episode, by name."""
+Success = Annotated[_Read, SUCCESSES, BeforeValidator(SUCCESSES.read)]
+"""A meaning of success, by name."""
 
 
 def reward(name: str, weight: float = 1.0) -> Callable[[F], F]:

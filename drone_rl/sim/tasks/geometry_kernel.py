@@ -3,8 +3,6 @@
 All functions are of one environment. Lengths in metres, world frame, in float64.
 """
 
-from typing import Any
-
 import warp as wp
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -44,8 +42,6 @@ class Nearest:
 
     distance: wp.float64
     """To its surface; negative inside."""
-    normal: wp.vec3d
-    """Unit vector out of the surface, towards the point from outside."""
     thing: int
     """Number of the object, or `NOTHING`."""
 
@@ -65,25 +61,9 @@ def distance_to(shape: int, size: wp.vec3d, away: wp.vec3d) -> wp.float64:
 
 
 @wp.func
-def normal_of(shape: int, size: wp.vec3d, away: wp.vec3d) -> wp.vec3d:
-    """Return the outward normal of the surface point that is nearest to a point."""
-    step = wp.float64(1.0e-6)
-    slope = wp.vec3d()
-    for axis in range(3):
-        ahead = wp.vec3d(away)
-        behind = wp.vec3d(away)
-        ahead[axis] = ahead[axis] + step
-        behind[axis] = behind[axis] - step
-        slope[axis] = distance_to(shape, size, ahead) - distance_to(shape, size, behind)
-    if wp.length(slope) == wp.float64(0.0):
-        return wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(1.0))
-    return wp.normalize(slope)
-
-
-@wp.func
 def nearest(objects: Objects, env: int, point: wp.vec3d, role: int) -> Nearest:
     """Return the nearest present object of a role; at an infinite distance if there is none."""
-    found = Nearest(wp.float64(wp.inf), wp.vec3d(), int(NOTHING))
+    found = Nearest(wp.float64(wp.inf), int(NOTHING))
     for i in range(objects.shapes.shape[0]):
         if objects.roles[i] == role and objects.present[env, i]:
             away = point - objects.places[env, i]
@@ -91,10 +71,6 @@ def nearest(objects: Objects, env: int, point: wp.vec3d, role: int) -> Nearest:
             if distance < found.distance:
                 found.distance = distance
                 found.thing = i
-    if found.thing != NOTHING:
-        i = found.thing
-        away = point - objects.places[env, i]
-        found.normal = normal_of(objects.shapes[i], objects.sizes[i], away)
     return found
 
 
@@ -135,17 +111,3 @@ def sweep(
         else:
             high = middle
     return high
-
-
-@wp.kernel
-def _query(
-    objects: Objects, points: wp.array2d[wp.vec3d], role: int, found: wp.array2d[Nearest]
-) -> None:
-    """Answer queries, a thread for each point of each environment."""
-    env, i = wp.tid()
-    found[env, i] = nearest(objects, env, points[env, i], role)
-
-
-def query(objects: Any, points: Any, role: int, found: Any) -> None:
-    """Write `nearest` of points, (N, K), to an array of `Nearest`."""
-    wp.launch(_query, points.shape, inputs=[objects, points, role, found], device="cpu")

@@ -2,10 +2,8 @@
 
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator
-
 from drone_rl.config.task import BaseTaskSettings, Color, ObjectRegion
-from drone_rl.sim.terms.terms import ENDS, REWARDS, SUCCESSES, Terms, TermSettings
+from drone_rl.config.terms import Ends, Rewards, Success
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import OneOf, Real, Several, Span, Whole
 from drone_rl.utils.settings import Settings
@@ -78,10 +76,6 @@ class StartSettings(Settings):
         return value if isinstance(value, tuple) else (value, value)
 
 
-def _terms(of: Terms) -> Any:
-    return Annotated[dict[str, TermSettings], BeforeValidator(of.read)]
-
-
 class TermTaskSettings(BaseTaskSettings):
     """A task of terms; `drone_rl.define_task` gives one a name. Lengths in metres."""
 
@@ -89,11 +83,11 @@ class TermTaskSettings(BaseTaskSettings):
     """Objects by name; those placed later keep away from earlier ones."""
     start: StartSettings = StartSettings()
     """Where the drone starts."""
-    reward: _terms(REWARDS) = {}  # pyright: ignore[reportInvalidTypeForm] (made by a function)
+    reward: Rewards = {}
     """Terms of the reward by name, each with a weight and parameters of its own."""
-    end: _terms(ENDS) = {}  # pyright: ignore[reportInvalidTypeForm]
+    end: Ends = {}
     """Reasons to end an episode, by name; earlier ones precede later ones and success."""
-    success: _terms(SUCCESSES) = {}  # pyright: ignore[reportInvalidTypeForm]
+    success: Success = {}
     """The one meaning of success, by name."""
     margin: Annotated[float, Real(0.0, 1000.0, unit="m")] = 10.0
     """How far outside the region of starts and objects the bounds are."""

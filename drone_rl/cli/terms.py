@@ -1,0 +1,42 @@
+"""`drone-rl terms`: list the terms that tasks can name."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from drone_rl.cli.policies import NO_RUN_FOLDER
+from drone_rl.cli.settings import CommandSettings
+from drone_rl.config.terms import ENDS, REWARDS, SUCCESSES, Terms
+from drone_rl.utils.display import aligned
+
+
+class TermsCommand(CommandSettings):
+    """List the terms of rewards, ends and success that tasks can name.
+
+    Those of your own are listed with plugins=FILE. A weight or parameter is set by
+    task.reward.NAME.weight=-0.3, and likewise task.end and task.success.
+    """
+
+    @classmethod
+    def prepare(cls, overrides: Sequence[str]) -> list[str]:
+        """Return the command line of a command that writes no files."""
+        return [*super().prepare(overrides), *NO_RUN_FOLDER]
+
+    def run(self, folder: Path) -> tuple[int, None]:
+        """List the terms; return the exit status."""
+        from drone_rl.sim import tasks as tasks  # registers the shipped ones; imports torch
+
+        for terms in (REWARDS, ENDS, SUCCESSES):
+            print(f"task.{terms.kind}", aligned(_rows(terms)), "", sep="\n")
+        return 0, None
+
+
+def _rows(terms: Terms) -> list[list[str]]:
+    """Return the name of each term, its weight and parameters by default, and its meaning."""
+    return [
+        [
+            f"  {term.name}",
+            ", ".join(f"{name}={value:g}" for name, value in term.settings()),
+            term.meaning,
+        ]
+        for term in terms.by_name.values()
+    ]

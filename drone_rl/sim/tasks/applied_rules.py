@@ -1,0 +1,171 @@
+"""Rules of tasks of objects with their numbers, applied to states."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import torch
+import warp as wp
+from torch import Tensor
+
+from drone_rl.config.term_task import ROLES, SHAPES, ObjectSettings
+from drone_rl.config.terms import REWARDS, Term, TermSettings
+from drone_rl.sim.dynamics import Dynamics, FlightState
+from drone_rl.sim.rendering.devices import on_torch_stream, start_warp
+from drone_rl.sim.tasks.geometry_kernel import NOTHING, Objects
+from drone_rl.sim.tasks.rules_kernel import Rules
+from drone_rl.sim.tasks.step_kernel import World
+from drone_rl.utils.errors import InputError
+
+SECONDS = 0.1
+"""Duration of a step of dynamics without time."""
+
+
+class AppliedRules:
+    """Compiled rules, and the constants that they read."""
+
+    def __init__(
+        self,
+        rules: Rules,
+        *,
+        rewards: Mapping[str, TermSettings],
+        parameters: Sequence[float] = (),
+        numbers: Sequence[float] = (),
+        low: Sequence[float] = (-torch.inf,) * 3,
+        high: Sequence[float] = (torch.inf,) * 3,
+    ) -> None:
+        """Take rules and their numbers.
+
+        Args:
+            rules: The compiled rules.
+            rewards: Settings of their reward terms.
+            parameters: Of their ends and success, in order.
+            numbers: Of their rules of contact and of what is ahead.
+            low: Least coordinates within the task's bounds, metres.
+            high: Largest ones.
+        """
+        self.compiled = rules
+        own = [getattr(rewards[t.name], n) for t in rules.rewards for n in t.parameters]
+        weights: list[Any] = [rewards[term.name] for term in rules.rewards]
+        self._lists = [[float(of.weight) for of in weights], [*own, *parameters], [*numbers]]
+        self._bounds = wp.vec3d(*low), wp.vec3d(*high)
+        self._arrays = dict[str, tuple[Any, ...]]()
+
+    def bind(self, objects: Sequence[ObjectSettings], settings: Any) -> None:
+        """Take the P objects, and settings with `drone_size` and `step_limit`."""
+        self._objects, self._settings = objects, settings
+
+    def begin(self, state: Any) -> None:
+        """Choose what is ahead in states, `ObjectState`, in place."""
+        self._run(state, state.drone, torch.zeros_like(state.action), None, is_start=True)
+
+    def step(self, state: Any, before: Tensor, speeds: Tensor, dynamics: Dynamics | None) -> Tensor:
+        """Write states after drones have moved, and return the rewards.
+
+        Args:
+            state: States, `ObjectState`, whose drones have moved, with contiguous tensors.
+            before: Where the drones were, metres. Shape: (N, 3).
+            speeds: See `Step.action`. Shape: (N, 4).
+            dynamics: What moved the drones; None for moves that are done at once.
+
+        Raises:
+            InputError: A reward term is not finite.
+        """
+        rewards = self._run(state, before, speeds, dynamics, is_start=False)
+        self.check(state.paid)
+        return rewards
+
+    def _run(
+        self,
+        state: Any,
+        before: Tensor,
+        speeds: Tensor,
+        dynamics: Dynamics | None,
+        *,
+        is_start: bool,
+    ) -> Tensor:
+        body = state.body
+        device = state.places.device
+        start_warp(str(device))
+        count = len(state)
+        steps, end_reasons = state.steps.int(), state.end_reason.int()
+        rewards = torch.empty(count, dtype=torch.float64, device=device)
+        flown = isinstance(body, FlightState)
+        thing = body.contact.thing if flown else torch.full_like(state.steps, NOTHING)
+        inputs = [
+            self.world(state, steps, end_reasons, dynamics),
+            is_start,
+            _warp(before.double(), wp.vec3d),
+            _warp(body.position.double(), wp.vec3d),
+            _warp(body.velocity.float(), wp.vec3),
+            _warp(body.attitude.float(), wp.vec4),
+            _warp(body.is_lost),
+            _warp(thing.int()),
+            _warp(speeds.float(), wp.vec4),
+            _warp(rewards),
+        ]
+        with on_torch_stream(device):
+            wp.launch(self.compiled.step_all, count, inputs=inputs, device=str(device))
+        state.steps[:], state.end_reason[:] = steps, end_reasons
+        return rewards
+
+    def check(self, paid: Tensor) -> None:
+        """Raise an `InputError` that names the terms whose sums, (N, R), are not finite."""
+        if bool(paid.isfinite().all()):
+            return
+        unusable = zip(self.compiled.rewards, ~paid.isfinite().all(0), strict=True)
+        named = ", ".join(term.name for term, is_unusable in unusable if is_unusable)
+        raise InputError(
+            f"the reward terms {named} have values that are not finite; correct "
+            "their functions, such as a division by 0 or a logarithm of it"
+        )
+
+    def world(
+        self, state: Any, steps: Tensor, end_reasons: Tensor, dynamics: Dynamics | None
+    ) -> Any:
+        """Return the rules' constants and arrays that share the memory of states.
+
+        Steps and end reasons are int32, (N,). Without dynamics moves are done at once.
+        """
+        constants = self._constants(str(state.places.device))
+        world: Any = World()
+        objects: Any = Objects()
+        objects.shapes, objects.roles, objects.sizes = constants[:3]
+        objects.places = _warp(state.places, wp.vec3d)
+        objects.present, objects.touched = _warp(state.present), _warp(state.touched)
+        world.objects = objects
+        world.low, world.high = self._bounds
+        world.radius = 0.5 * self._settings.drone_size
+        timestep = getattr(dynamics, "timestep", None)
+        world.moves_at_once, world.seconds = timestep is None, timestep or SECONDS
+        world.step_limit = self._settings.step_limit
+        world.weights, world.parameters, world.numbers = constants[3:]
+        world.goal, world.reached = _warp(state.ahead), _warp(state.reached)
+        world.sides, world.noted = _warp(state.sides), _warp(state.noted)
+        world.actions, world.paid = _warp(state.action, wp.vec4), _warp(state.paid)
+        world.steps, world.end_reasons = _warp(steps), _warp(end_reasons)
+        return world
+
+    def _constants(self, device: str) -> tuple[Any, ...]:
+        """Return shapes, roles and half sizes of objects, weights, parameters and numbers."""
+        if device in self._arrays:
+            return self._arrays[device]
+        start_warp(device)
+        shapes = torch.tensor([SHAPES.index(of.shape) for of in self._objects], dtype=torch.int32)
+        sizes = torch.tensor([of.half_size for of in self._objects], dtype=torch.float64)
+        roles = torch.tensor([ROLES.index(of.role) for of in self._objects], dtype=torch.int32)
+        self._arrays[device] = (
+            *(_warp(of.to(device)) for of in (shapes, roles)),
+            _warp(sizes.to(device), wp.vec3d),
+            *(_warp(torch.tensor(of, dtype=torch.float64, device=device)) for of in self._lists),
+        )
+        return self._arrays[device]
+
+
+def reward_terms(rewards: Mapping[str, TermSettings]) -> tuple[Term, ...]:
+    """Return the terms that settings name."""
+    return tuple(REWARDS.by_name[name] for name in rewards)
+
+
+def _warp(tensor: Tensor, kind: Any = None) -> Any:
+    """Return a tensor as Warp's array, which shares its memory if it is contiguous."""
+    return wp.from_torch(tensor.contiguous(), dtype=kind)

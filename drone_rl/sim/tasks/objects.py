@@ -1,0 +1,185 @@
+"""Tasks whose rules are about objects: their state, and what their rules share."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import torch
+from torch import Tensor
+
+from drone_rl.config.term_task import ROLES, ObjectSettings
+from drone_rl.sim.dynamics import BodyState, ComputerVision, Dynamics, Obstacles
+from drone_rl.sim.entities import VisualEntity
+from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.tasks.applied_rules import AppliedRules
+from drone_rl.sim.tasks.common import HIDDEN_DEPTH, SIDES
+from drone_rl.sim.tasks.geometry_kernel import NOTHING
+from drone_rl.sim.tasks.task import State, Task
+
+_CLASSES = (SemanticClass.TARGET, SemanticClass.OBSTACLE, SemanticClass.GROUND)
+_KINDS = {"ball": "sphere", "cylinder": "cylinder", "box": "box"}
+_PLAIN = torch.contiguous_format
+
+
+@dataclasses.dataclass
+class ObjectState(State):
+    """State of N environments with P objects and G goals each. Metres, world frame."""
+
+    places: Tensor  # (N, P, 3) float64
+    """Centres of the objects."""
+    present: Tensor  # (N, P) bool
+    """Whether each is there."""
+    touched: Tensor  # (N, P) bool
+    """Whether the drone has touched it."""
+    ahead: Tensor  # (N,) int32
+    """Number of the object that calls for action now; -1 if none does."""
+    reached: Tensor  # (N, G) bool
+    """Whether each goal is reached."""
+    sides: Tensor  # (N, G) int32
+    """`Side` of each goal when it came up; -1 before that."""
+    noted: Tensor  # (N, G) float64
+    """What the task notes about it then; NaN before that."""
+    action: Tensor  # (N, 4) float32
+    """The last action: forward, left, up, turning left, as fractions of the greatest speed."""
+    paid: Tensor  # (N, R) float64
+    """Sum of each weighted reward term in this episode."""
+
+
+class ObjectEntity(VisualEntity):
+    """An object; its frame is at its centre. Metres."""
+
+    def _build(self, settings: ObjectSettings, name: str) -> None:
+        self.semantic_class = _CLASSES[ROLES.index(settings.role)]
+        half = settings.half_size
+        size = {"ball": half[:1], "cylinder": (half[0], half[2]), "box": half}[settings.shape]
+        self._add_geom(_KINDS[settings.shape], size, settings.color, name)
+
+
+class ObjectTask(Task[ObjectState]):
+    """A task whose rules are Warp functions of objects; a subclass gives them to `__init__`."""
+
+    strata = SIDES
+    has_own_rules: ClassVar[bool] = True
+    """Whether steps are those of `rules`: no subclass overrides `step`, `places` or `obstacles`."""
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        """Note whether a subclass overrides the rules."""
+        super().__init_subclass__(**kwargs)
+        if {"step", "places", "obstacles"} & vars(cls).keys():
+            cls.has_own_rules = False
+
+    def __init__(
+        self,
+        settings: Any,
+        objects: Mapping[str, ObjectSettings],
+        rules: AppliedRules,
+        *,
+        num_goals: int | None = None,
+    ) -> None:
+        """Take the objects and rules of a task.
+
+        Args:
+            settings: Of the task, with `drone_size`, `step_length` and `step_limit`.
+            objects: The P objects by name.
+            rules: Their rules.
+            num_goals: Number of goals; by default each object that is one.
+        """
+        self.settings, self.objects, self.rules = settings, objects, rules
+        self.drone_size = settings.drone_size
+        self.each = tuple(objects.values())
+        """Settings of each of the P objects."""
+        self.roles = torch.tensor([ROLES.index(of.role) for of in self.each], dtype=torch.int32)
+        self.num_goals = len(self.each) if num_goals is None else num_goals
+        self.reward_terms = tuple(term.name for term in rules.compiled.rewards)
+        rules.bind(self.each, settings)
+
+    def make_dynamics(self) -> Dynamics:
+        """Return moves of the task's length (Table 1 of Luo et al., 2018)."""
+        return ComputerVision(self.settings.step_length)
+
+    def make_props(self) -> list[ObjectEntity]:
+        """Return the objects, in order."""
+        return [ObjectEntity(of, name=name) for name, of in self.objects.items()]
+
+    def begun(self, body: BodyState, places: Tensor) -> ObjectState:
+        """Return states at the start of episodes, with objects at places, (N, P, 3).
+
+        Raises:
+            InputError: A term can't be compiled.
+        """
+        self.rules.compiled.load()
+        count, device = len(places), places.device
+        none = torch.zeros(count, len(self.each), dtype=torch.bool, device=device)
+        goals = none.new_zeros(count, self.num_goals)
+        zero = torch.zeros(count, dtype=torch.int64, device=device)
+        state = ObjectState(
+            body=body,
+            steps=zero,
+            end_reason=zero.clone(),
+            places=places,
+            present=~none,
+            touched=none,
+            ahead=torch.full((count,), NOTHING, dtype=torch.int32, device=device),
+            reached=goals,
+            sides=goals.int() - 1,
+            noted=torch.full(goals.shape, torch.nan, dtype=torch.float64, device=device),
+            action=torch.zeros(count, 4, device=device),
+            paid=torch.zeros(count, len(self.reward_terms), dtype=torch.float64, device=device),
+        )
+        self.look_ahead(state)
+        return state
+
+    def look_ahead(self, state: ObjectState) -> None:
+        """Choose what is ahead again, in place, such as after objects have moved."""
+        state.ahead[:] = NOTHING
+        self.rules.begin(state)
+
+    def step(
+        self,
+        state: ObjectState,
+        body: BodyState,
+        action: Tensor | None = None,
+        dynamics: Dynamics | None = None,
+    ) -> tuple[ObjectState, Tensor]:
+        """Apply the rules: contacts, what is ahead, rewards, ends and success.
+
+        `action`, (N, *), is what `dynamics` took, for terms that read it; None for none.
+        """
+        written = ("present", "touched", "ahead", "reached", "sides", "noted", "action", "paid")
+        copies = {name: getattr(state, name).clone(memory_format=_PLAIN) for name in written}
+        counts = {"steps": state.steps.clone(), "end_reason": state.end_reason.clone()}
+        new = dataclasses.replace(state, body=body, **counts, **copies)
+        speeds = torch.zeros_like(state.action)
+        if action is not None and dynamics is not None:
+            speeds = dynamics.actions.speeds_of(action)
+        return new, self.rules.step(new, state.drone, speeds, dynamics)
+
+    def touch(
+        self, state: ObjectState, position: Tensor, before: Tensor | None = None
+    ) -> Tensor | None:
+        """Apply the rules of contact in place, without a step or reward; by default there are none.
+
+        `position` is that of each drone, metres, and `before` where it comes from, if it touches
+        what is on the straight path. Shapes: (num_envs, 3).
+
+        Returns:
+            Fraction of the path before each object was touched; inf without contact, (N, P).
+            Without any contact it may be None.
+        """
+
+    def places(self, state: ObjectState) -> Tensor:
+        """Return the objects' centres, those of absent ones under the floor."""
+        hidden = (~state.present).double() * HIDDEN_DEPTH
+        return state.places - torch.nn.functional.pad(hidden[..., None], (2, 0))
+
+    def obstacles(self, state: ObjectState) -> Obstacles | None:
+        """Return what is solid, if all of it is of one size."""
+        solid = [i for i, of in enumerate(self.each) if of.role == "obstacle"]
+        if len({self.each[i].half_size for i in solid}) != 1:
+            return None
+        return Obstacles(self.places(state)[:, solid], self.each[solid[0]].half_size)
+
+    def next_number(self, state: ObjectState) -> Tensor:
+        """Return the object ahead, P for none. Shape: (N,), int64."""
+        ahead = state.ahead.long()
+        return torch.where(ahead == NOTHING, len(self.each), ahead)

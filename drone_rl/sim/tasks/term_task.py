@@ -1,0 +1,185 @@
+"""The task that is made of terms: objects, starts, rewards, ends and success."""
+
+import enum
+import math
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from drone_rl.config.term_task import ObjectSettings, TermTaskSettings
+from drone_rl.config.terms import ENDS, SUCCESSES
+from drone_rl.sim.actions import Entry
+from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.tasks.applied_rules import AppliedRules, reward_terms
+from drone_rl.sim.tasks.common import Side
+from drone_rl.sim.tasks.geometry_kernel import GOAL
+from drone_rl.sim.tasks.objects import ObjectState, ObjectTask
+from drone_rl.sim.tasks.rules_kernel import SUCCESS, make_rules
+from drone_rl.sim.tasks.scene_edits import Range, SceneEdits
+from drone_rl.sim.tasks.task import Goals, register_task
+from drone_rl.sim.vocabulary import TaskVocabulary
+from drone_rl.utils.errors import InputError
+
+_MOST_TRIES = 1000
+"""Largest number of samples of a place until one keeps away from the objects before it."""
+_LAST_ENDS = ("STEP_LIMIT", "LOST_CONTROL")
+
+
+class TermTask(ObjectTask):
+    """A task of terms: every rule is that of its settings; see `define_task`."""
+
+    success_end = SUCCESS
+    observed = ("reached", "end_reason")
+    scored = ("reached", "sides", "places")
+
+    def __init__(self, settings: TermTaskSettings) -> None:
+        """Take the settings of a task of terms."""
+        s = settings
+        self.name = s.name
+        objects = {
+            f"{name}_{i}" if of.count > 1 else name: of
+            for name, of in s.objects.items()
+            for i in range(of.count)
+        }
+        ends = tuple(ENDS.by_name[name] for name in s.end)
+        (success,) = (SUCCESSES.by_name[name] for name in s.success)
+        named = zip((*ends, success), (*s.end.values(), *s.success.values()), strict=True)
+        rules = AppliedRules(
+            make_rules(reward_terms(s.reward), ends, success),
+            rewards=s.reward,
+            parameters=[getattr(of, name) for term, of in named for name in term.parameters],
+            low=s.low,
+            high=s.high,
+        )
+        super().__init__(s, objects, rules)
+        x, y, z = (sum(s.start.range_of(axis)) / 2 for axis in "xyz")
+        self.origin = (x, y, z)
+        own = [term.name.upper() for term in ends]
+        kinds: Any = enum.IntEnum("End", ["RUNNING", "SUCCESS", *own, *_LAST_ENDS], start=0)
+        self.ends = kinds
+        self.truncation = self.expected_end = kinds["STEP_LIMIT"]
+        self.vocabulary = TaskVocabulary(tested=f"scenes of the task {s.name}")
+        self.edits = self._edits()
+
+    @property
+    def goals(self) -> Tensor:
+        """Numbers of the objects that are goals. Shape: (G,)."""
+        return (self.roles == GOAL).nonzero()[:, 0]
+
+    @property
+    def entries(self) -> Mapping[str, Entry]:
+        """See `ObjectState`; "reached" and "sides" are of the goals alone."""
+        objects, goals = len(self.each), len(self.goals)
+        return {
+            "reached": Entry((goals,), torch.bool),
+            "sides": Entry((goals,), torch.int64, -1, len(Side) - 1),
+            "places": Entry((objects, 3), torch.float32),
+            "present": Entry((objects,), torch.bool),
+            "touched": Entry((objects,), torch.bool),
+            "goal": Entry((1,), torch.int64, 0, objects),
+            "paid": Entry((len(self.reward_terms),), torch.float32),
+            "end_reason": Entry((1,), torch.int64, 0, len(self.ends) - 1),
+        }
+
+    def sample(self, random_state: np.random.RandomState) -> Tensor:
+        """Sample x, y, z (m) and heading (rad) of the start, then the centres. Shape: (4 + 3 P,).
+
+        Raises:
+            InputError: A region has no room left for an object.
+        """
+        s = self.settings
+        *start, heading = (
+            random_state.uniform(*s.start.range_of(axis)) for axis in ("x", "y", "z", "heading")
+        )
+        placed: list[Any] = []
+        for name, of in self.objects.items():
+            for _ in range(_MOST_TRIES):
+                place = np.array([random_state.uniform(*of.range_of(axis)) for axis in "xyz"])
+                if self._has_room(of, place, placed, start):
+                    break
+            else:
+                raise InputError(
+                    f"task.objects: found no room for {name} in {_MOST_TRIES} tries that keeps "
+                    f"{of.apart:g} m from other objects and {s.start.apart:g} m from the start; "
+                    "give a larger range of x or y, a smaller apart, or fewer objects"
+                )
+            placed.append((of, place))
+        places = np.concatenate([[*start, math.radians(heading)], *(p for _, p in placed)])
+        return torch.from_numpy(places)
+
+    def _has_room(self, of: ObjectSettings, place: Any, placed: list[Any], start: Any) -> bool:
+        """Return whether boxes around an object, the ones before it and the drone keep apart."""
+        s = self.settings
+        half, drone = np.array(of.half_size), np.array(start)
+        if of.role != "decoration":
+            gap = np.abs(place - drone) - half - 0.5 * s.drone_size
+            if np.linalg.norm(gap.clip(0)) <= s.start.apart:
+                return False
+        gaps = (np.abs(place - other) - half - np.array(o.half_size) for o, other in placed)
+        return of.apart == 0 or all(np.linalg.norm(gap.clip(0)) >= of.apart for gap in gaps)
+
+    def start(self, sampled: Tensor, body: BodyState) -> ObjectState:
+        """Return initial states; see `sample`."""
+        half = 0.5 * sampled[:, 3]
+        zero = torch.zeros_like(half)
+        attitude = torch.stack([half.cos(), zero, zero, half.sin()], -1)
+        places = sampled[:, 4:].reshape(len(sampled), len(self.each), 3).clone()
+        return self.begun(body.moved(sampled[:, :3].clone(), attitude), places)
+
+    def info(self, state: ObjectState) -> dict[str, Tensor]:
+        """See `entries`."""
+        goals = self.goals.to(state.places.device)
+        return {
+            "reached": state.reached[:, goals],
+            "sides": state.sides[:, goals].long(),
+            "places": state.places.float(),
+            "present": state.present,
+            "touched": state.touched,
+            "goal": self.next_number(state)[:, None],
+            "paid": state.paid.float(),
+            "end_reason": state.end_reason[:, None],
+        }
+
+    def score(self, info: Mapping[str, Tensor]) -> Goals:
+        """Return the goals; their strata are the sides on which they came up."""
+        return Goals(info["reached"], info["sides"], info["places"].flatten(1).double())
+
+    def _edits(self) -> SceneEdits:
+        """Return changes of its scenes; random goals are as far ahead as goals ever are."""
+        s = self.settings
+        goals = [of for of in self.each if of.role == "goal"]
+        reach = max(of.half_size[1] for of in goals) + 0.5 * self.drone_size
+        near = reach + 0.5 * s.step_length
+        far = max(of.range_of("x")[1] for of in goals) - s.start.range_of("x")[0]
+        starts = s.start.range_of("y")
+        wide = max(abs(y - o) for of in goals for y in of.range_of("y") for o in starts)
+        ahead = Range(near, max(far, near + s.step_length), max(wide, 2 * reach))
+        heights = sorted({z - self.origin[2] for of in goals for z in of.range_of("z")})
+        return SceneEdits(self, reach, ahead, ahead, tuple(heights))
+
+
+def define_task(name: str, **settings: Any) -> type[TermTaskSettings]:
+    """Register a task of terms, which settings, commands and files then know by its name.
+
+    Args:
+        name: What commands call it: `task=NAME`.
+        settings: Values of `TermTaskSettings`, which become the defaults of the new task.
+
+    Returns:
+        The class of the task's settings.
+
+    Raises:
+        InputError: A value is invalid, or there is another task of this name.
+    """
+    checked = TermTaskSettings.read(settings, name)
+    hints = {field: TermTaskSettings.model_fields[field].rebuild_annotation() for field in settings}
+    caller = sys._getframe(1).f_globals.get("__name__", __name__)  # as collections.namedtuple does
+    members = {"__annotations__": hints, "__module__": caller, "name": name}
+    values = {field: getattr(checked, field) for field in settings}
+    kind: Any = type(f"{name}_settings", (TermTaskSettings,), {**members, **values})
+    register_task(kind, TermTask)
+    return kind
