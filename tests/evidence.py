@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from drone_rl.config.commands import ShiftSettings
-from drone_rl.sim.vocabulary import CUBES
+from drone_rl.sim.vocabulary import shipped_vocabulary
 
 Plain = dict[str, Any]
 
@@ -146,7 +146,7 @@ _DARK = {
 SHIFTS: Plain = {
     "policy": "made up",
     "network": None,
-    "terms": CUBES.as_dict(),
+    "terms": shipped_vocabulary("collect_cubes").as_dict(),
     **FIXED_SEED,
     "settings": ShiftSettings(domain_episodes=400, episodes=200, seed=0).values(),
     "plain": {"success": _share(200, 200, 0.98, 1.0), "oracle": _share(200, 200, 0.98, 1.0)},

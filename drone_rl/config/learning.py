@@ -40,7 +40,7 @@ class SuccessScaled(_Discounted, target="success_scaled"):
     """Discounted return scaled by exp(reward - max_reward) (variant 3)."""
 
     max_reward: Annotated[float, Real(0.0, 1e6)] = 3.0
-    """Reward of a perfect episode; give the task's `largest_reward`, such as 1 for pillars."""
+    """Reward of a perfect episode; give the task's `largest_reward`."""
 
 
 class TimeBaseline(_Discounted, target="time_baseline"):

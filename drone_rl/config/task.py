@@ -43,6 +43,8 @@ class BaseTaskSettings(Named):
 
     registry: ClassVar[dict[str, Any]] = TASKS
     default_name: ClassVar[str | None] = DEFAULT_TASK
+    object_size: ClassVar[str | None] = None
+    """Name of the setting that is the size of its objects; None if there is none."""
 
     @property
     def object_region(self) -> ObjectRegion | None:
@@ -74,6 +76,7 @@ class TaskSettings(BaseTaskSettings):
     """
 
     name: ClassVar[str] = DEFAULT_TASK
+    object_size: ClassVar[str | None] = "cube_size"
     num_cubes: Annotated[int, Whole(1, 100, "cubes")] = 3
     """Cubes placed in every episode."""
     first_distance: Length = 15.0
@@ -169,6 +172,7 @@ class PillarsSettings(BaseTaskSettings):
     """
 
     name: ClassVar[str] = "pillars"
+    object_size: ClassVar[str | None] = "width"
     num_rows: Annotated[int, Whole(1, 100, "rows")] = 4
     """Rows of pillars, one behind the other."""
     first_distance: Length = 9.0

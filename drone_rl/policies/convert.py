@@ -46,7 +46,7 @@ _OVERRIDES = (
 )
 """Patterns of the names of settings and choices until version 0.1, and the present names."""
 _PENALTY = "collision_penalty"
-"""Setting of pillars, before it became the weight of a term."""
+"""A setting of tasks, before it became the weight of a term."""
 _DESCRIBED = {"certificate.json": "policy", "shifts.json": "network"}
 """The entry with the policy's description, by the end of the name of a file."""
 _FOLDERS = 100
@@ -167,7 +167,7 @@ def _converted_result(path: Path) -> bytes:
 
 
 def _with_reward_terms(task: Mapping[str, Any]) -> dict[str, Any]:
-    """Return settings of a task in which the penalty of former pillars is the weight of a term."""
+    """Return settings of a task in which a former penalty is the weight of a term."""
     present = dict(task)
     if _PENALTY in present:
         present["reward"] = {"progress": 1.0, "contact": -float(present.pop(_PENALTY))}

@@ -67,7 +67,7 @@ def make_env(
 
     Args:
         num_envs: Batch size.
-        task: Settings of the task, or a name such as "pillars" for its defaults.
+        task: Settings of the task, or its name for the defaults.
         camera: The policy's camera.
         transforms: Transform of the image, or several in this order.
         seed: Root of the environments' random streams.

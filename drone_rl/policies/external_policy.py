@@ -181,7 +181,7 @@ def policy_from(
         logits: Callable from a batch of transformed frames, floats (N, C, H, W), to a logit for
             each action, a tensor or an array (N, number of actions); or a model of
             Stable-Baselines3.
-        task: The task, its settings, or a name such as "pillars" for the default settings.
+        task: The task, its settings, or its name for the default settings.
         camera: The policy's camera. By default, its images have the size in
             `logits.observation_shape` if there is one.
         dynamics: Vehicle dynamics.

@@ -30,7 +30,7 @@ PALETTE = (
     (0.29, 0.40, 0.66),
     (0.58, 0.47, 0.66),
 )
-"""Yellow, teal, white, green, blue, violet: neither red (cubes) nor brown (pillars)."""
+"""Yellow, teal, white, green, blue, violet: neither the red of goals nor the brown of obstacles."""
 WIDTH = 7
 """Numbers of a distractor: position, size, color."""
 _TURN = (5**0.5 - 1) / 2

@@ -107,10 +107,10 @@ def _third(verb: str) -> str:
     return f"{verb}es" if verb.endswith(("s", "sh", "ch", "x")) else f"{verb}s"
 
 
-_BUILT_IN = tomllib.loads(Path(__file__).with_name("vocabulary.toml").read_text(encoding="utf-8"))
-CUBES = TaskVocabulary(**_BUILT_IN["collect_cubes"])
-"""Of cube collection, and of files without terms."""
-PILLARS = TaskVocabulary(**_BUILT_IN["pillars"])
+def shipped_vocabulary(task: str) -> TaskVocabulary:
+    """Return the terms of a shipped task, by its name."""
+    path = Path(__file__).with_name("vocabulary.toml")
+    return TaskVocabulary(**tomllib.loads(path.read_text(encoding="utf-8"))[task])
 
 
 MOST_ACTIONS = 16

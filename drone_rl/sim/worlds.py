@@ -25,8 +25,9 @@ from drone_rl.sim.rendering import (
 from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.scene_model import SceneModel
-from drone_rl.sim.tasks import ObjectTask, State, Task, as_task, check_actions
+from drone_rl.sim.tasks import State, Task, as_task, check_actions
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
+from drone_rl.sim.tasks.objects import follows_rules
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance
 
@@ -193,8 +194,7 @@ class Worlds:
         """Return states a step later, and rewards; the environments stay as they are."""
         around = [self.task.obstacles(state)] if self.dynamics.needs_obstacles else []
         body = self.dynamics.step(state.body, action, *around)
-        reads_actions = isinstance(self.task, ObjectTask) and self.task.has_own_rules
-        more: Any = (action, self.dynamics) if reads_actions else ()
+        more: Any = (action, self.dynamics) if follows_rules(self.task) else ()
         step: Any = self.task.step
         outcome = step(state, body, *more)
         reward: Any = outcome[1] if isinstance(outcome, tuple) and len(outcome) == 2 else None

@@ -48,7 +48,7 @@ class Row(Model):
     success: float | None = None
     """Success rate of the greedy policy."""
     share: float | None = None
-    """Fraction of goals that it reaches: cubes, or rows of pillars."""
+    """Fraction of goals that it reaches."""
     left: float | None = None
     """The same of goals on its left; None without such goals, as in a task with other strata."""
     ahead: float | None = None

@@ -176,12 +176,12 @@ class CollapseCheck(Callback):
     UPDATES = 20
     """Least number of their updates."""
     CLOSE = 0.9
-    """Fraction of the target from which a policy counts as good enough."""
+    """Fraction of the target, or success rate in a batch, from which a policy is good enough."""
     STEP = 0.01
     """Fraction of the target by which the running reward must rise to count as improvement."""
 
-    def __init__(self, target: float) -> None:
-        """Take the running reward at which the task counts as solved."""
+    def __init__(self, target: float | None) -> None:
+        """Take the running reward at which the task counts as solved, if one is known."""
         self._target, self._best = target, float("-inf")
         self._since = (0, 0)
         """Episodes and updates at the last sign of learning."""
@@ -197,9 +197,12 @@ class CollapseCheck(Callback):
         progress = training.progress
         # continuous actions have densities, whose entropy is also below 0
         is_deterministic = abs(metrics.get("loss/entropy", 1.0)) < DETERMINISTIC
-        is_better = progress.running_reward > self._best + self.STEP * self._target
+        is_better = progress.running_reward > self._best + self.STEP * (self._target or 0.0)
         self._best = progress.running_reward if is_better else self._best
-        is_close = progress.running_reward >= self.CLOSE * self._target
+        if self._target is None:
+            is_close = metrics.get("end/success", 0.0) >= self.CLOSE
+        else:
+            is_close = progress.running_reward >= self.CLOSE * self._target
         if is_better or is_close or not is_deterministic:
             self._since = progress.episodes, progress.updates
         episodes, updates = progress.episodes - self._since[0], progress.updates - self._since[1]

@@ -128,7 +128,7 @@ def learn(
         if confirmation is not None:
             stack.callback(confirmation.close)
         checkpoints = run.checkpoints(settings)
-        collapse = CollapseCheck(target or as_task(settings.task).largest_reward or 0.0)
+        collapse = CollapseCheck(target or as_task(settings.task).largest_reward)
         first = (CsvCallback(folder / "metrics.csv"), checkpoints, collapse, UnpaidTerms())
         trainer = Trainer(
             collector=parts.collector,

@@ -109,14 +109,13 @@ class Axis:
 CORRELATION_TIME = -1.0 / math.log(0.95)
 """Frames; consecutive frames of noise correlate by 0.95."""
 _THINGS = (SemanticClass.TARGET, SemanticClass.OBSTACLE)
-_SIZES = {"collect_cubes": "cube_size", "pillars": "width"}
 
 
 def _size(subject: EvaluatedPolicy) -> str:
     name = subject.task.name
-    if name not in _SIZES:
+    if subject.task.object_size is None:
         raise InputError(f"axes=object_size is not for task={name}; leave it out of axes")
-    return _SIZES[name]
+    return subject.task.object_size
 
 
 def _rendered(subject: EvaluatedPolicy, condition: Condition) -> Condition:

@@ -4,7 +4,8 @@ from typing import Any
 
 import pydantic
 
-from drone_rl.sim.vocabulary import CUBES, TaskVocabulary
+from drone_rl.config.task import DEFAULT_TASK
+from drone_rl.sim.vocabulary import TaskVocabulary, shipped_vocabulary
 from drone_rl.trust.findings import Finding
 from drone_rl.trust.rule import USABLE, Quantity, VerdictKind
 from drone_rl.utils.intervals import Mean, Share
@@ -206,7 +207,7 @@ class Verdict(Seeded):
     """Largest fraction of cases in which the rule gives a certain and wrong verdict."""
     good_share: float
     """See `Rule.good_share`."""
-    terms: TaskVocabulary = CUBES
+    terms: TaskVocabulary = shipped_vocabulary(DEFAULT_TASK)
     num_cubes: int = 0
     """Goals of an episode."""
     repetition: Repetition | None = None

@@ -3,9 +3,11 @@
 import numpy as np
 
 from drone_rl.explanations.results import Explanation
-from drone_rl.sim.vocabulary import CUBES, SHOWN_MOVES
+from drone_rl.sim.vocabulary import SHOWN_MOVES, shipped_vocabulary
 from drone_rl.trust.shifts_results import packed
 from tests.evidence import SAVED_SHIFTS, SHIFTS, VERDICT, changed
+
+CUBES = shipped_vocabulary("collect_cubes")
 
 FRAMES, STEPS, ACTIONS = 12, 5, 3  # of the data set, in two episodes; of the film
 

@@ -3,8 +3,16 @@
 import pytest
 
 from drone_rl.sim import actions
-from drone_rl.sim.vocabulary import CUBES, MOST, SHOWN_MOVES, ShownActions, TaskVocabulary
+from drone_rl.sim.vocabulary import (
+    MOST,
+    SHOWN_MOVES,
+    ShownActions,
+    TaskVocabulary,
+    shipped_vocabulary,
+)
 from drone_rl.utils.errors import InputError
+
+CUBES = shipped_vocabulary("collect_cubes")
 
 
 def test_vocabulary_round_trip():

@@ -102,7 +102,7 @@ def test_passes_over_demonstrations_have_rows_of_their_own(tmp_path):
     assert not (tmp_path / "metrics.csv").exists()
 
 
-def collapse(updates, episodes=10, target=3.0):
+def collapse(updates, episodes=10, target=3.0, **metrics):
     """A check after updates of (entropy, running reward), with so many episodes each."""
     check, progress = CollapseCheck(target), TrainingProgress()
     training = types.SimpleNamespace(progress=progress)
@@ -110,7 +110,8 @@ def collapse(updates, episodes=10, target=3.0):
     for entropy, reward in updates:
         progress.frames, progress.episodes = progress.frames + 100, progress.episodes + episodes
         progress.updates, progress.running_reward = progress.updates + 1, reward
-        check.on_update(training, {"loss/entropy": entropy} if entropy is not None else {})
+        entropies = {"loss/entropy": entropy} if entropy is not None else {}
+        check.on_update(training, entropies | metrics)
     return check
 
 
@@ -138,6 +139,11 @@ def test_a_deterministic_policy_that_does_not_improve_has_collapsed(caplog, upda
     check = collapse(updates)
     assert check.collapsed_at == collapsed_at
     assert len(caplog.records) == (collapsed_at is not None)
+
+
+def test_without_a_target_the_success_rate_tells_a_collapse():
+    assert collapse(STUCK * 60, target=None, **{"end/success": 0.4}).collapsed_at == 5100
+    assert collapse(STUCK * 60, target=None, **{"end/success": 0.95}).collapsed_at is None
 
 
 def test_torchrl_loggers_are_supported(make_trainer, tmp_path):

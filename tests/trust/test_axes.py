@@ -55,6 +55,7 @@ def test_unknown_axes():
 def test_task_without_a_size():
     class Other(PillarsSettings):
         name = "other"
+        object_size = None
 
     other = subject(task=Other())
     with pytest.raises(InputError, match="axes=object_size is not for task=other"):

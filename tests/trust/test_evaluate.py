@@ -6,13 +6,15 @@ import pytest
 
 import drone_rl
 from drone_rl.config import AppearanceSettings
-from drone_rl.sim.vocabulary import CUBES
+from drone_rl.sim.vocabulary import shipped_vocabulary
 from drone_rl.trust.evaluate import Evaluation
 from drone_rl.trust.results import Figures
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.utils.progress import silent
 from tests.fake_flight import floating
+
+CUBES = shipped_vocabulary("collect_cubes")
 
 
 @pytest.fixture(scope="module")

@@ -31,7 +31,7 @@ from drone_rl.sim.tasks.objects import ObjectState, ObjectTask
 from drone_rl.sim.tasks.rules_kernel import make_rules
 from drone_rl.sim.tasks.scene_edits import Range, SceneEdits
 from drone_rl.sim.tasks.task import Goals, OracleRule, register_task
-from drone_rl.sim.vocabulary import CUBES
+from drone_rl.sim.vocabulary import shipped_vocabulary
 
 
 @dataclasses.dataclass
@@ -80,7 +80,7 @@ class CollectCubes(ObjectTask):
                 f"keeps its altitude never touches them; give at most {s.touch_distance} (half of "
                 "cube_size + drone_size), or actions=moves_3d"
             }
-        self.vocabulary = CUBES.replace(tested=_some_cubes(s))
+        self.vocabulary = shipped_vocabulary(self.name).replace(tested=_some_cubes(s))
         actions = MOVES_3D if s.must_climb else MOVES
         self.oracle = OracleRule(("drone", "cube_positions", "next_cube"), self.line_up, actions)
         reach, bound = s.touch_distance, s.vertical_bound

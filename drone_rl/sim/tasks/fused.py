@@ -12,14 +12,14 @@ from drone_rl.sim.dynamics.moves_kernel import make_fleet
 from drone_rl.sim.dynamics.state import NUMBERS
 from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, PoseArrays
 from drone_rl.sim.tasks.geometry_kernel import OBSTACLE
-from drone_rl.sim.tasks.objects import ObjectTask
+from drone_rl.sim.tasks.objects import ObjectTask, follows_rules
 from drone_rl.sim.tasks.rules_kernel import Episodes, place
 from drone_rl.sim.tasks.task import State, Task
 
 
 def fused_rules(task: Task[Any], dynamics: Dynamics, state: State) -> "FusedObjects | None":
     """Return environments as many as states for the fused kernel, or None if it lacks the rules."""
-    if not isinstance(task, ObjectTask) or not task.has_own_rules:
+    if not isinstance(task, ObjectTask) or not follows_rules(task):
         return None
     is_flown = type(dynamics) is Quadrotor and isinstance(dynamics.steering, Moves)
     if type(dynamics) is not ComputerVision and (

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -59,14 +59,6 @@ class ObjectTask(Task[ObjectState]):
     """A task whose rules are Warp functions of objects; a subclass gives them to `__init__`."""
 
     strata = SIDES
-    has_own_rules: ClassVar[bool] = True
-    """Whether steps are those of `rules`: no subclass overrides `step`, `places` or `obstacles`."""
-
-    def __init_subclass__(cls, **kwargs: Any) -> None:
-        """Note whether a subclass overrides the rules."""
-        super().__init_subclass__(**kwargs)
-        if {"step", "places", "obstacles"} & vars(cls).keys():
-            cls.has_own_rules = False
 
     def __init__(
         self,
@@ -183,3 +175,9 @@ class ObjectTask(Task[ObjectState]):
         """Return the object ahead, P for none. Shape: (N,), int64."""
         ahead = state.ahead.long()
         return torch.where(ahead == NOTHING, len(self.each), ahead)
+
+
+def follows_rules(task: Task[Any]) -> bool:
+    """Return whether the steps of a task are those of its `rules`, which no subclass overrides."""
+    names = ("step", "places", "obstacles")
+    return all(getattr(type(task), name) is getattr(ObjectTask, name, None) for name in names)

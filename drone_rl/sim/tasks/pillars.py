@@ -25,7 +25,7 @@ from drone_rl.sim.tasks.pillars_lanes import EDGE, Lanes
 from drone_rl.sim.tasks.rules_kernel import make_rules
 from drone_rl.sim.tasks.scene_edits import Range, SceneEdits
 from drone_rl.sim.tasks.task import Goals, OracleRule, register_task
-from drone_rl.sim.vocabulary import PILLARS
+from drone_rl.sim.vocabulary import shipped_vocabulary
 from drone_rl.utils.text import plural
 
 
@@ -74,7 +74,7 @@ class Pillars(ObjectTask):
             f"{plural(s.num_rows, 'row')} of pillars {s.width:g} m wide, {s.density:g} per metre "
             f"of row width, {s.spacing:g} m from row to row"
         )
-        self.vocabulary = PILLARS.replace(tested=tested)
+        self.vocabulary = shipped_vocabulary(self.name).replace(tested=tested)
         self.oracle = OracleRule(("drone", "rows", "next_row"), self.lanes.fly_through, MOVES)
         reach = s.touch_distance
         self.edits = SceneEdits(
