@@ -1,6 +1,9 @@
 """Settings of a task of terms: objects, starts, bounds, rewards, ends and success."""
 
-from typing import Annotated, Any
+from collections.abc import Mapping
+from typing import Annotated, Any, Self
+
+from pydantic import BeforeValidator
 
 from drone_rl.config.task import BaseTaskSettings, Color, ObjectRegion
 from drone_rl.config.terms import Ends, Rewards, Success
@@ -12,6 +15,20 @@ Coordinate = Annotated[Any, Span(Real(-1000.0, 1000.0, unit="m"))]
 Size = Real(0.01, 1000.0, unit="m")
 ROLES = ("goal", "obstacle", "decoration")
 SHAPES = ("ball", "cylinder", "box")
+
+
+def _dotted(given: Any) -> Any:
+    """Return a mapping whose names have dots instead of mappings inside of it."""
+    if not isinstance(given, Mapping):
+        return given
+    flat: dict[Any, Any] = {}
+    for name, value in given.items():
+        inner = _dotted(value)
+        is_nested = isinstance(inner, Mapping)
+        flat |= (
+            {f"{name}.{key}": item for key, item in inner.items()} if is_nested else {name: value}
+        )
+    return flat
 
 
 class ObjectSettings(Settings):
@@ -89,6 +106,9 @@ class TermTaskSettings(BaseTaskSettings):
     """Reasons to end an episode, by name; earlier ones precede later ones and success."""
     success: Success = {}
     """The one meaning of success, by name."""
+    curriculum: Annotated[dict[str, Coordinate], BeforeValidator(_dotted)] = {}
+    """Ranges in which a training begins, such as objects.ball.x: [5, 6]. As success rises, each
+    widens to the range of its setting, which everything but training uses from the start."""
     margin: Annotated[float, Real(0.0, 1000.0, unit="m")] = 10.0
     """How far outside the region of starts and objects the bounds are."""
     drone_size: Annotated[float, Real(0.01, 10.0, unit="m")] = 0.8
@@ -107,6 +127,35 @@ class TermTaskSettings(BaseTaskSettings):
         weights: dict[str, Any] = {name: term for name, term in self.reward.items()}
         if not any(term.weight for term in weights.values()):
             raise InputError("reward has no weight other than 0; give one, such as progress: 1.0")
+        self.at_level(0.0)
+
+    def at_level(self, level: float) -> Self:
+        """Return the settings at a level of the curriculum: 0 where it begins, 1 where it ends.
+
+        Raises:
+            InputError: The curriculum names no range, or begins outside of one.
+        """
+        if not self.curriculum:
+            return self
+        parts = {"start": self.start, **{f"objects.{n}": of for n, of in self.objects.items()}}
+        changed: dict[str, Any] = dict(parts)
+        for key, given in self.curriculum.items():
+            name, _, axis = key.rpartition(".")
+            part = parts.get(name)
+            if part is None or axis not in ("x", "y", "z", "heading") or not hasattr(part, axis):
+                known = ", ".join(f"{known}.x" for known in parts)
+                raise InputError(f"curriculum.{key} names no range; give one such as {known}")
+            first, last = given if isinstance(given, tuple) else (given, given)
+            end = part.range_of(axis)
+            if not end[0] <= first <= last <= end[1]:
+                raise InputError(
+                    f"curriculum.{key}={[first, last]} is not within {list(end)}, where it ends; "
+                    "give a range inside of it"
+                )
+            at = tuple(a + level * (b - a) for a, b in zip((first, last), end, strict=True))
+            changed[name] = changed[name].replace(**{axis: at})
+        objects = {name: changed[f"objects.{name}"] for name in self.objects}
+        return self.replace(start=changed["start"], objects=objects, curriculum={})
 
     @property
     def low(self) -> tuple[float, ...]:

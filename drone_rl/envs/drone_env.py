@@ -133,8 +133,13 @@ class DroneEnv(EnvBase):
         self.is_closed = False  # TorchRL's default is True
 
     def state_dict(self, *args: object, **kwargs: object) -> dict:
-        """Return the random streams, which suffice if every environment is reset next."""
-        return {"random_states": [get_state(r) for r in self.random_states]}
+        """Return the random streams, which suffice if every environment is reset next.
+
+        They are joined by the state of the task's curriculum, if it has one.
+        """
+        states = {"random_states": [get_state(r) for r in self.random_states]}
+        curriculum = self.worlds.task.curriculum
+        return states if curriculum is None else {**states, "curriculum": curriculum.state()}
 
     def load_state_dict(  # pyright: ignore[reportIncompatibleMethodOverride] (as EnvBase)
         self, state_dict: dict, strict: bool = True, assign: bool = False
@@ -148,6 +153,8 @@ class DroneEnv(EnvBase):
             )
         for random_state, state in zip(self.random_states, states, strict=True):
             set_state(random_state, state)
+        if self.worlds.task.curriculum is not None:
+            self.worlds.task.curriculum.load(state_dict["curriculum"])
 
     def running_state(self) -> dict[str, Any]:
         """Return the full state, which suffices to resume within episodes."""

@@ -4,6 +4,7 @@ import copy
 import csv
 import io
 import logging
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -13,6 +14,7 @@ from torchrl.record.loggers import Logger
 
 from drone_rl.config.training import DETERMINISTIC
 from drone_rl.policies.zoo import TrainingProgress as TrainingProgress
+from drone_rl.sim.tasks import Task
 from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.files import make_folder, write_atomically
 from drone_rl.utils.progress import Progress, as_progress
@@ -215,6 +217,26 @@ class CollapseCheck(Callback):
                 "optimizer.lr, a higher objective.entropy_coeff or another seed",
                 *(episodes, DETERMINISTIC, progress.running_reward),
             )
+
+
+class WidenRanges(Callback):
+    """Widen the ranges of a task's `Curriculum` as success rises."""
+
+    def __init__(self, tasks: Sequence[Task[Any]], *, is_new: bool) -> None:
+        """Take the task of each group of environments, and whether the training is a new one."""
+        self._curricula = [task.curriculum for task in tasks]
+        self._success = f"end/{tasks[0].ends(tasks[0].success_end).name.lower()}"
+        if is_new:
+            for curriculum in self._curricula:
+                curriculum.load((0.0, 0.0))
+
+    def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
+        """Note the success of the episodes that end in a batch, if any do."""
+        success, (first, *others) = metrics[self._success], self._curricula
+        if not math.isnan(success) and first.note(success):
+            _log.info("curriculum: level %.1f of 1", first.level)
+        for curriculum in others:
+            curriculum.load(first.state())
 
 
 class UnpaidTerms(Callback):

@@ -20,18 +20,20 @@ from drone_rl.collectors import EpisodeCollector, ThreadedCollector
 from drone_rl.config.learning import Episodes, Ray, Reinforce
 from drone_rl.config.registry import implements, modules_of
 from drone_rl.config.training import TrainSettings
+from drone_rl.envs import base_env
 from drone_rl.objectives import ReinforceLoss
 from drone_rl.policies import ImageNetwork, make_actor
 from drone_rl.policies.actor import exploring
 from drone_rl.policies.zoo import Checkpoint, describe
 from drone_rl.sim.rendering.devices import check_device
-from drone_rl.sim.tasks import FailureReplayTask, as_task
+from drone_rl.sim.tasks import FailureReplayTask, Task, as_task
 from drone_rl.training import run_folder
 from drone_rl.training.callbacks import (
     Callback,
     CollapseCheck,
     CsvCallback,
     UnpaidTerms,
+    WidenRanges,
     with_progress,
 )
 from drone_rl.training.cloning import clone
@@ -129,7 +131,11 @@ def learn(
             stack.callback(confirmation.close)
         checkpoints = run.checkpoints(settings)
         collapse = CollapseCheck(target or as_task(settings.task).largest_reward)
-        first = (CsvCallback(folder / "metrics.csv"), checkpoints, collapse, UnpaidTerms())
+        first = [CsvCallback(folder / "metrics.csv"), checkpoints, collapse, UnpaidTerms()]
+        if as_task(settings.task).curriculum is not None:
+            if not parts.tasks:
+                raise InputError("collector=ray widens no task.curriculum; give another collector")
+            first.append(WidenRanges(parts.tasks, is_new=state is None))
         trainer = Trainer(
             collector=parts.collector,
             learner=learner,
@@ -170,6 +176,8 @@ class Components(NamedTuple):
     network: ImageNetwork
     generators: dict[str, torch.Generator]
     """Random streams of this process, by name."""
+    tasks: tuple[Task[Any], ...] = ()
+    """That of each group of environments in this process."""
     activations: ActivationRecorder | None = None
     """What a fused collector records, if it alone makes the batches."""
 
@@ -177,7 +185,8 @@ class Components(NamedTuple):
     def of(cls, collector: Any, groups: Sequence[tuple[EnvBase, Any]]) -> Self:
         """Return the components of a training run whose groups are in this process."""
         generators = {f"actions_{i}": actor.generator for i, (_, actor) in enumerate(groups)}
-        return cls(collector, collector.actor.network, generators)
+        tasks = tuple(base_env(env).worlds.task for env, _ in groups)
+        return cls(collector, collector.actor.network, generators, tasks)
 
 
 def make_collector(settings: TrainSettings, replay: FailureReplayTask | None = None) -> Components:

@@ -140,7 +140,7 @@ def _place(details: ErrorDetails, where: str) -> str:
     for part in details["loc"]:
         if isinstance(part, int):
             text += f"[{part}]"
-        elif part.isidentifier():
+        elif all(name.isidentifier() for name in part.split(".")):
             text += f".{part}" if text else part
     return text
 

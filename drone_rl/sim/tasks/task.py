@@ -144,6 +144,8 @@ class Task(abc.ABC, Generic[S]):
     """Entries of an episode's last information that `score` reads."""
     oracle: OracleRule | None = None
     """The best action given the true state; None if it is unknown."""
+    curriculum: Any = None
+    """Widens ranges of its episodes in a training, `Curriculum`; None if they stay."""
     reward_terms: tuple[str, ...] = ()
     """Names of the reward's terms; empty if it is computed as a whole."""
     needed_actions: Mapping[str, str] = {}

@@ -3,7 +3,7 @@
 import enum
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,47 @@ _MOST_TRIES = 1000
 _LAST_ENDS = ("STEP_LIMIT", "LOST_CONTROL")
 
 
+class Curriculum:
+    """The ranges in which episodes begin, from the narrowest ones to those of the settings.
+
+    The level rises by `STEP` whenever a running mean of success reaches `SUCCESS`.
+    """
+
+    SUCCESS, STEP, DECAY = 0.8, 0.1, 0.9
+
+    def __init__(self, settings: TermTaskSettings) -> None:
+        """Begin at the end, where everything but a training stays."""
+        self._settings = settings
+        self.load((1.0, 0.0))
+
+    def state(self) -> tuple[float, float]:
+        """Return the level, 0 to 1, and the running success at it."""
+        return self.level, self._success
+
+    def load(self, state: Sequence[float]) -> None:
+        """Return to a `state`; that of a new training is (0, 0)."""
+        self.level, self._success = state
+        self.ranges = self._settings.at_level(self.level)
+        """Settings with the present ranges."""
+
+    def note(self, success: float) -> bool:
+        """Count the success rate of a batch; return whether the ranges are wider now."""
+        mean = self.DECAY * self._success + (1 - self.DECAY) * success
+        is_wider = mean >= self.SUCCESS and self.level < 1.0
+        level = min(1.0, self.level + self.STEP) if is_wider else self.level
+        self.load((level, 0.0 if is_wider else mean))
+        return is_wider
+
+
+def _named(settings: TermTaskSettings) -> dict[str, ObjectSettings]:
+    """Return the objects of a task by name."""
+    return {
+        f"{name}_{i}" if of.count > 1 else name: of
+        for name, of in settings.objects.items()
+        for i in range(of.count)
+    }
+
+
 class TermTask(ObjectTask):
     """A task of terms: every rule is that of its settings; see `define_task`."""
 
@@ -40,11 +81,6 @@ class TermTask(ObjectTask):
         """Take the settings of a task of terms."""
         s = settings
         self.name = s.name
-        objects = {
-            f"{name}_{i}" if of.count > 1 else name: of
-            for name, of in s.objects.items()
-            for i in range(of.count)
-        }
         ends = tuple(ENDS.by_name[name] for name in s.end)
         (success,) = (SUCCESSES.by_name[name] for name in s.success)
         named = zip((*ends, success), (*s.end.values(), *s.success.values()), strict=True)
@@ -55,7 +91,7 @@ class TermTask(ObjectTask):
             low=s.low,
             high=s.high,
         )
-        super().__init__(s, objects, rules)
+        super().__init__(s, _named(s), rules)
         x, y, z = (sum(s.start.range_of(axis)) / 2 for axis in "xyz")
         self.origin = (x, y, z)
         own = [term.name.upper() for term in ends]
@@ -64,6 +100,7 @@ class TermTask(ObjectTask):
         self.truncation = self.expected_end = kinds["STEP_LIMIT"]
         self.vocabulary = TaskVocabulary(tested=f"scenes of the task {s.name}")
         self.edits = self._edits()
+        self.curriculum = Curriculum(s) if s.curriculum else None
 
     @property
     def goals(self) -> Tensor:
@@ -91,12 +128,12 @@ class TermTask(ObjectTask):
         Raises:
             InputError: A region has no room left for an object.
         """
-        s = self.settings
+        s = self.settings if self.curriculum is None else self.curriculum.ranges
         *start, heading = (
             random_state.uniform(*s.start.range_of(axis)) for axis in ("x", "y", "z", "heading")
         )
         placed: list[Any] = []
-        for name, of in self.objects.items():
+        for name, of in _named(s).items():
             for _ in range(_MOST_TRIES):
                 place = np.array([random_state.uniform(*of.range_of(axis)) for axis in "xyz"])
                 if self._has_room(of, place, placed, start):

@@ -6,6 +6,7 @@ import torch
 import warp as wp
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
+import drone_rl
 from drone_rl import InputError, Step, define_task, reward
 from drone_rl.acceleration import FusedEpisodes
 from drone_rl.config.task import TASKS, BaseTaskSettings
@@ -13,6 +14,7 @@ from drone_rl.sim.tasks import as_task
 from drone_rl.sim.tasks.task import MAKERS
 from drone_rl.sim.worlds import Worlds
 from drone_rl.training.metrics import batch_metrics
+from drone_rl.utils.progress import silent
 from tests.acceleration.test_fused_episodes import make
 
 FORWARD, LEFT, RIGHT = 0, 1, 2
@@ -131,6 +133,9 @@ def test_sampled_objects_keep_apart():
         ({"objects": {"ball": {**BALL, "size": [1.0, 2.0, 1.0]}}}, "size"),
         ({"success": {}}, "success"),
         ({"start": {"x": [2.0, 1.0]}}, "start.x"),
+        ({"curriculum": {"objects.ball.x": [7.0, 5.0]}}, "objects.ball.x"),
+        ({"curriculum": {"objects.ball.x": [5.0, 7.0]}}, "not within"),
+        ({"curriculum": {"objects.bal.x": 6.0}}, "objects.ball.x"),
     ],
 )
 def test_invalid_tasks_are_refused(changes, named):
@@ -200,3 +205,37 @@ def test_fused_episodes_name_unusable_terms():
     collector = make(task=task, num_envs=4, compiled=True)
     with pytest.raises(InputError, match="undefined"):
         collector.collect()
+
+
+def test_a_curriculum_widens_from_its_range_to_that_of_the_setting():
+    wide = {"ball": {**BALL, "y": [-4.0, 4.0]}}
+    made = worlds(objects=wide, curriculum={"objects.ball.y": [0.0, 1.0]})
+    curriculum = made.task.curriculum
+    assert curriculum.ranges.objects["ball"].y == (-4.0, 4.0)  # except in a training
+    curriculum.load((0.0, 0.0))
+    # running means of 1 - 0.9^n reach 0.8 at the 16th batch
+    assert [curriculum.note(1.0) for _ in range(16)] == [False] * 15 + [True]
+    assert curriculum.ranges.objects["ball"].y == pytest.approx((-0.4, 1.3))
+    drawn = [float(made.task.sample(np.random.RandomState(seed))[5]) for seed in range(50)]
+    assert -0.4 <= min(drawn) < -0.2 and 1.1 < max(drawn) <= 1.3
+
+
+def test_a_training_with_a_curriculum_resumes_bit_for_bit(tmp_path):
+    task = BaseTaskSettings.read(
+        {
+            "name": "test_reach",
+            "objects": {"ball": {**BALL, "y": [-4.0, 4.0]}},
+            "curriculum": {"objects.ball.y": 0.0},
+        }
+    )
+
+    short = drone_rl.TrainerSettings(total_frames=1000, target_share=None, confirm_episodes=0)
+    settings = drone_rl.TrainSettings(task=task, trainer=short)
+    longer = short.replace(total_frames=2000)
+    whole = drone_rl.train(settings.replace(trainer=longer), folder=tmp_path / "a", progress=silent)
+    half = drone_rl.train(settings, folder=tmp_path / "b", progress=silent)
+    again = drone_rl.train(folder=half.folder, resume=True, trainer=longer, progress=silent)
+    assert half.result.frames < again.result.frames == whole.result.frames
+    assert again.result.running_reward == whole.result.running_reward
+    one, two = (drone_rl.load_policy(of.folder).state.weights for of in (whole, again))
+    assert all(torch.equal(one[name], two[name]) for name in one)
