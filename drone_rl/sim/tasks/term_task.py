@@ -74,6 +74,7 @@ class TermTask(ObjectTask):
     """A task of terms: every rule is that of its settings; see `define_task`."""
 
     success_end = SUCCESS
+    largest_reward = None
     observed = ("reached", "end_reason")
     scored = ("reached", "sides", "places")
 
