@@ -102,7 +102,7 @@ class TaskSettings(BaseTaskSettings):
     step_limit: Steps = 300
     """Steps after which an episode is truncated."""
     reward: Rewards = {"reached": {"weight": 1.0}}  # pyright: ignore[reportAssignmentType] (read)
-    """Terms of the reward by name, each with a weight and parameters of its own."""
+    """Its terms by name, with weights; `task.reward.NAME.weight=0.1` adds or changes one."""
     front_margin: Length = 11.0
     """How far behind the last cube the front boundary stands."""
     side_margin: Length = 20.0
@@ -203,7 +203,7 @@ class PillarsSettings(BaseTaskSettings):
     step_limit: Steps = 120
     """Steps after which an episode is truncated."""
     reward: Rewards = {"progress": {"weight": 1.0}, "contact": {"weight": -0.5}}  # pyright: ignore[reportAssignmentType]
-    """Terms of the reward by name; reaching the line is worth the weight of `progress`."""
+    """As in `collect_cubes`; reaching the line is worth the weight of `progress`."""
 
     @property
     def row_size(self) -> int:

@@ -101,7 +101,7 @@ class TermTaskSettings(BaseTaskSettings):
     start: StartSettings = StartSettings()
     """Where the drone starts."""
     reward: Rewards = {}
-    """Terms of the reward by name, each with a weight and parameters of its own."""
+    """Its terms by name, with weights; `task.reward.NAME.weight=0.1` adds or changes one."""
     end: Ends = {}
     """Reasons to end an episode, by name; earlier ones precede later ones and success."""
     success: Success = {}

@@ -84,7 +84,8 @@ def _settings_class(name: str, numbers: Mapping[str, float]) -> type[TermSetting
     hints = dict.fromkeys(numbers, Number)
     members = {"__annotations__": hints, "__module__": __name__, **numbers}
     base = RewardSettings if "weight" in numbers else TermSettings
-    return type(f"{name}_settings", (base,), members)
+    kind: Any = type(f"{name}_settings", (base,), members)
+    return kind
 
 
 class Terms:
@@ -93,6 +94,11 @@ class Terms:
     def __init__(self, kind: str) -> None:
         """Begin without terms; `kind` is the name of the decorator."""
         self.kind, self.by_name = kind, dict[str, Term]()
+
+    @property
+    def words(self) -> str:
+        """The allowed values of a setting in words."""
+        return f"{self.kind} terms by name"
 
     @property
     def registry(self) -> dict[str, type[TermSettings]]:

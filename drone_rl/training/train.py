@@ -262,7 +262,7 @@ def make_groups(
             sizes[number],
             seed=seed,
             device=device,
-            task=replay,
+            task=replay or as_task(settings.task),  # the description lacks its rewards
             first_world=sum(sizes[:number]),
             num_shards=1,
             renderer=settings.renderer,

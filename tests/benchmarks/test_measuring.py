@@ -9,6 +9,7 @@ from benchmarks import pipeline, revisions, scaling, speed, startup, training
 from benchmarks.memory import growth
 from benchmarks.pipeline import paired, rate
 from drone_rl.config import AppearanceSettings
+from drone_rl.utils.run_result import RunResult
 from drone_rl.utils.settings import conf_dir
 
 
@@ -83,7 +84,8 @@ def test_a_training_is_evaluated_for_each_seed(setup, monkeypatch):
 
     def train(run, *settings):
         runs.append(settings)
-        return 2.0 * len(runs), {"frames": 10 * len(runs), "seconds": 0.5, "reason": "solved"}
+        result = RunResult(reason="solved", frames=10 * len(runs), seconds=0.5, largest_reward=3)
+        return 2.0 * len(runs), result
 
     monkeypatch.setattr(training, "train", train)
     monkeypatch.setattr(training, "evaluate", lambda setup, run: {"lower95": 0.9})

@@ -10,6 +10,7 @@ from benchmarks.peers import comparison
 from benchmarks.peers.comparison import bench_peers, train_ours
 from benchmarks.peers.program import PEERS, success_lower95
 from benchmarks.peers.settings import LABELS, OURS, THEIRS
+from drone_rl.utils.run_result import RunResult
 
 
 def test_learners_alternate_for_each_seed(setup, monkeypatch):
@@ -44,7 +45,7 @@ def test_our_training_is_measured(tmp_path, monkeypatch):
     def train(run, *arguments):
         run.mkdir()
         (run / "metrics.csv").write_text("seconds,train/running_reward\n0.5,1.5\n")
-        return 3.0, {"seconds": 1.0, "frames": 8, "reason": "frames"}
+        return 3.0, RunResult(reason="frames", frames=8, seconds=1.0, largest_reward=3)
 
     monkeypatch.setattr(comparison, "train", train)
     measured = train_ours([], seed=1, episodes=0, folder=tmp_path)

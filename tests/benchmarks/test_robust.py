@@ -23,6 +23,7 @@ from drone_rl.config.training import TrainSettings
 from drone_rl.config.transforms import Blur, Fault, Gray, LateFrames, Noise, Shift, Standardize
 from drone_rl.trust.axes import AXES, GROUPS
 from drone_rl.trust.paired_evaluation import PairedEvaluator
+from drone_rl.utils.run_result import RunResult
 from tests.trust.making import shifts_of
 from tests.trust.subjects import Blind, subject
 
@@ -55,7 +56,11 @@ def test_gains_and_costs_by_hand(setup, monkeypatch):
     )
     steps = (Gray(), Noise(), Shift(), Standardize())
     config = TrainSettings(appearance=appearance, transforms=steps).config()
-    monkeypatch.setattr(robust, "train", lambda run, seed, *_: (1.0, {"frames": int(seed[5:])}))
+
+    def train(run, seed, *settings):
+        return 1.0, RunResult(reason="solved", frames=int(seed[5:]), largest_reward=3)
+
+    monkeypatch.setattr(robust, "train", train)
     monkeypatch.setattr(robust, "read_checkpoint", lambda path: SimpleNamespace(config=config))
     monkeypatch.setattr(robust, "success_rates", success_rates)
     figures = bench_robust(setup)

@@ -16,7 +16,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import conf_dir
 
 COMMAND = re.compile(r"^(?:[A-Z]+=\S+ )?drone-rl ([a-z-]+)(.*)$", re.MULTILINE)
-_SWEPT = re.compile(r"=(?:range\((\d+)\)|(?:interval\()?([^\[\]{},(]+),.*)$")
+_SWEPT = re.compile(r"=(?:range\((\d+)\)|(?:tag\(log,)?(?:interval\()?([^\[\]{},(]+),.*)$")
 
 
 def check_commands(text):

@@ -15,6 +15,7 @@ from hydra.core.config_store import ConfigStore
 import drone_rl.explanations
 from drone_rl.cli.hydra import composition
 from drone_rl.config import TASKS
+from drone_rl.config.terms import REWARDS
 from drone_rl.explanations import report
 from drone_rl.explanations.report import page as report_page
 from drone_rl.sim.tasks.task import MAKERS
@@ -111,9 +112,10 @@ def workplace(tmp_path, monkeypatch):
     with (
         patch.dict(TASKS),
         patch.dict(MAKERS),
+        patch.dict(REWARDS.by_name),
         few,
         quick_figures(),
-    ):  # a page's tasks are registered until its end
+    ):  # a page's tasks and terms are registered until its end
         yield tmp_path
     report_page._environment.cache_clear()
     forget_choices()

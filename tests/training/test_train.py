@@ -12,6 +12,7 @@ from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.config.learning import Episodes
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.training import Callback
+from drone_rl.training.train import make_collector
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.run_result import RunResult
@@ -263,3 +264,14 @@ def test_a_result_is_forgotten_once_the_run_goes_on(trained, tmp_path):
             folder=folder, resume=True, trainer=longer, callbacks=[Kill()], progress=silent
         )
     assert not (folder / "result.json").exists()
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_weights_of_rewards_are_those_of_the_settings(compiled):
+    """Each cube pays 2.5, not the default of 1."""
+    task = TaskSettings(reward={"reached": {"weight": 2.5}})
+    collector = Episodes(num_envs=4, compiled=compiled)
+    made = make_collector(TrainSettings(task=task, collector=collector)).collector
+    rewards = next(iter(made))["next", "reward"]
+    made.shutdown()
+    assert set(rewards.unique().tolist()) == {0.0, 2.5}

@@ -49,6 +49,7 @@ def make_blocks(root: Path) -> dict[str, str]:
         "contracts": list_contracts(contracts),
         "choices": settings.list_choices(root / "conf"),
         "groups": settings.list_groups(),
+        "terms": settings.list_terms(),
         "parts": settings.list_parts(),
         "commands": settings.list_commands(),
         "presets": settings.list_presets(root / "conf"),

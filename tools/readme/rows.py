@@ -268,6 +268,13 @@ ADVERSARIAL = (
         "0",
     ),
     Row(
+        "adversaries",
+        "policies that act by rounding, sweep blindly or fail within a range: most fresh seeds of "
+        "one that is judged good and certain, or its range accepted; rate of all",
+        "{adversaries_most} of {adversaries_seeds}; {adversaries_rate:%}",
+        "1 of 20; 3%",
+    ),
+    Row(
         "fragile_honest",
         'honest policies, bundled or trained by default, "not certain" when episodes are repeated',
         "{fragile_honest} of {fragile_honest_total}",

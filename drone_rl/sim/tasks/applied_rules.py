@@ -139,7 +139,7 @@ class AppliedRules:
         world.moves_at_once, world.seconds = timestep is None, timestep or SECONDS
         world.step_limit = self._settings.step_limit
         world.weights, world.parameters, world.numbers = constants[3:]
-        world.goal, world.reached = _warp(state.ahead), _warp(state.reached)
+        world.ahead, world.reached = _warp(state.ahead), _warp(state.reached)
         world.sides, world.noted = _warp(state.sides), _warp(state.noted)
         world.actions, world.paid = _warp(state.action, wp.vec4), _warp(state.paid)
         world.steps, world.end_reasons = _warp(steps), _warp(end_reasons)
@@ -164,6 +164,18 @@ class AppliedRules:
 def reward_terms(rewards: Mapping[str, TermSettings]) -> tuple[Term, ...]:
     """Return the terms that settings name."""
     return tuple(REWARDS.by_name[name] for name in rewards)
+
+
+def largest_reward(rewards: Mapping[str, Any], **largest: float) -> float | None:
+    """Return the weighted sum of the terms' largest sums in an episode; None if one is unknown.
+
+    Without any contact that of `contact` is 0.
+    """
+    known = {"contact": 0.0, **largest}
+    weights = {name: of.weight for name, of in rewards.items() if of.weight}
+    if weights.keys() - known:
+        return None
+    return float(sum(weight * known[name] for name, weight in weights.items()))
 
 
 def _warp(tensor: Tensor, kind: Any = None) -> Any:

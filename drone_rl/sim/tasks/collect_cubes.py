@@ -12,7 +12,7 @@ from drone_rl.config import TaskSettings
 from drone_rl.config.term_task import ObjectSettings
 from drone_rl.sim.actions import DOWN, MOVES, MOVES_3D, UP, Entry, Move
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.tasks.applied_rules import AppliedRules, reward_terms
+from drone_rl.sim.tasks.applied_rules import AppliedRules, largest_reward, reward_terms
 from drone_rl.sim.tasks.collect_cubes_kernel import (
     ALL_CUBES,
     ENDS,
@@ -45,7 +45,7 @@ class CubeGoals(Goals):
 
 
 class CollectCubes(ObjectTask):
-    """Move until every cube is touched. The reward is 1 a cube."""
+    """Move until every cube is touched. By default the reward is 1 a cube."""
 
     name = TaskSettings.name
     ends = CubesEnd
@@ -72,7 +72,7 @@ class CollectCubes(ObjectTask):
             {f"cube_{i}": cube for i in range(s.num_cubes)},
             AppliedRules(rules, rewards=s.reward, parameters=bounds),
         )
-        self.largest_reward = float(s.num_cubes)
+        self.largest_reward = largest_reward(s.reward, reached=s.num_cubes)
         self.origin = (0.0, 0.0, s.altitude)
         if s.must_climb:
             self.needed_actions = {

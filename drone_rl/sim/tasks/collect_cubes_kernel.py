@@ -62,7 +62,7 @@ def choose_first(world: World, env: int, motion: Motion, axes: Axes, step: Step)
             world.noted[env, i] = lateral
         if ahead == NOTHING and objects.present[env, i]:
             ahead = i
-    world.goal[env] = ahead
+    world.ahead[env] = ahead
     return seen
 
 

@@ -11,7 +11,7 @@ from drone_rl.config import PillarsSettings
 from drone_rl.config.term_task import ObjectSettings
 from drone_rl.sim.actions import MOVES, Entry
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.tasks.applied_rules import AppliedRules, reward_terms
+from drone_rl.sim.tasks.applied_rules import AppliedRules, largest_reward, reward_terms
 from drone_rl.sim.tasks.common import Side, interval_classes, number_classes
 from drone_rl.sim.tasks.objects import ObjectState, ObjectTask
 from drone_rl.sim.tasks.pillars_kernel import (
@@ -38,7 +38,10 @@ class RowGoals(Goals):
 
 
 class Pillars(ObjectTask):
-    """Reach the finish line without touching a pillar. The reward is progress, 1 in total."""
+    """Reach the finish line without touching a pillar.
+
+    By default the reward is progress, 1 in total, minus 0.5 for a touch.
+    """
 
     name = PillarsSettings.name
     ends = PillarsEnd
@@ -68,6 +71,7 @@ class Pillars(ObjectTask):
             rules,
             num_goals=s.num_rows,
         )
+        self.largest_reward = largest_reward(s.reward, reached=s.num_rows, progress=1.0)
         self.lanes = Lanes(s)
         self.origin = (0.0, 0.0, s.altitude)
         tested = (

@@ -179,7 +179,7 @@ def choose_pillar(world: World, env: int, motion: Motion, axes: Axes, step: Step
             if aside < least:
                 least = aside
                 ahead = next_row * size + k
-    world.goal[env] = ahead
+    world.ahead[env] = ahead
     return step
 
 

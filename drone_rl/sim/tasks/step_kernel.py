@@ -70,7 +70,7 @@ class World:
     """Of all terms, one after the other."""
     numbers: wp.array[wp.float64]
     """Constants of the task's own rules."""
-    goal: wp.array[int]
+    ahead: wp.array[int]
     """Number of the object ahead: the goal, or what must be passed; or `NOTHING`. Shape: (N,)."""
     reached: wp.array2d[wp.bool]
     """Whether each of G goals is reached. Shape: (N, G), as of what follows."""
@@ -149,7 +149,7 @@ def side_of(aside: wp.float64, tolerance: wp.float64) -> int:
 def approach(world: World, env: int, motion: Motion, step: Step) -> Step:
     """Return the step with its distances to the goal that was ahead."""
     seen = step
-    ahead = world.goal[env]
+    ahead = world.ahead[env]
     if ahead != NOTHING:
         place = world.objects.places[env, ahead]
         now = wp.length(place - motion.now)
@@ -164,14 +164,14 @@ def approach(world: World, env: int, motion: Motion, step: Step) -> Step:
 def choose_nearest(world: World, env: int, motion: Motion, axes: Axes, step: Step) -> Step:
     """Let the nearest goal be the one ahead once the last one is gone, and note its side."""
     seen = approach(world, env, motion, step)
-    ahead = world.goal[env]
+    ahead = world.ahead[env]
     is_gone = ahead == NOTHING
     if not is_gone:
         is_gone = not world.objects.present[env, ahead]
     if is_gone:
         found = nearest(world.objects, env, motion.now, GOAL)
         ahead = found.thing
-        world.goal[env] = ahead
+        world.ahead[env] = ahead
         if ahead != NOTHING and world.sides[env, ahead] < 0:
             aside = wp.dot(world.objects.places[env, ahead] - motion.now, wp.vec3d(axes.left))
             reach = world.objects.sizes[ahead][1] + world.radius
@@ -185,7 +185,7 @@ def see(world: World, env: int, motion: Motion, axes: Axes, step: Step) -> Step:
     """Return the step with the drone's pose, clearance and action; count it."""
     seen = step
     objects = world.objects
-    ahead = world.goal[env]
+    ahead = world.ahead[env]
     if ahead != NOTHING:
         away = wp.vec3(objects.places[env, ahead] - motion.now)
         seen.goal = wp.vec3(

@@ -128,8 +128,8 @@ class Task(abc.ABC, Generic[S]):
     """How an episode ends in which a goal was missed and nothing else went wrong."""
     observed: tuple[str, ...] = ("end_reason",)
     """Entries of the information that dm_control's observations hold."""
-    largest_reward: float = 1.0
-    """The return of a perfect episode."""
+    largest_reward: float | None = 1.0
+    """The return of a perfect episode; None if it is unknown."""
     drone_size: float = 0.5
     """Edge in metres of the box around the drone."""
     origin: tuple[float, float, float] = (0.0, 0.0, 1.0)

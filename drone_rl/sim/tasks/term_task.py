@@ -24,8 +24,9 @@ from drone_rl.sim.tasks.task import Goals, register_task
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.utils.errors import InputError
 
-_MOST_TRIES = 1000
-"""Largest number of samples of a place until one keeps away from the objects before it."""
+_MOST_TRIES, _TRIES = 1000, 20
+"""Most samples of all objects until none is too near to another one; samples of each object."""
+_SIDES = {"left": "on its left", "ahead": "ahead", "right": "on its right"}
 _LAST_ENDS = ("STEP_LIMIT", "LOST_CONTROL")
 
 
@@ -74,6 +75,7 @@ class TermTask(ObjectTask):
     """A task of terms: every rule is that of its settings; see `define_task`."""
 
     success_end = SUCCESS
+    largest_reward = None
     observed = ("reached", "end_reason")
     scored = ("reached", "sides", "places")
 
@@ -98,7 +100,11 @@ class TermTask(ObjectTask):
         kinds: Any = enum.IntEnum("End", ["RUNNING", "SUCCESS", *own, *_LAST_ENDS], start=0)
         self.ends = kinds
         self.truncation = self.expected_end = kinds["STEP_LIMIT"]
-        self.vocabulary = TaskVocabulary(tested=f"scenes of the task {s.name}")
+        self.vocabulary = TaskVocabulary(
+            tested=f"scenes of the task {s.name}",
+            sides=_SIDES,
+            places=_SIDES,
+        )
         self.edits = self._edits()
         self.curriculum = Curriculum(s) if s.curriculum else None
 
@@ -132,21 +138,32 @@ class TermTask(ObjectTask):
         *start, heading = (
             random_state.uniform(*s.start.range_of(axis)) for axis in ("x", "y", "z", "heading")
         )
+        for _ in range(_MOST_TRIES):
+            placed, crowded = self._placed(s, start, random_state)
+            if crowded is None:
+                places = np.concatenate([[*start, math.radians(heading)], *placed])
+                return torch.from_numpy(places)
+        raise InputError(
+            f"task.objects: found no room for {crowded} in {_MOST_TRIES} tries that keeps "
+            f"{s.objects[crowded].apart:g} m from other objects and {s.start.apart:g} m from the "
+            "start; give a larger range of x or y, a smaller apart, or fewer objects"
+        )
+
+    def _placed(
+        self, s: TermTaskSettings, start: Any, random_state: np.random.RandomState
+    ) -> tuple[list[Any], str | None]:
+        """Return centres of the objects, or the name of those that found no room."""
         placed: list[Any] = []
-        for name, of in _named(s).items():
-            for _ in range(_MOST_TRIES):
-                place = np.array([random_state.uniform(*of.range_of(axis)) for axis in "xyz"])
-                if self._has_room(of, place, placed, start):
-                    break
-            else:
-                raise InputError(
-                    f"task.objects: found no room for {name} in {_MOST_TRIES} tries that keeps "
-                    f"{of.apart:g} m from other objects and {s.start.apart:g} m from the start; "
-                    "give a larger range of x or y, a smaller apart, or fewer objects"
-                )
-            placed.append((of, place))
-        places = np.concatenate([[*start, math.radians(heading)], *(p for _, p in placed)])
-        return torch.from_numpy(places)
+        for name, of in s.objects.items():
+            for _ in range(of.count):
+                for _ in range(_TRIES):
+                    place = np.array([random_state.uniform(*of.range_of(axis)) for axis in "xyz"])
+                    if self._has_room(of, place, placed, start):
+                        placed.append((of, place))
+                        break
+                else:
+                    return [], name
+        return [place for _, place in placed], None
 
     def _has_room(self, of: ObjectSettings, place: Any, placed: list[Any], start: Any) -> bool:
         """Return whether boxes around an object, the ones before it and the drone keep apart."""

@@ -92,6 +92,19 @@ def test_weights_and_parameters_are_settings():
     assert fly(made, FORWARD)[0] == pytest.approx([1.0 - 0.25])  # the ground is 2.1 m away
 
 
+@pytest.mark.parametrize(
+    ("task", "weights", "largest"),
+    [
+        ("collect_cubes", {"reached": 0.5}, 1.5),
+        ("collect_cubes", {"reached": 1.0, "time": -0.01}, None),
+        ("collect_cubes", {"reached": 1.0, "time": 0.0}, 3.0),
+        ("pillars", {"progress": 2.0, "contact": -1.0, "reached": 0.25}, 3.0),  # in four rows
+    ],
+)
+def test_the_largest_reward_follows_from_the_weights(task, weights, largest):
+    assert as_task(TASKS[task](reward=weights)).largest_reward == largest
+
+
 def test_the_side_of_a_goal_is_that_of_the_drone_when_it_comes_up():
     low = {**BALL, "x": 9.0, "y": -4.0}
     made = worlds(objects={"first": BALL, "second": low})
