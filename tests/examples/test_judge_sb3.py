@@ -28,4 +28,3 @@ def test_train_save_judge_and_explain(example, tmp_path, capsys, monkeypatch):
     assert (
         "of layer policy.features_extractor.cnn.5" in page
     )  # the nonlinearity after the last convolution
-    assert "What is left out" not in page

@@ -135,7 +135,8 @@ class Stage:
     @property
     def _placed(self) -> Tensor:
         """Where the scene's objects stand, or stood before they vanished. Shape: (1, *, 3)."""
-        return getattr(self.worlds.state, getattr(self.task, "props", "sampled"))
+        state: Any = self.worlds.state
+        return state.places if isinstance(self.task, ObjectTask) else state.sampled
 
     # Objects
 

@@ -25,7 +25,7 @@ from drone_rl.sim.tasks.common import (
     first_contact,
     interval_classes,
     number_classes,
-    side_of,
+    turn_towards,
 )
 from drone_rl.sim.tasks.objects import ObjectState, ObjectTask
 from drone_rl.sim.tasks.rules_kernel import make_rules
@@ -222,12 +222,6 @@ class FailureReplayTask(CollectCubes):
             lower, upper = self.boxes[int(which * len(self.boxes))].T
             cubes[:, 1] = torch.from_numpy(lower + np.array(parts) * (upper - lower))
         return cubes
-
-
-def turn_towards(lateral: Tensor, tolerance: float) -> Tensor:
-    """Return the move towards a cube so many metres to the left of the drone. Shape kept."""
-    moves = torch.tensor([Move.LEFT, Move.FORWARD, Move.RIGHT], device=lateral.device)
-    return moves[side_of(lateral, tolerance)]
 
 
 def inflated(boxes: NDArray[np.float64], metres: float, bound: float) -> NDArray[np.float64]:

@@ -66,12 +66,12 @@ def choose_first(world: World, env: int, motion: Motion, axes: Axes, step: Step)
     return seen
 
 
-def is_before_front(step: Step, bound: wp.float64 = 0.0) -> bool:  # pyright: ignore[reportArgumentType] (of Warp)
+def is_beyond_front(step: Step, bound: wp.float64 = 0.0) -> bool:  # pyright: ignore[reportArgumentType] (of Warp)
     """The drone is beyond the front boundary, metres along x."""
     return step.exact_position[0] > bound
 
 
-def is_aside(
+def is_beyond_side(
     step: Step,
     side: wp.float64 = 0.0,  # pyright: ignore[reportArgumentType]
     altitude: wp.float64 = 0.0,  # pyright: ignore[reportArgumentType]
@@ -82,6 +82,6 @@ def is_aside(
     return wp.abs(place[1]) > side or wp.abs(place[2] - altitude) > height
 
 
-ENDS = Term.of("front_boundary", is_before_front), Term.of("side_boundary", is_aside)
+ENDS = Term.of("front_boundary", is_beyond_front), Term.of("side_boundary", is_beyond_side)
 """Their parameters are those of `TaskSettings`."""
 ALL_CUBES = Term.of("all_cubes", has_all_goals)

@@ -1,4 +1,4 @@
-"""Parts that several tasks use: props, sides, classes of goals, views."""
+"""Parts that several tasks use: sides, contacts, classes of goals, views."""
 
 import enum
 import math
@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import CameraSettings
+from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.task import Goals
 from drone_rl.utils.text import ordinal
 
@@ -30,6 +31,12 @@ def side_of(lateral: Tensor, tolerance: float) -> Tensor:
     """Return the `Side` of metres to the left; AHEAD within `tolerance` metres. Shape kept."""
     right = torch.where(lateral < -tolerance, Side.RIGHT.value, Side.AHEAD.value)
     return torch.where(lateral > tolerance, Side.LEFT.value, right)
+
+
+def turn_towards(lateral: Tensor, tolerance: float) -> Tensor:
+    """Return the move towards metres to the left; FORWARD within `tolerance`. Shape kept."""
+    moves = torch.tensor([Move.LEFT, Move.FORWARD, Move.RIGHT], device=lateral.device)
+    return moves[side_of(lateral, tolerance)]
 
 
 def first_contact(reach: float | Tensor, before: Tensor, now: Tensor, places: Tensor) -> Tensor:

@@ -193,11 +193,11 @@ def is_touching(step: Step) -> bool:
     return step.contact
 
 
-def is_beside(step: Step, side: wp.float64 = 0.0) -> bool:  # pyright: ignore[reportArgumentType]
+def is_beyond_side(step: Step, side: wp.float64 = 0.0) -> bool:  # pyright: ignore[reportArgumentType]
     """The drone is beside the field, metres from its middle."""
     return wp.abs(step.exact_position[1]) > side
 
 
-ENDS = Term.of("pillar_touched", is_touching), Term.of("side_boundary", is_beside)
+ENDS = Term.of("pillar_touched", is_touching), Term.of("side_boundary", is_beyond_side)
 """Their parameters are those of `PillarsSettings`."""
 FINISH_LINE = Term.of("finish_line", is_over_line)

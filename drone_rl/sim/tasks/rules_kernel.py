@@ -175,13 +175,14 @@ class Rules:
         for number, term in enumerate(rewards):
             pay = _added(pay, bound(term, first), number)
             first += len(term.parameters)
-        firsts, numbers = [], [*range(SUCCESS + 1, SUCCESS + 1 + len(ends)), SUCCESS]
-        for term in (*ends, success):
-            firsts.append(first)
+        checks = []
+        for number, term in (*enumerate(ends, SUCCESS + 1), (SUCCESS, success)):
+            checks.append((bound(term, first), number))
             first += len(term.parameters)
-        order = [*range(len(ends)), len(ends)]
-        for i in [order[-1], *order[:-1]] if success_first else order:
-            find = _checked(find, bound((*ends, success)[i], firsts[i]), numbers[i])
+        if success_first:
+            checks.insert(0, checks.pop())
+        for term, number in checks:
+            find = _checked(find, term, number)
         step_limit = SUCCESS + 1 + len(ends)
         lost_control = step_limit + 1
 

@@ -13,7 +13,7 @@ from torch import Tensor
 from drone_rl.config import CameraSettings
 from drone_rl.sim.actions import Move
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.tasks.common import Side, place_in_view, side_of
+from drone_rl.sim.tasks.common import Side, place_in_view, turn_towards
 from drone_rl.sim.tasks.geometry_kernel import GOAL, OBSTACLE
 from drone_rl.sim.tasks.objects import ObjectState, ObjectTask
 
@@ -97,8 +97,7 @@ class SceneEdits:
         """
         lateral = offset[..., 1]
         if self.is_followed:
-            moves = torch.tensor([Move.LEFT, Move.FORWARD, Move.RIGHT], device=lateral.device)
-            return moves[side_of(lateral, self.reach)]
+            return turn_towards(lateral, self.reach)
         turn = torch.where(lateral > 0, Move.RIGHT, Move.LEFT)
         return torch.where(lateral.abs() <= self.reach, turn, Move.FORWARD)
 

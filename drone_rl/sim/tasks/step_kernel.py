@@ -22,7 +22,10 @@ class Step:
     heading: float
     """To the left of the world's x, radians."""
     goal: wp.vec3
-    """From the drone to the centre of its goal: forward, left and up as the drone is turned."""
+    """From the drone to its goal's centre: forward, left and up as the drone is turned.
+
+    In `pillars` to that of the nearest pillar of the next row.
+    """
     distance: float
     """To the centre of the goal that was ahead in this step; 0 if none was."""
     distance_before: float
