@@ -281,12 +281,10 @@ def test_terms_that_settings_could_not_name_are_refused(name, function, message)
 
 def test_a_camera_may_start_among_objects_that_keep_apart_from_the_start():
     around = {"count": 4, "size": [0.5, 0.5, 5.0], "x": [-4.0, 4.0], "y": [-4.0, 4.0]}
-    made = worlds(objects={"ball": BALL, "around": around}, start={"apart": 0.5})
-    assert made.task.settings.object_region.room == 0.5 + 0.4
-    with pytest.raises(InputError, match=r"give less than 0\.5"):
-        check_appearance(
-            AppearanceSettings(camera_offset=(0.6, 0.0, 0.0)),
-            CameraSettings(),
-            made.task.settings.object_region,
-            "test_reach",
-        )
+    start = {"apart": 0.5}
+    values = {"name": "test_reach", "objects": {"ball": BALL, "around": around}, "start": start}
+    region, camera = BaseTaskSettings.read(values).object_region, CameraSettings()
+    check_appearance(AppearanceSettings(), camera, region, "test_reach")
+    forward = AppearanceSettings(camera_offset=(0.6, 0.0, 0.0))
+    with pytest.raises(InputError, match=r"give less than 0\.5"):  # 0.5 m and half the drone, 0.4
+        check_appearance(forward, camera, region, "test_reach")
