@@ -165,7 +165,7 @@ def check_appearance(
             f"{_LEAST_HEIGHT - region.altitude:g} or more"
         )
     aside = max(most_left, -most_right)
-    reach = region.first - region.size / 2 - FRONT[0]
+    reach = region.room - FRONT[0]
     if forward >= reach:
         raise InputError(
             f"appearance.camera_offset={forward:g} forward puts the camera into the first object; "

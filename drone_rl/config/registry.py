@@ -14,7 +14,6 @@ classes and functions in higher layers.
 
 import functools
 import inspect
-import re
 import typing
 from collections.abc import Callable, Mapping, Sequence, Set
 from typing import Any, NamedTuple, TypeVar, cast
@@ -26,7 +25,7 @@ from drone_rl.config.networks import Network
 from drone_rl.config.parts import Part
 from drone_rl.config.transforms import Frame, Transform
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.plugins import described, errors_of, place_of
+from drone_rl.utils.plugins import check_name, described, errors_of, place_of, require_own
 from drone_rl.utils.settings import Settings
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -50,7 +49,6 @@ _BASES: dict[type[Part], _Base] = {
     Collector: _Base("Components", ("collector", "network", "generators")),
 }
 _KEYS = {"in_keys", "out_keys"}
-_NAME = re.compile(r"[a-z][a-z0-9_]{0,60}")
 
 
 def implements(*variants: type[Part]) -> Callable[[F], F]:
@@ -159,13 +157,12 @@ def _decorator(
     names of further ones, and `methods` those of the settings class.
     """
     kind = part.__name__.lower()
-    if not isinstance(name, str):
-        raise InputError('give a name in brackets, as in @drone_rl.register_network("mine")')
-    if not _NAME.fullmatch(name):
-        raise InputError(f"name={name!r} is invalid; give lower-case letters, digits and _")
+    check_name(name, "register_network")
 
     def register(factory: F) -> F:
-        _free_name(part, name, factory.__module__)
+        taken = part.registry.get(name)
+        if taken is not None:
+            require_own(f"{kind}={name}", taken.__module__, factory.__module__)
         fields = _fields(name, factory, positional, skipped)
         taken = {*dir(part), "target"} - part.model_fields.keys()
         for field, _, _ in fields:
@@ -190,19 +187,6 @@ def _decorator(
         return factory
 
     return register
-
-
-def _free_name(part: type[Part], name: str, module: str) -> None:
-    """Refuse the names of others' parts; a module that is imported again replaces its own."""
-    kind, others = part.__name__.lower(), part.registry.get(name)
-    if others is None:
-        return
-    if others.__module__.startswith("drone_rl."):
-        raise InputError(f"{kind}={name} is built in; give another name")
-    if len({others.__module__, module}) > 1 and "__main__" not in (others.__module__, module):
-        raise InputError(
-            f"{kind}={name} is registered by {others.__module__}, too; give another name"
-        )
 
 
 def _checked(factory: Callable[..., Any], what: str, base: _Base) -> Callable[..., Any]:

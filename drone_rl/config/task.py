@@ -31,7 +31,9 @@ class ObjectRegion(NamedTuple):
     last: float
     """Largest x."""
     altitude: float
-    """z at which the drone starts."""
+    """Least z at which the drone starts."""
+    room: float
+    """Least distance from there to the surface of an object."""
 
 
 TASKS: dict[str, type["BaseTaskSettings"]] = {}
@@ -141,7 +143,8 @@ class TaskSettings(BaseTaskSettings):
         """Where the cubes are; see `BaseTaskSettings`."""
         first, last = self.first_distance, self.last_distance
         color, bound = self.cube_color, self.lateral_bound
-        return ObjectRegion(self.cube_size, color, bound, first, last, self.altitude)
+        room = first - 0.5 * self.cube_size
+        return ObjectRegion(self.cube_size, color, bound, first, last, self.altitude, room)
 
     def check(self) -> None:
         """Reject tasks that can't be simulated or solved."""
@@ -232,7 +235,8 @@ class PillarsSettings(BaseTaskSettings):
         """Where the pillars are; see `BaseTaskSettings`."""
         first, last = self.first_distance, self.last_distance
         color, bound = self.pillar_color, self.spread
-        return ObjectRegion(self.width, color, bound, first, last, self.altitude)
+        room = first - 0.5 * self.width
+        return ObjectRegion(self.width, color, bound, first, last, self.altitude, room)
 
     def check(self) -> None:
         """Reject fields that can't be simulated or crossed."""

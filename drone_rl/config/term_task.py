@@ -180,4 +180,5 @@ class TermTaskSettings(BaseTaskSettings):
         bound = max(abs(y) for of in every for y in of.range_of("y"))
         first = min(of.range_of("x")[0] for of in every)
         last = max(of.range_of("x")[1] for of in every)
-        return ObjectRegion(size, color, bound, first, last, self.start.range_of("z")[1])
+        room = self.start.apart + 0.5 * self.drone_size
+        return ObjectRegion(size, color, bound, first, last, self.start.range_of("z")[0], room)

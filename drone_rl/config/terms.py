@@ -18,9 +18,9 @@ from typing import Annotated, Any, TypeVar
 from pydantic import BeforeValidator
 
 from drone_rl.utils.errors import InputError, did_you_mean
-from drone_rl.utils.plugins import place_of
+from drone_rl.utils.plugins import check_name, place_of, require_own
 from drone_rl.utils.schema import Real, shown
-from drone_rl.utils.settings import Settings, about
+from drone_rl.utils.settings import Settings, about, prefixed_errors
 
 MOST_PARAMETERS = 4
 """Largest number of parameters of a term."""
@@ -58,21 +58,34 @@ class Term:
     @classmethod
     def of(cls, name: str, function: Callable[..., Any], **own: float) -> "Term":
         """Return a function as a term; see `Terms.register`."""
-        _, *rest = inspect.signature(function).parameters.values()
-        if len(rest) > MOST_PARAMETERS:
+        place, every = place_of(function), [*inspect.signature(function).parameters.values()]
+        if not 1 <= len(every) <= 1 + MOST_PARAMETERS:
             raise InputError(
-                f"{place_of(function)} has {len(rest)} parameters besides the step; give at "
-                f"most {MOST_PARAMETERS}"
+                f"{place} has {len(every)} parameters; give step: Step and at most "
+                f"{MOST_PARAMETERS} numbers"
             )
-        for parameter in rest:
-            if not isinstance(parameter.default, int | float):
+        rest = every[1:]
+        types = {getattr(p.annotation, "__name__", str(p.annotation)) for p in rest}
+        is_exact = bool(types) and all("float64" in of for of in types)
+        for p in rest:
+            is_number = isinstance(p.default, int | float) and not isinstance(p.default, bool)
+            if not is_number or not (is_exact or types == {"float"}):
                 raise InputError(
-                    f"{place_of(function)}: the parameter {parameter.name} has no number as "
-                    f"default; write {parameter.name}: float = 1.0"
+                    f"{place}: the parameter {p.name} is no number; write {p.name}: float = 1.0"
                 )
-        settings = _settings_class(name, {**own, **{p.name: float(p.default) for p in rest}})
-        is_exact = any("float64" in str(p.annotation) for p in rest)
+            if p.name in own or hasattr(TermSettings, p.name):
+                raise InputError(
+                    f"{place}: settings of terms have {p.name} already; rename the parameter"
+                )
+        settings = _settings_class(name, {**own, **{p.name: p.default for p in rest}})
+        with prefixed_errors(name):
+            settings()  # its defaults are checked
         return cls(name, function, settings, tuple(p.name for p in rest), is_exact)
+
+    @property
+    def module(self) -> str:
+        """Name of the module that defines it."""
+        return __name__ if self.function is None else self.function.__module__
 
     @property
     def meaning(self) -> str:
@@ -109,10 +122,14 @@ class Terms:
         """Return a decorator that registers a function; `own` are numbers that are not arguments.
 
         Raises:
-            InputError: The function has too many parameters, or one without a number as default.
+            InputError: The name is invalid or taken, or a parameter is no number.
         """
+        check_name(name, self.kind)
 
         def decorate(function: F) -> F:
+            if name in self.by_name:
+                owner = self.by_name[name].module
+                require_own(f"{self.kind} {name}", owner, function.__module__)
             self.by_name[name] = Term.of(name, function, **own)
             return function
 

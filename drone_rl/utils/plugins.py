@@ -3,6 +3,7 @@
 import contextlib
 import importlib.util
 import os
+import re
 import sys
 import sysconfig
 import traceback
@@ -16,6 +17,7 @@ IMPORTED: list[str] = []
 """Modules, and absolute paths of files, that `plugins=` named; other processes must import them,
 too, by `import_plugin`."""
 _FOLDERS = (Path(__file__).parents[1], *map(sysconfig.get_path, ("stdlib", "purelib")))
+_NAME = re.compile(r"[a-z][a-z0-9_]{0,60}")
 _OTHERS = tuple(f"{folder}{os.sep}" for folder in _FOLDERS)
 """Folders of code that is not the user's."""
 
@@ -70,6 +72,25 @@ def _refuse_other(module: str, file: Path, name: str) -> None:
             f"plugins={name}: the module {module} of {origin or 'Python'} has precedence over your "
             f"{file.name}; rename the file"
         )
+
+
+def check_name(name: Any, decorator: str) -> None:
+    """Raise an `InputError` unless a decorator of the package is called with a valid name."""
+    if not isinstance(name, str):
+        raise InputError(f'give a name in brackets, as in @drone_rl.{decorator}("mine")')
+    if not _NAME.fullmatch(name):
+        raise InputError(f"name={name!r} is invalid; give lower-case letters, digits and _")
+
+
+def require_own(what: str, owner: str, module: str) -> None:
+    """Raise an `InputError` if a name is that of another module's part; see `check_name`.
+
+    A module that is imported again, or a cell that runs again, replaces its own.
+    """
+    if owner.startswith("drone_rl."):
+        raise InputError(f"{what} is built in; give another name")
+    if len({owner, module}) > 1 and "__main__" not in (owner, module):
+        raise InputError(f"{what} is registered by {owner}, too; give another name")
 
 
 def place_of(code: Callable[..., Any]) -> str:

@@ -18,6 +18,7 @@ from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.tasks.geometry_kernel import NOTHING
 from drone_rl.sim.tasks.step_kernel import Motion, Step, World, choose_nearest, see, touch_solid
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.plugins import errors_of, place_of
 
 _OPTIONS = {"enable_backward": False, "fuse_fp": False}
 wp.set_module_options(_OPTIONS)
@@ -56,7 +57,9 @@ def _rounded(numbers: wp.array[wp.float64], i: int) -> float:
 
 def bound(term: Term, first: int) -> Any:  # noqa: C901 (functions that Warp compiles)
     """Return a term as a Warp function of a step and all parameters; its own begin at `first`."""
-    function = wp.func(term.function)
+    place = place_of(term.function) if term.function else term.name
+    with errors_of(f"the term {term.name}", place):
+        function = wp.func(term.function)
     count = len(term.parameters)
     read = _exact if term.is_exact else _rounded
 
@@ -269,8 +272,8 @@ def _compile_error(text: str, terms: Iterable[Term]) -> str:
     """Return one line about the innermost line of code that Warp's message names."""
     places = re.findall(r'parsing function "(.*?)" at (.*?):(\d+)', text)
     reason = text.splitlines()[-1].lstrip(";") if text else "no reason given"
-    if not places:
-        names = ", ".join(term.name for term in terms)
+    if not places or places[-1][1] == __file__:  # where it is called
+        names = ", ".join(term.name for term in terms if not term.module.startswith("drone_rl."))
         return f"the terms {names} can't be compiled by Warp ({reason}); correct them"
     function, file, line = places[-1]
     return f"line {line} of {file}: {function} can't be compiled by Warp ({reason}); correct it"

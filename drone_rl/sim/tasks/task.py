@@ -242,8 +242,8 @@ def register_task(
         make: Makes the task from its settings; not for a task without settings.
 
     Raises:
-        InputError: Another task has this name, unless both are without settings, or an argument is
-            of the wrong kind.
+        InputError: Another task has this name, unless both are without settings or a notebook's
+            cell ran again, or an argument is of the wrong kind.
     """
     if isinstance(settings, Task):
         as_settings(settings)
@@ -255,7 +255,8 @@ def register_task(
             "settings and what makes it: register_task(MySettings, MyTask)"
         )
     _require_name(settings)
-    if TASKS.get(settings.name, settings) is not settings:
+    other = TASKS.get(settings.name, settings)
+    if (other.__module__, other.__name__) != (settings.__module__, settings.__name__):
         raise InputError(f"there is a task called {settings.name}; give another name")
     with prefixed_errors(settings.__name__):
         settings()  # its defaults are checked

@@ -9,6 +9,8 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 import drone_rl
 from drone_rl import InputError, Step, define_task, reward
 from drone_rl.acceleration import FusedEpisodes
+from drone_rl.config.appearance import AppearanceSettings, check_appearance
+from drone_rl.config.camera import CameraSettings
 from drone_rl.config.task import TASKS, BaseTaskSettings
 from drone_rl.sim.tasks import as_task
 from drone_rl.sim.tasks.task import MAKERS
@@ -252,3 +254,37 @@ def test_a_training_with_a_curriculum_resumes_bit_for_bit(tmp_path):
     assert again.result.running_reward == whole.result.running_reward
     one, two = (drone_rl.load_policy(of.folder).state.weights for of in (whole, again))
     assert all(torch.equal(one[name], two[name]) for name in one)
+
+
+def _named_weight(step: Step, weight: float = 1.0) -> float:
+    return weight
+
+
+def _whole(step: Step, count: int = 1) -> float:
+    return float(count)
+
+
+@pytest.mark.parametrize(
+    ("name", "function", "message"),
+    [
+        ("contact", near, "contact is built in"),
+        ("My Term", near, "My Term"),
+        ("test_weight", _named_weight, "weight"),
+        ("test_whole", _whole, "count: float"),
+        ("test_none", lambda: 0.0, "0 parameters"),
+    ],
+)
+def test_terms_that_settings_could_not_name_are_refused(name, function, message):
+    with pytest.raises(InputError, match=message):
+        reward(name)(function)
+
+
+def test_a_camera_may_start_among_objects_that_keep_apart_from_the_start():
+    around = {"count": 4, "size": [0.5, 0.5, 5.0], "x": [-4.0, 4.0], "y": [-4.0, 4.0]}
+    start = {"apart": 0.5}
+    values = {"name": "test_reach", "objects": {"ball": BALL, "around": around}, "start": start}
+    region, camera = BaseTaskSettings.read(values).object_region, CameraSettings()
+    check_appearance(AppearanceSettings(), camera, region, "test_reach")
+    forward = AppearanceSettings(camera_offset=(0.6, 0.0, 0.0))
+    with pytest.raises(InputError, match=r"give less than 0\.5"):  # 0.5 m and half the drone, 0.4
+        check_appearance(forward, camera, region, "test_reach")
