@@ -9,6 +9,7 @@ from drone_rl.config.parts import Named
 from drone_rl.config.terms import Rewards
 from drone_rl.config.values import Steps
 from drone_rl.utils.schema import Real, Several, Whole
+from drone_rl.utils.settings import Settings
 
 Length = Annotated[float, Real(0.001, 10_000.0, unit="m")]
 Bound = Annotated[float, Real(0.0, 10_000.0, unit="m")]
@@ -52,6 +53,10 @@ class BaseTaskSettings(Named):
     def object_region(self) -> ObjectRegion | None:
         """Region, size and color of the task's objects; None if unknown."""
         return None
+
+    def __reduce__(self) -> Any:
+        """Pickle the values and the name, since classes of terms are made at run time."""
+        return BaseTaskSettings.read, ({"name": self.name, **Settings.values(self)}, "task")
 
     def values(self) -> dict[str, Any]:
         """See `Settings.values`; a task other than `DEFAULT_TASK` has its name."""

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 import torch
@@ -213,6 +214,10 @@ class FailureReplayTask(CollectCubes):
         """
         super().__init__(settings)
         self.boxes, self.share = boxes, share
+
+    def __reduce__(self) -> Any:
+        """See `ObjectTask`."""
+        return type(self), (self.settings, self.boxes, self.share)
 
     def sample(self, random_state: np.random.RandomState) -> Tensor:
         """Sample the positions of the cubes. Shape: (num_cubes, 3)."""

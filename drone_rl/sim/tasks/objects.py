@@ -85,6 +85,10 @@ class ObjectTask(Task[ObjectState]):
         self.reward_terms = tuple(term.name for term in rules.compiled.rewards)
         rules.bind(self.each, settings)
 
+    def __reduce__(self) -> Any:
+        """Copy and pickle the settings, since rules are compiled; a subclass adds its arguments."""
+        return type(self), (self.settings,), {"curriculum": self.curriculum}
+
     def make_dynamics(self) -> Dynamics:
         """Return moves of the task's length (Table 1 of Luo et al., 2018)."""
         return ComputerVision(self.settings.step_length)
@@ -170,11 +174,6 @@ class ObjectTask(Task[ObjectState]):
         if len({self.each[i].half_size for i in solid}) != 1:
             return None
         return Obstacles(self.places(state)[:, solid], self.each[solid[0]].half_size)
-
-    def next_number(self, state: ObjectState) -> Tensor:
-        """Return the object ahead, P for none. Shape: (N,), int64."""
-        ahead = state.ahead.long()
-        return torch.where(ahead == NOTHING, len(self.each), ahead)
 
 
 def follows_rules(task: Task[Any]) -> bool:

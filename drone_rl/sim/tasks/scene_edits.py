@@ -14,7 +14,7 @@ from drone_rl.config import CameraSettings
 from drone_rl.sim.actions import Move
 from drone_rl.sim.dynamics import BodyState
 from drone_rl.sim.tasks.common import Side, place_in_view, turn_towards
-from drone_rl.sim.tasks.geometry_kernel import GOAL, OBSTACLE
+from drone_rl.sim.tasks.geometry_kernel import GOAL, NOTHING, OBSTACLE
 from drone_rl.sim.tasks.objects import ObjectState, ObjectTask
 
 
@@ -62,7 +62,8 @@ class SceneEdits:
 
     def next_target(self, state: ObjectState) -> Tensor:
         """Return the target that calls for action now; their number if none does. (N,)."""
-        return self.task.next_number(state)
+        ahead = state.ahead.long()
+        return torch.where(ahead == NOTHING, len(self.task.each), ahead)
 
     def next_offset(self, state: ObjectState) -> Tensor:
         """Return the next target's offset from the drone, metres; NaN if there is none. (N, 3).

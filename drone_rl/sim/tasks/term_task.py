@@ -193,7 +193,7 @@ class TermTask(ObjectTask):
             "places": state.places.float(),
             "present": state.present,
             "touched": state.touched,
-            "goal": self.next_number(state)[:, None],
+            "goal": self.edits.next_target(state)[:, None],
             "paid": state.paid.float(),
             "end_reason": state.end_reason[:, None],
         }
