@@ -16,7 +16,6 @@ MUTABLE = {
     "explanations.heat_maps:Explainer",
     "explanations.truth:Intervention",
     "explanations.rollouts:RolloutDataset",
-    "trust.domain:End",
     "policies.zoo.files:TrainingProgress",
     "sweeps.figures:Layout",
     "training.actor_critic:ActorCriticLearner",

@@ -134,7 +134,7 @@ def test_a_network_learns_the_actions_of_the_flights():
     assert (done["demonstrations"], done["frames"]) == (4, 48)
     assert (done["held_out_demonstrations"], done["held_out_frames"]) == (1, 12)
     assert (done["folder"], done["epochs"]) == ("x", 60) and done["seconds"] > 0
-    assert Cloning.read(done, "cloning").values() == done
+    assert Cloning.read(done, "cloning").model_dump() == done
     observed = RecordedFrames.of(FLIGHTS, "cpu").observe(
         torch.arange(60), [t.make() for t in SETTINGS.transforms]
     )

@@ -50,6 +50,10 @@ class AppliedRules:
         self._bounds = wp.vec3d(*low), wp.vec3d(*high)
         self._arrays = dict[str, tuple[Any, ...]]()
 
+    def __deepcopy__(self, memo: Any) -> "AppliedRules":
+        """Return the same rules, which never change and whose kernels can't be copied."""
+        return self
+
     def bind(self, objects: Sequence[ObjectSettings], settings: Any) -> None:
         """Take the P objects, and settings with `drone_size` and `step_limit`."""
         self._objects, self._settings = objects, settings

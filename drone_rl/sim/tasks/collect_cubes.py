@@ -80,7 +80,7 @@ class CollectCubes(ObjectTask):
                 f"keeps its altitude never touches them; give at most {s.touch_distance} (half of "
                 "cube_size + drone_size), or actions=moves_3d"
             }
-        self.vocabulary = shipped_vocabulary(self.name).replace(tested=_some_cubes(s))
+        self.vocabulary = shipped_vocabulary(TaskSettings.name).replace(tested=_some_cubes(s))
         actions = MOVES_3D if s.must_climb else MOVES
         self.oracle = OracleRule(("drone", "cube_positions", "next_cube"), self.line_up, actions)
         reach, bound = s.touch_distance, s.vertical_bound

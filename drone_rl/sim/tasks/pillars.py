@@ -78,7 +78,7 @@ class Pillars(ObjectTask):
             f"{plural(s.num_rows, 'row')} of pillars {s.width:g} m wide, {s.density:g} per metre "
             f"of row width, {s.spacing:g} m from row to row"
         )
-        self.vocabulary = shipped_vocabulary(self.name).replace(tested=tested)
+        self.vocabulary = shipped_vocabulary(PillarsSettings.name).replace(tested=tested)
         self.oracle = OracleRule(("drone", "rows", "next_row"), self.lanes.fly_through, MOVES)
         reach = s.touch_distance
         self.edits = SceneEdits(
