@@ -77,7 +77,7 @@ class TermTask(ObjectTask):
     success_end = SUCCESS
     largest_reward = None
     observed = ("reached", "end_reason")
-    scored = ("reached", "sides", "places")
+    scored = ("reached", "sides", "places", "end_reason")
 
     def __init__(self, settings: TermTaskSettings) -> None:
         """Take the settings of a task of terms."""
@@ -199,8 +199,12 @@ class TermTask(ObjectTask):
         }
 
     def score(self, info: Mapping[str, Tensor]) -> Goals:
-        """Return the goals; their strata are the sides on which they came up."""
-        return Goals(info["reached"], info["sides"], info["places"].flatten(1).double())
+        """Return the goals; their strata are the sides on which they came up.
+
+        A success counts as all of them: its own meaning may need only some.
+        """
+        reached = info["reached"] | (info["end_reason"] == SUCCESS)
+        return Goals(reached, info["sides"], info["places"].flatten(1).double())
 
     def _edits(self) -> SceneEdits:
         """Return changes of its scenes; random goals are as far ahead as goals ever are."""

@@ -288,3 +288,17 @@ def test_a_camera_may_start_among_objects_that_keep_apart_from_the_start():
     forward = AppearanceSettings(camera_offset=(0.6, 0.0, 0.0))
     with pytest.raises(InputError, match=r"give less than 0\.5"):  # 0.5 m and half the drone, 0.4
         check_appearance(forward, camera, region, "test_reach")
+
+
+@drone_rl.success("test_any_goal")
+def any_goal(step: Step) -> bool:
+    """One of two goals is reached."""
+    return step.remaining <= 1
+
+
+@pytest.mark.parametrize(("success", "reached"), [("test_any_goal", 2), ("all_goals", 1)])
+def test_a_success_counts_as_all_goals(success, reached):
+    far = {**BALL, "x": 30.0}
+    made = worlds(objects={"ball": BALL, "far": far}, success=[success])
+    fly(made, *[FORWARD] * 5)  # at x = 5 the drone touches the nearer ball of radius 1 at x = 6
+    assert int(made.task.score(made.info()).reached.sum()) == reached
