@@ -138,9 +138,10 @@ class TermTask(ObjectTask):
         *start, heading = (
             random_state.uniform(*s.start.range_of(axis)) for axis in ("x", "y", "z", "heading")
         )
+        crowded = ""
         for _ in range(_MOST_TRIES):
             placed, crowded = self._placed(s, start, random_state)
-            if crowded is None:
+            if not crowded:
                 places = np.concatenate([[*start, math.radians(heading)], *placed])
                 return torch.from_numpy(places)
         raise InputError(
@@ -151,8 +152,8 @@ class TermTask(ObjectTask):
 
     def _placed(
         self, s: TermTaskSettings, start: Any, random_state: np.random.RandomState
-    ) -> tuple[list[Any], str | None]:
-        """Return centres of the objects, or the name of those that found no room."""
+    ) -> tuple[list[Any], str]:
+        """Return centres of the objects, and the name of those that found no room, if any."""
         placed: list[Any] = []
         for name, of in s.objects.items():
             for _ in range(of.count):
@@ -163,7 +164,7 @@ class TermTask(ObjectTask):
                         break
                 else:
                     return [], name
-        return [place for _, place in placed], None
+        return [place for _, place in placed], ""
 
     def _has_room(self, of: ObjectSettings, place: Any, placed: list[Any], start: Any) -> bool:
         """Return whether boxes around an object, the ones before it and the drone keep apart."""
