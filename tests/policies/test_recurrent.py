@@ -255,7 +255,7 @@ def test_every_command_runs_it(trained, tmp_path):
     sizes = {"frames": 40, "data_episodes": 30, "perplexity": 5}
     explained = drone_rl.explain(policy, folder=tmp_path / "explained", **sizes, **few)
     (results,) = explained.policies.values()
-    assert [*results.left_out] == ["contradictions", "places"] and results.dataset.remembers
+    assert "contradictions" in results.left_out and results.dataset.remembers
     assert "remembers earlier frames" in explained.report.read_text()
     drone_rl.class_models(policy, steps=2, episodes=2, gallery=False, seed=0)
     film(policy, tmp_path / "film", 1)
