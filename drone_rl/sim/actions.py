@@ -7,6 +7,7 @@ discrete actions, or kinds of continuous actions, such as "left".
 import abc
 import dataclasses
 import enum
+import functools
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, TypeVar
 
@@ -159,8 +160,7 @@ class Actions(abc.ABC):
         By default those of the action's part by name, see `SPEEDS`; zero for other names.
         Shapes: (*), then the entry's, to (*, 4), float32.
         """
-        table = [SPEEDS.get(name, (0.0, 0.0, 0.0, 0.0)) for name in self.names]
-        return torch.tensor(table, device=action.device)[self.part(action)]
+        return _speeds(self.names, action.device)[self.part(action)]
 
     @abc.abstractmethod
     def sample(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
@@ -177,6 +177,12 @@ class Actions(abc.ABC):
     @abc.abstractmethod
     def is_reversible(self, kept: Mapping[str, Tensor]) -> Tensor:
         """Return whether actions, as `kept`, are steps of going back and forth. (T,), bool."""
+
+
+@functools.lru_cache(maxsize=64)
+def _speeds(names: tuple[str, ...], device: torch.device) -> Tensor:
+    table = [SPEEDS.get(name, (0.0, 0.0, 0.0, 0.0)) for name in names]
+    return torch.tensor(table, device=device)
 
 
 def _take(values: Sequence[int], part: Tensor) -> Tensor:

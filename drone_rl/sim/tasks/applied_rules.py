@@ -18,6 +18,8 @@ from drone_rl.utils.errors import InputError
 
 SECONDS = 0.1
 """Duration of a step of dynamics without time."""
+_WRITTEN = ("present", "touched", "ahead", "reached", "sides", "noted")
+"""Fields of states, in the order of the kernel's arguments."""
 
 
 class AppliedRules:
@@ -48,7 +50,7 @@ class AppliedRules:
         weights: list[Any] = [rewards[term.name] for term in rules.rewards]
         self._lists = [[float(of.weight) for of in weights], [*own, *parameters], [*numbers]]
         self._bounds = wp.vec3d(*low), wp.vec3d(*high)
-        self._arrays = dict[str, tuple[Any, ...]]()
+        self._kept = dict[tuple[str, float | None], Any]()
 
     def bind(self, objects: Sequence[ObjectSettings], settings: Any) -> None:
         """Take the P objects, and settings with `drone_size` and `step_limit`."""
@@ -91,17 +93,20 @@ class AppliedRules:
         rewards = torch.empty(count, dtype=torch.float64, device=device)
         flown = isinstance(body, FlightState)
         thing = body.contact.thing if flown else torch.full_like(state.steps, NOTHING)
+        timestep = getattr(dynamics, "timestep", None)
         inputs = [
-            self.world(state, steps, end_reasons, dynamics),
+            self._constants(str(device), timestep),
             is_start,
-            _warp(before.double(), wp.vec3d),
-            _warp(body.position.double(), wp.vec3d),
-            _warp(body.velocity.float(), wp.vec3),
-            _warp(body.attitude.float(), wp.vec4),
-            _warp(body.is_lost),
-            _warp(thing.int()),
-            _warp(speeds.float(), wp.vec4),
-            _warp(rewards),
+            _ctype(state.places, wp.vec3d),
+            *(_ctype(getattr(state, name)) for name in _WRITTEN),
+            _ctype(state.action, wp.vec4),
+            *map(_ctype, (state.paid, steps, end_reasons)),
+            *(_ctype(of.double(), wp.vec3d) for of in (before, body.position)),
+            _ctype(body.velocity.float(), wp.vec3),
+            _ctype(body.attitude.float(), wp.vec4),
+            *map(_ctype, (body.is_lost, thing.int())),
+            _ctype(speeds, wp.vec4),
+            _ctype(rewards),
         ]
         with on_torch_stream(device):
             wp.launch(self.compiled.step_all, count, inputs=inputs, device=str(device))
@@ -126,39 +131,42 @@ class AppliedRules:
 
         Steps and end reasons are int32, (N,). Without dynamics moves are done at once.
         """
-        constants = self._constants(str(state.places.device))
-        world: Any = World()
-        objects: Any = Objects()
-        objects.shapes, objects.roles, objects.sizes = constants[:3]
+        device, timestep = str(state.places.device), getattr(dynamics, "timestep", None)
+        world = self._make_constants(device, timestep)
+        objects: Any = world.objects
         objects.places = _warp(state.places, wp.vec3d)
         objects.present, objects.touched = _warp(state.present), _warp(state.touched)
         world.objects = objects
-        world.low, world.high = self._bounds
-        world.radius = 0.5 * self._settings.drone_size
-        timestep = getattr(dynamics, "timestep", None)
-        world.moves_at_once, world.seconds = timestep is None, timestep or SECONDS
-        world.step_limit = self._settings.step_limit
-        world.weights, world.parameters, world.numbers = constants[3:]
         world.ahead, world.reached = _warp(state.ahead), _warp(state.reached)
         world.sides, world.noted = _warp(state.sides), _warp(state.noted)
         world.actions, world.paid = _warp(state.action, wp.vec4), _warp(state.paid)
         world.steps, world.end_reasons = _warp(steps), _warp(end_reasons)
         return world
 
-    def _constants(self, device: str) -> tuple[Any, ...]:
-        """Return shapes, roles and half sizes of objects, weights, parameters and numbers."""
-        if device in self._arrays:
-            return self._arrays[device]
+    def _constants(self, device: str, timestep: float | None) -> Any:
+        """Return the rules' constants, without states."""
+        key = device, timestep
+        if key not in self._kept:
+            self._kept[key] = self._make_constants(device, timestep)
+        return self._kept[key]
+
+    def _make_constants(self, device: str, timestep: float | None) -> Any:
         start_warp(device)
+        world, objects = World(), Objects()
         shapes = torch.tensor([SHAPES.index(of.shape) for of in self._objects], dtype=torch.int32)
         sizes = torch.tensor([of.half_size for of in self._objects], dtype=torch.float64)
         roles = torch.tensor([ROLES.index(of.role) for of in self._objects], dtype=torch.int32)
-        self._arrays[device] = (
-            *(_warp(of.to(device)) for of in (shapes, roles)),
-            _warp(sizes.to(device), wp.vec3d),
-            *(_warp(torch.tensor(of, dtype=torch.float64, device=device)) for of in self._lists),
+        objects.shapes, objects.roles = _warp(shapes.to(device)), _warp(roles.to(device))
+        objects.sizes = _warp(sizes.to(device), wp.vec3d)
+        world.objects = objects
+        world.low, world.high = self._bounds
+        world.radius = 0.5 * self._settings.drone_size
+        world.moves_at_once, world.seconds = timestep is None, timestep or SECONDS
+        world.step_limit = self._settings.step_limit
+        world.weights, world.parameters, world.numbers = (
+            _warp(torch.tensor(of, dtype=torch.float64, device=device)) for of in self._lists
         )
-        return self._arrays[device]
+        return world
 
 
 def reward_terms(rewards: Mapping[str, TermSettings]) -> tuple[Term, ...]:
@@ -181,3 +189,8 @@ def largest_reward(rewards: Mapping[str, Any], **largest: float) -> float | None
 def _warp(tensor: Tensor, kind: Any = None) -> Any:
     """Return a tensor as Warp's array, which shares its memory if it is contiguous."""
     return wp.from_torch(tensor.contiguous(), dtype=kind)
+
+
+def _ctype(tensor: Tensor, kind: Any = None) -> Any:
+    """Return a tensor as an argument of a kernel, which is made faster than an array."""
+    return wp.from_torch(tensor.contiguous(), dtype=kind, return_ctype=True)

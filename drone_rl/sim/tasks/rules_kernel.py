@@ -16,7 +16,15 @@ from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, PoseArrays
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.tasks.geometry_kernel import NOTHING
-from drone_rl.sim.tasks.step_kernel import Motion, Step, World, choose_nearest, see, touch_solid
+from drone_rl.sim.tasks.step_kernel import (
+    Motion,
+    Step,
+    World,
+    choose_nearest,
+    see,
+    touch_solid,
+    with_states,
+)
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.plugins import errors_of, place_of
 
@@ -208,8 +216,19 @@ class Rules:
 
         @wp.kernel(module="unique", module_options=_OPTIONS)
         def step_all(
-            world: World,
+            constants: World,
             is_start: bool,
+            places: wp.array2d[wp.vec3d],
+            present: wp.array2d[wp.bool],
+            touched: wp.array2d[wp.bool],
+            ahead: wp.array[int],
+            reached: wp.array2d[wp.bool],
+            sides: wp.array2d[int],
+            noted: wp.array2d[wp.float64],
+            actions: wp.array[wp.vec4],
+            paid: wp.array2d[wp.float64],
+            steps: wp.array[int],
+            end_reasons: wp.array[int],
             before: wp.array[wp.vec3d],
             now: wp.array[wp.vec3d],
             velocity: wp.array[wp.vec3],
@@ -221,6 +240,20 @@ class Rules:
         ) -> None:
             """Apply all rules to environments, a thread each; at a start only choose a goal."""
             env = wp.tid()
+            world = with_states(
+                constants,
+                places,
+                present,
+                touched,
+                ahead,
+                reached,
+                sides,
+                noted,
+                actions,
+                paid,
+                steps,
+                end_reasons,
+            )
             motion = Motion()
             motion.before = before[env]
             motion.now = now[env]
