@@ -121,4 +121,4 @@ def _draw(groups: Sequence[Sequence[RunCurves]], x: str) -> Figure:
 
 def _words(override: str) -> str:
     """Return an override in words, such as "optimizer learning rate=1e-3"."""
-    return re.sub(r"[._=]+(?!\d)", " ", override).replace(" lr", " learning rate")
+    return re.sub(r"[._=]+(?!\d)", " ", override.lstrip("+")).replace(" lr", " learning rate")
