@@ -14,6 +14,7 @@ from drone_rl.config import TASKS
 from drone_rl.sim.tasks import as_task
 from drone_rl.sweeps.rows import Array
 from drone_rl.sweeps.summary import on_grid
+from drone_rl.training.metrics import success_metric
 from drone_rl.trust.plots.saving import new_chart
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.overrides import read_overrides
@@ -69,7 +70,7 @@ def read_run(folder: Path, x: str) -> RunCurves:
         columns = {name: np.array(values) for name, values in read_metrics(folder).items()}
         y = {_REWARD: columns["train/running_reward"]}
         for task in map(as_task, TASKS):
-            rates = columns.get(f"end/{task.ends(task.success_end).name.lower()}")
+            rates = columns.get(success_metric(task))
             if rates is not None:
                 y[_SUCCESS] = success_rates(columns["episodes"], rates)
         settings = read_yaml(folder / "run.yaml")["config"] | {"seed": None}

@@ -15,6 +15,7 @@ from torchrl.record.loggers import Logger
 from drone_rl.config.training import DETERMINISTIC
 from drone_rl.policies.zoo import TrainingProgress as TrainingProgress
 from drone_rl.sim.tasks import Task
+from drone_rl.training.metrics import success_metric
 from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.files import make_folder, write_atomically
 from drone_rl.utils.progress import Progress, as_progress
@@ -182,8 +183,12 @@ class CollapseCheck(Callback):
     STEP = 0.01
     """Fraction of the target by which the running reward must rise to count as improvement."""
 
-    def __init__(self, target: float | None) -> None:
-        """Take the running reward at which the task counts as solved, if one is known."""
+    def __init__(self, target: float | None, success: str) -> None:
+        """Take the running reward at which the task counts as solved, and what measures success.
+
+        `target` is None if it is unknown; `success` is a name, see `success_metric`.
+        """
+        self._success = success
         self._target, self._best = target, float("-inf")
         self._since = (0, 0)
         """Episodes and updates at the last sign of learning."""
@@ -202,7 +207,7 @@ class CollapseCheck(Callback):
         is_better = progress.running_reward > self._best + self.STEP * (self._target or 0.0)
         self._best = progress.running_reward if is_better else self._best
         if self._target is None:
-            is_close = metrics.get("end/success", 0.0) >= self.CLOSE
+            is_close = metrics.get(self._success, 0.0) >= self.CLOSE
         else:
             is_close = progress.running_reward >= self.CLOSE * self._target
         if is_better or is_close or not is_deterministic:
@@ -225,7 +230,7 @@ class WidenRanges(Callback):
     def __init__(self, tasks: Sequence[Task[Any]], *, is_new: bool) -> None:
         """Take the task of each group of environments, and whether the training is a new one."""
         self._curricula = [task.curriculum for task in tasks]
-        self._success = f"end/{tasks[0].ends(tasks[0].success_end).name.lower()}"
+        self._success = success_metric(tasks[0])
         if is_new:
             for curriculum in self._curricula:
                 curriculum.load((0.0, 0.0))
@@ -235,8 +240,8 @@ class WidenRanges(Callback):
         success, (first, *others) = metrics[self._success], self._curricula
         if not math.isnan(success) and first.note(success):
             _log.info("curriculum: level %.1f of 1", first.level)
-        for curriculum in others:
-            curriculum.load(first.state())
+            for curriculum in others:
+                curriculum.load(first.state())
 
 
 class UnpaidTerms(Callback):

@@ -2,12 +2,13 @@
 
 import enum
 from collections.abc import Iterable, Sequence
-from typing import cast
+from typing import Any, cast
 
 import torch
 from tensordict import TensorDictBase
 from torch import Tensor
 
+from drone_rl.sim.tasks import Task
 from drone_rl.utils.errors import InputError
 
 
@@ -43,6 +44,11 @@ def running_mean(old: float, values: Tensor, decay: float) -> float:
     for value in values.tolist():
         old = decay * old + (1 - decay) * value
     return old
+
+
+def success_metric(task: Task[Any]) -> str:
+    """Return the name of the success rate among `batch_metrics`."""
+    return f"end/{task.ends(task.success_end).name.lower()}"
 
 
 def batch_metrics(

@@ -39,6 +39,7 @@ from drone_rl.training.callbacks import (
 from drone_rl.training.cloning import clone
 from drone_rl.training.confirmation import Confirmation
 from drone_rl.training.learners import NotANumberError, ReinforceLearner
+from drone_rl.training.metrics import success_metric
 from drone_rl.training.run_folder import Judge, RunFolder, Training
 from drone_rl.training.trainer import Trainer
 from drone_rl.utils.available_memory import require_memory
@@ -130,9 +131,10 @@ def learn(
         if confirmation is not None:
             stack.callback(confirmation.close)
         checkpoints = run.checkpoints(settings)
-        collapse = CollapseCheck(target or as_task(settings.task).largest_reward)
+        task = as_task(settings.task)
+        collapse = CollapseCheck(target or task.largest_reward, success_metric(task))
         first = [CsvCallback(folder / "metrics.csv"), checkpoints, collapse, UnpaidTerms()]
-        if as_task(settings.task).curriculum is not None:
+        if task.curriculum is not None:
             if not parts.tasks:
                 raise InputError("collector=ray widens no task.curriculum; give another collector")
             first.append(WidenRanges(parts.tasks, is_new=state is None))
@@ -149,7 +151,7 @@ def learn(
             total_episodes=limits.total_episodes,
             running_decay=limits.running_decay,
             ends=run_folder.possible_ends(settings),
-            reward_terms=as_task(settings.task).reward_terms,
+            reward_terms=task.reward_terms,
         )
         own_threads = getattr(learner, "num_threads", None)
         stack.enter_context(torch_threads(own_threads or limits.num_threads))

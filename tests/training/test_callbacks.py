@@ -104,7 +104,7 @@ def test_passes_over_demonstrations_have_rows_of_their_own(tmp_path):
 
 def collapse(updates, episodes=10, target=3.0, **metrics):
     """A check after updates of (entropy, running reward), with so many episodes each."""
-    check, progress = CollapseCheck(target), TrainingProgress()
+    check, progress = CollapseCheck(target, "end/success"), TrainingProgress()
     training = types.SimpleNamespace(progress=progress)
     check.on_start(training)
     for entropy, reward in updates:

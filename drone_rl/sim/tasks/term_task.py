@@ -57,8 +57,10 @@ class Curriculum:
         """Count the success rate of a batch; return whether the ranges are wider now."""
         mean = self.DECAY * self._success + (1 - self.DECAY) * success
         is_wider = mean >= self.SUCCESS and self.level < 1.0
-        level = min(1.0, self.level + self.STEP) if is_wider else self.level
-        self.load((level, 0.0 if is_wider else mean))
+        if is_wider:
+            self.load((min(1.0, self.level + self.STEP), 0.0))
+        else:
+            self._success = mean
         return is_wider
 
 
@@ -86,14 +88,17 @@ class TermTask(ObjectTask):
         ends = tuple(ENDS.by_name[name] for name in s.end)
         (success,) = (SUCCESSES.by_name[name] for name in s.success)
         named = zip((*ends, success), (*s.end.values(), *s.success.values()), strict=True)
+        objects = _named(s)
         rules = AppliedRules(
             make_rules(reward_terms(s.reward), ends, success),
+            s,
+            [*objects.values()],
             rewards=s.reward,
             parameters=[getattr(of, name) for term, of in named for name in term.parameters],
             low=s.low,
             high=s.high,
         )
-        super().__init__(s, _named(s), rules)
+        super().__init__(s, objects, rules)
         x, y, z = (sum(s.start.range_of(axis)) / 2 for axis in "xyz")
         self.origin = (x, y, z)
         own = [term.name.upper() for term in ends]
