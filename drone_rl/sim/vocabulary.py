@@ -1,5 +1,6 @@
 """Terms of reports; `vocabulary.toml` has those of the built-in tasks."""
 
+import functools
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -107,6 +108,7 @@ def _third(verb: str) -> str:
     return f"{verb}es" if verb.endswith(("s", "sh", "ch", "x")) else f"{verb}s"
 
 
+@functools.cache
 def shipped_vocabulary(task: str) -> TaskVocabulary:
     """Return the terms of a shipped task, by its name."""
     path = Path(__file__).with_name("vocabulary.toml")

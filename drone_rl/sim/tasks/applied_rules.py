@@ -18,8 +18,8 @@ from drone_rl.utils.errors import InputError
 
 SECONDS = 0.1
 """Duration of a step of dynamics without time."""
-_WRITTEN = ("present", "touched", "ahead", "reached", "sides", "noted")
-"""Fields of states, in the order of the kernel's arguments."""
+WRITTEN = ("present", "touched", "ahead", "reached", "sides", "noted", "action", "paid")
+"""Fields of states that rules write, besides counts, in the order of the kernel's arguments."""
 
 
 class AppliedRules:
@@ -28,6 +28,8 @@ class AppliedRules:
     def __init__(
         self,
         rules: Rules,
+        settings: Any,
+        objects: Sequence[ObjectSettings],
         *,
         rewards: Mapping[str, TermSettings],
         parameters: Sequence[float] = (),
@@ -39,22 +41,20 @@ class AppliedRules:
 
         Args:
             rules: The compiled rules.
+            settings: Of the task, with `drone_size` and `step_limit`.
+            objects: The P objects.
             rewards: Settings of their reward terms.
             parameters: Of their ends and success, in order.
             numbers: Of their rules of contact and of what is ahead.
             low: Least coordinates within the task's bounds, metres.
             high: Largest ones.
         """
-        self.compiled = rules
+        self.compiled, self._settings, self._objects = rules, settings, objects
         own = [getattr(rewards[t.name], n) for t in rules.rewards for n in t.parameters]
         weights: list[Any] = [rewards[term.name] for term in rules.rewards]
         self._lists = [[float(of.weight) for of in weights], [*own, *parameters], [*numbers]]
         self._bounds = wp.vec3d(*low), wp.vec3d(*high)
         self._kept = dict[tuple[str, float | None], Any]()
-
-    def bind(self, objects: Sequence[ObjectSettings], settings: Any) -> None:
-        """Take the P objects, and settings with `drone_size` and `step_limit`."""
-        self._objects, self._settings = objects, settings
 
     def begin(self, state: Any) -> None:
         """Choose what is ahead in states, `ObjectState`, in place."""
@@ -98,9 +98,8 @@ class AppliedRules:
             self._constants(str(device), timestep),
             is_start,
             _ctype(state.places, wp.vec3d),
-            *(_ctype(getattr(state, name)) for name in _WRITTEN),
-            _ctype(state.action, wp.vec4),
-            *map(_ctype, (state.paid, steps, end_reasons)),
+            *(_ctype(getattr(state, n), wp.vec4 if n == "action" else None) for n in WRITTEN),
+            *map(_ctype, (steps, end_reasons)),
             *(_ctype(of.double(), wp.vec3d) for of in (before, body.position)),
             _ctype(body.velocity.float(), wp.vec3),
             _ctype(body.attitude.float(), wp.vec4),

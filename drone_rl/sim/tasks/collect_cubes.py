@@ -68,11 +68,9 @@ class CollectCubes(ObjectTask):
             success_first=True,
         )
         bounds = (s.front_bound, s.side_bound, s.altitude, s.height_bound)
-        super().__init__(
-            s,
-            {f"cube_{i}": cube for i in range(s.num_cubes)},
-            AppliedRules(rules, rewards=s.reward, parameters=bounds),
-        )
+        cubes = {f"cube_{i}": cube for i in range(s.num_cubes)}
+        applied = AppliedRules(rules, s, [*cubes.values()], rewards=s.reward, parameters=bounds)
+        super().__init__(s, cubes, applied)
         self.largest_reward = largest_reward(s.reward, reached=s.num_cubes)
         self.origin = (0.0, 0.0, s.altitude)
         if s.must_climb:

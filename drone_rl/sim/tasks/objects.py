@@ -11,7 +11,7 @@ from drone_rl.config.term_task import ROLES, ObjectSettings
 from drone_rl.sim.dynamics import BodyState, ComputerVision, Dynamics, Obstacles
 from drone_rl.sim.entities import VisualEntity
 from drone_rl.sim.rendering.scene import SemanticClass
-from drone_rl.sim.tasks.applied_rules import AppliedRules
+from drone_rl.sim.tasks.applied_rules import WRITTEN, AppliedRules
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH, SIDES
 from drone_rl.sim.tasks.geometry_kernel import NOTHING
 from drone_rl.sim.tasks.task import State, Task
@@ -83,7 +83,6 @@ class ObjectTask(Task[ObjectState]):
         self.roles = torch.tensor([ROLES.index(of.role) for of in self.each], dtype=torch.int32)
         self.num_goals = len(self.each) if num_goals is None else num_goals
         self.reward_terms = tuple(term.name for term in rules.compiled.rewards)
-        rules.bind(self.each, settings)
 
     def __reduce__(self) -> Any:
         """Copy and pickle the settings, since rules are compiled; a subclass adds its arguments."""
@@ -141,8 +140,7 @@ class ObjectTask(Task[ObjectState]):
 
         `action`, (N, *), is what `dynamics` took, for terms that read it; None for none.
         """
-        written = ("present", "touched", "ahead", "reached", "sides", "noted", "action", "paid")
-        copies = {name: getattr(state, name).clone(memory_format=_PLAIN) for name in written}
+        copies = {name: getattr(state, name).clone(memory_format=_PLAIN) for name in WRITTEN}
         counts = {"steps": state.steps.clone(), "end_reason": state.end_reason.clone()}
         new = dataclasses.replace(state, body=body, **counts, **copies)
         speeds = torch.zeros_like(state.action)

@@ -58,19 +58,17 @@ class Pillars(ObjectTask):
         lines[-1] = s.finish - 1e-9
         size = (s.width, s.width, s.height)
         pillar = ObjectSettings(shape="box", role="obstacle", size=size, color=s.pillar_color)
+        pillars = {f"pillar_{i}": pillar for i in range(s.num_pillars)}
         terms = (reward_terms(s.reward), ENDS, FINISH_LINE)
         rules = AppliedRules(
             make_rules(*terms, touch=touch_pillars, choose=choose_pillar),
+            s,
+            [*pillars.values()],
             rewards=s.reward,
             parameters=(s.spread + EDGE, s.finish),
             numbers=(s.finish, s.step_length, s.spread, s.spread + EDGE, *lines.tolist()),
         )
-        super().__init__(
-            s,
-            {f"pillar_{i}": pillar for i in range(s.num_pillars)},
-            rules,
-            num_goals=s.num_rows,
-        )
+        super().__init__(s, pillars, rules, num_goals=s.num_rows)
         self.largest_reward = largest_reward(s.reward, reached=s.num_rows, progress=1.0)
         self.lanes = Lanes(s)
         self.origin = (0.0, 0.0, s.altitude)

@@ -15,7 +15,7 @@ from drone_rl.sim.dynamics.state import ATTITUDE, VELOCITY
 from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, PoseArrays
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
-from drone_rl.sim.tasks.geometry_kernel import NOTHING
+from drone_rl.sim.tasks.geometry_kernel import NOTHING, Objects
 from drone_rl.sim.tasks.step_kernel import (
     Motion,
     Step,
@@ -23,7 +23,6 @@ from drone_rl.sim.tasks.step_kernel import (
     choose_nearest,
     see,
     touch_solid,
-    with_states,
 )
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.plugins import errors_of, place_of
@@ -240,11 +239,18 @@ class Rules:
         ) -> None:
             """Apply all rules to environments, a thread each; at a start only choose a goal."""
             env = wp.tid()
-            world = with_states(
-                constants,
-                places,
-                present,
-                touched,
+            of = constants.objects
+            world = World(
+                Objects(of.shapes, of.roles, of.sizes, places, present, touched),
+                constants.low,
+                constants.high,
+                constants.radius,
+                constants.seconds,
+                constants.moves_at_once,
+                constants.step_limit,
+                constants.weights,
+                constants.parameters,
+                constants.numbers,
                 ahead,
                 reached,
                 sides,

@@ -90,45 +90,6 @@ class World:
     end_reasons: wp.array[int]
 
 
-@wp.func
-def with_states(
-    constants: World,
-    places: wp.array2d[wp.vec3d],
-    present: wp.array2d[wp.bool],
-    touched: wp.array2d[wp.bool],
-    ahead: wp.array[int],
-    reached: wp.array2d[wp.bool],
-    sides: wp.array2d[int],
-    noted: wp.array2d[wp.float64],
-    actions: wp.array[wp.vec4],
-    paid: wp.array2d[wp.float64],
-    steps: wp.array[int],
-    end_reasons: wp.array[int],
-) -> World:
-    """Return the constants of a task with states."""
-    of = constants.objects
-    return World(
-        Objects(of.shapes, of.roles, of.sizes, places, present, touched),
-        constants.low,
-        constants.high,
-        constants.radius,
-        constants.seconds,
-        constants.moves_at_once,
-        constants.step_limit,
-        constants.weights,
-        constants.parameters,
-        constants.numbers,
-        ahead,
-        reached,
-        sides,
-        noted,
-        actions,
-        paid,
-        steps,
-        end_reasons,
-    )
-
-
 @wp.struct
 class Motion:
     """What a drone's dynamics did in a step. SI units, world frame."""
