@@ -76,6 +76,7 @@ class Moves:
     actions = MOVES
 
     def __init__(self, settings: ActionSettings) -> None:
+        self.modes: Modes = self.MODES
         self.lead = settings.move_lead
         self.drifts = torch.zeros(len(DIRECTIONS), 4, dtype=torch.float64)
         self.drifts[:, :2] = torch.tensor(DIRECTIONS, dtype=torch.float64)[:, :2]
@@ -97,8 +98,9 @@ class Velocities:
 
     def __init__(self, settings: ActionSettings) -> None:
         self.actions = ContinuousActions.of(settings)
+        self.modes: Modes = self.MODES
 
     def goals(self, body: FlightState, action: Tensor) -> FlightGoals:
         """Return the goals until the next action. `action`: (num_envs, 3)."""
         height = body.reference[:, 3:]
-        return FlightGoals(self.MODES, torch.cat([self.actions.to_rates(action), height], -1))
+        return FlightGoals(self.modes, torch.cat([self.actions.to_rates(action), height], -1))

@@ -1,4 +1,4 @@
-"""The chapter's moves by a quadrotor for fused kernels, bit for bit those of `Quadrotor.step`."""
+"""Moves by a quadrotor for fused kernels, bit for bit those of `Quadrotor.step`."""
 
 import torch
 import warp as wp
@@ -20,7 +20,7 @@ class Fleet:
     lead: wp.float64
     is_gimballed: int
     moves: wp.array2d[wp.float64]
-    """Velocity of the target position, one row an action."""
+    """Velocity of the target position, one row an action; none if actions are continuous."""
     numbers: wp.array2d[wp.float64]
     """See `FlightState`; no rows in computer-vision mode."""
 
@@ -32,8 +32,8 @@ def is_flying(fleet: Fleet) -> bool:
 
 
 @wp.func
-def fly_move(fleet: Fleet, world: int, action: int) -> wp.vec3d:
-    """Fly a drone through a move. Returns its position, metres."""
+def fly_move(fleet: Fleet, world: int, action: int) -> None:
+    """Fly a drone through a move."""
     for axis in range(4):
         wanted = fleet.numbers[world, fs.REFERENCE + axis]
         if axis < 2:
@@ -42,8 +42,6 @@ def fly_move(fleet: Fleet, world: int, action: int) -> wp.vec3d:
         fleet.command.goals[world, axis] = wanted
         fleet.command.drifts[world, axis] = fleet.moves[action, axis]
     run(fleet.command, fleet.numbers, fleet.numbers, world)
-    numbers = fleet.numbers[world]
-    return wp.vec3d(numbers[fs.POSITION], numbers[fs.POSITION + 1], numbers[fs.POSITION + 2])
 
 
 @wp.func
@@ -65,17 +63,22 @@ def is_lost(fleet: Fleet, world: int) -> bool:
     return fleet.numbers[world, fs.LOST] != wp.float64(0.0)
 
 
-def make_fleet(quadrotor: Quadrotor | None, numbers: Tensor) -> Fleet:
-    """Return drones whose `FlightState.numbers` are given; of no rows if `quadrotor` is None."""
+def make_fleet(
+    quadrotor: Quadrotor | None, numbers: Tensor, obstacles: fs.Obstacles | None = None
+) -> Fleet:
+    """Return drones whose `FlightState.numbers` are given; of no rows if `quadrotor` is None.
+
+    They share the memory of the obstacles' places.
+    """
     fleet = Fleet()
     fleet.numbers = wp.from_torch(numbers)
     if quadrotor is not None:
-        steering = quadrotor.steering
-        assert isinstance(steering, Moves)
+        steering, ticks = quadrotor.steering, quadrotor.settings.control_ticks
         zeros = torch.zeros(2, len(numbers), 4, dtype=torch.float64)
-        goals = FlightGoals(steering.MODES, *zeros)
-        fleet.command = make_command(quadrotor.frame, goals, quadrotor.settings.control_ticks)
-        fleet.lead = steering.lead
+        goals = FlightGoals(steering.modes, *zeros)
+        fleet.command = make_command(quadrotor.frame, goals, ticks, obstacles)
         fleet.is_gimballed = int(quadrotor.mount == "gimbal")
-        fleet.moves = wp.from_torch(steering.drifts.contiguous())
+        if isinstance(steering, Moves):
+            fleet.lead = steering.lead
+            fleet.moves = wp.from_torch(steering.drifts.contiguous())
     return fleet
