@@ -206,7 +206,9 @@ class ActionSettings(Settings):
     def check(self) -> None:
         """Refuse turns that a drone with dynamics would not make."""
         if self.kind in ("moves_turning", "moves_full") and not self.yaw_rate:
-            self.refuse("yaw_rate", f"is none for the turns of actions={self.kind}; give more than 0")
+            self.refuse(
+                "yaw_rate", f"is none for the turns of actions={self.kind}; give more than 0"
+            )
 
 
 MOVES_SETTINGS = ActionSettings()

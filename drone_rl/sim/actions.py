@@ -69,6 +69,14 @@ class Actions(abc.ABC):
         leading = (i for i, (_, left, _, turn) in enumerate(speeds) if left + turn > 0)
         return tuple(sorted({self.left, *leading}))
 
+    def like(self, name: str) -> int | None:
+        """Return the part of a name, None if there is none.
+
+        Without sideways parts, "left" and "right" are those that turn.
+        """
+        sides = {"left": self.left, "right": self.right}
+        return self.names.index(name) if name in self.names else sides.get(name)
+
     def chosen(self, probs: Tensor) -> Tensor:
         """Return the most probable part. Shape: (*)."""
         return probs.argmax(-1)

@@ -68,9 +68,9 @@ class ComputerVision(Dynamics):
         speeds = actions.speeds_of(torch.arange(len(actions))).double()
         half = 0.5 * math.radians(turn_step) * speeds[:, 3]
         self.moves = speeds[:, :3] * step_length
-        """Metres, in the drone's frame. Shape: (number of actions, 3), float64, as of what follows."""
+        """Metres, in the drone's frame. Shape: (number of actions, 3), float64."""
         self.turns = torch.stack([half.cos(), half.sin()], -1)
-        """Cosine and sine of half the angle to the left. Shape: (number of actions, 2)."""
+        """Cosine and sine of half the angle to the left. Shape: (number of actions, 2), float64."""
         self._can_turn = bool(half.any())
 
     def step(

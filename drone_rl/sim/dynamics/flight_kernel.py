@@ -316,9 +316,7 @@ def _write_reference(command: FlightCommand, after: wp.array2d[wp.float64], worl
             if command.modes[2] != Mode.ANGLE:
                 axes = rigid.axes_of(four(after, world, fs.ATTITUDE))
                 reference = wp.float64(wp.atan2(axes.forward[1], axes.forward[0]))
-        elif (
-            command.modes[axis] != Mode.POSITION and command.modes[axis] != Mode.HEADING_POSITION
-        ):
+        elif command.modes[axis] != Mode.POSITION and command.modes[axis] != Mode.HEADING_POSITION:
             reference = after[world, fs.POSITION + wp.min(axis, 2)]
         after[world, fs.REFERENCE + axis] = reference
 

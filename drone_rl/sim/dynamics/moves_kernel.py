@@ -58,9 +58,7 @@ def along_heading(attitude: wp.vec4d, vector: wp.vec3d) -> wp.vec3d:
     square = wp.max(w * w + z * z, LEAST)
     cos = (w * w - z * z) / square
     sin = wp.float64(2.0) * w * z / square
-    return wp.vec3d(
-        cos * vector[0] - sin * vector[1], sin * vector[0] + cos * vector[1], vector[2]
-    )
+    return wp.vec3d(cos * vector[0] - sin * vector[1], sin * vector[0] + cos * vector[1], vector[2])
 
 
 @wp.func

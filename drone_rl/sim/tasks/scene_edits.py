@@ -1,7 +1,8 @@
 """Changes of scenes that explanations make: targets that are removed, moved or placed.
 
 A target is an object to which the drone flies, or else one that it avoids, known by its number.
-Functions that take a state return a new one. World frame, metres.
+Functions that take a state return a new one. Metres; offsets are forward, to the left and up in the
+drone's heading.
 """
 
 import dataclasses
@@ -12,7 +13,9 @@ from torch import Tensor
 
 from drone_rl.config import CameraSettings
 from drone_rl.sim.actions import Move
+from drone_rl.sim.coordinates import inverse
 from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.dynamics.state import along_heading
 from drone_rl.sim.tasks.common import Side, place_in_view, turn_towards
 from drone_rl.sim.tasks.geometry_kernel import GOAL, NOTHING, OBSTACLE
 from drone_rl.sim.tasks.objects import ObjectState, ObjectTask
@@ -73,6 +76,7 @@ class SceneEdits:
         target, places = self.next_target(state), self.task.places(state)
         last, env = places.shape[1] - 1, torch.arange(len(state), device=places.device)
         away = places[env, target.clamp(max=last)] - state.body.position
+        away = along_heading(inverse(state.body.attitude), away)
         if not self.is_followed:
             away = away * torch.tensor([1.0, 1.0, 0.0]).to(away)
         return torch.where((target <= last)[:, None], away, torch.nan)
@@ -121,7 +125,7 @@ class SceneEdits:
         """
         first = int(self._targets.nonzero()[0, 0])
         places = body.position[:, None].repeat(1, len(self.task.each), 1).double()
-        places[:, first] += offset.to(places)
+        places[:, first] += along_heading(body.attitude, offset.to(places))
         if not self.is_followed:
             places[..., 2] = self.task.each[first].half_size[2]
         state = self.task.begun(body, places)
@@ -139,10 +143,11 @@ class SceneEdits:
 
     def next_moved(self, state: ObjectState, metres: Tensor | float) -> ObjectState:
         """Move the next target to the left. Shape of `metres`: (N,), or a number."""
-        places = state.places.clone()
-        metres = torch.as_tensor(metres, dtype=places.dtype, device=places.device)
-        places[..., 1] += metres.expand(len(places))[:, None] * self._is_next(state)
-        return self._changed(state, places=places)
+        left = state.drone.new_zeros(len(state), 3)
+        left[:, 1] = torch.as_tensor(metres, dtype=left.dtype, device=left.device)
+        left = along_heading(state.body.attitude, left)
+        is_next = self._is_next(state)[..., None]
+        return self._changed(state, places=state.places + left[:, None] * is_next)
 
     def elsewhere(
         self, state: ObjectState, camera: CameraSettings, generator: torch.Generator
@@ -152,7 +157,9 @@ class SceneEdits:
         at, is_target = self.around, self._targets.to(state.places.device)
         away = place_in_view(draw[..., :2], camera, at.nearest, at.farthest, at.widest)
         places = state.places.clone()
-        random = state.drone[:, None, :2] + away.to(places)
+        away = torch.nn.functional.pad(away.to(places), (0, 1))
+        away = along_heading(state.body.attitude[:, None], away)[..., :2]
+        random = state.drone[:, None, :2] + away
         places[..., :2] = torch.where(is_target[:, None], random, places[..., :2])
         if self.is_sorted:
             up = (2 * draw[..., 2] - 1) * max(self.heights)
