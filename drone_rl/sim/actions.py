@@ -288,7 +288,7 @@ def fields_of(names: tuple[str, ...]) -> dict[str, Any]:
     parts = [PARTS[name] for name in names]
     number = {part.speeds: i for i, part in enumerate(parts)}
     mirrored = ((ahead, -left, up, -turn) for ahead, left, up, turn in number)
-    opposite = (tuple(-speed for speed in speeds) for speeds in number)
+    opposite = ((-ahead, -left, -up, -turn) for ahead, left, up, turn in number)
     return {
         "names": names,
         "mirrored": tuple(number[speeds] for speeds in mirrored),

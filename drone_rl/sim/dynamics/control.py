@@ -109,14 +109,17 @@ class Moves:
 
 
 class Velocities:
-    """Speed forward, speed to the left and yaw rate; the height is kept."""
+    """Speed forward, speed to the left and yaw rate; the height is kept if there is no climb."""
 
     MODES = (Mode.HEADING_VELOCITY, Mode.HEADING_VELOCITY, Mode.RATE, Mode.POSITION)
 
     def __init__(self, settings: ActionSettings) -> None:
         self.actions = ContinuousActions.of(settings)
+        self._climbs = settings.climb_speed > 0
 
     def goals(self, body: FlightState, action: Tensor) -> FlightGoals:
-        """Return the goals until the next action. `action`: (num_envs, 3)."""
-        height = body.reference[:, 3:]
-        return FlightGoals(self.MODES, torch.cat([self.actions.to_rates(action), height], -1))
+        """Return the goals until the next action. `action`: (num_envs, 3), or 4 with climb."""
+        rates = self.actions.to_rates(action)
+        if self._climbs:
+            return FlightGoals((*self.MODES[:3], Mode.VELOCITY), rates)
+        return FlightGoals(self.MODES, torch.cat([rates, body.reference[:, 3:]], -1))

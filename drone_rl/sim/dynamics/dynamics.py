@@ -97,10 +97,11 @@ class Kinematic(Dynamics):
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
     ) -> BodyState:
         """Return the drones a time step later; velocities are those of the step."""
-        forward, left, rate = self._continuous.to_rates(action).unbind(-1)
+        forward, left, rate, *climb = self._continuous.to_rates(action).unbind(-1)
         heading = heading_of(body.attitude)
         cos, sin, zero = heading.cos(), heading.sin(), torch.zeros_like(heading)
-        velocity = torch.stack([cos * forward - sin * left, sin * forward + cos * left, zero], -1)
+        level = [cos * forward - sin * left, sin * forward + cos * left]
+        velocity = torch.stack([*level, *(climb or [zero])], -1)
         half = (heading + rate * self._seconds) / 2
         return dataclasses.replace(
             body,

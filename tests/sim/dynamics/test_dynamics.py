@@ -222,6 +222,20 @@ def test_step_length_follows_from_the_velocity():
     assert flown((1.0, 0.0, 0.0), timestep=0.5).position[0, 0] == 3.0
 
 
+def test_climb_and_backward_are_flown():
+    settings = SETTINGS.replace(climb_speed=2.0, backward_speed=1.0)
+    dynamics = Kinematic(settings, timestep=0.5)
+    body = dynamics.start(torch.tensor([[1.0, 2.0, 3.0]], dtype=torch.float64))
+    body = dynamics.step(body, torch.tensor([[-1.0, 0.0, 0.0, 0.5]]))  # -1 m/s, and 1 m/s up
+    assert body.position[0].tolist() == pytest.approx([0.5, 2.0, 3.5])
+    assert body.velocity[0].tolist() == pytest.approx([-1.0, 0.0, 1.0])
+    drone = Quadrotor(FLIGHT, settings)
+    flown = drone.start(torch.tensor([[0.0, 0.0, 10.0]], dtype=torch.float64))
+    for _ in range(40):
+        flown = drone.step(flown, torch.tensor([[-1.0, 0.0, 0.0, 0.5]]))
+    assert flown.velocity[0].tolist() == pytest.approx([-1.0, 0.0, 1.0], abs=0.15)
+
+
 def test_turn_takes_effect_in_the_next_step():
     """1 s at 90 degrees/s, then 4 m/s forward, which is world left, and left, which is back."""
     turned = flown((-1.0, 0.0, 1.0), timestep=1.0)
