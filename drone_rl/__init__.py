@@ -19,12 +19,10 @@ if TYPE_CHECKING:
     from drone_rl.config.commands import ChanceSettings as ChanceSettings
     from drone_rl.config.commands import CheckSettings as CheckSettings
     from drone_rl.config.commands import EvaluateSettings as EvaluateSettings
-    from drone_rl.config.commands import FlySettings as FlySettings
     from drone_rl.config.commands import JudgeSettings as JudgeSettings
     from drone_rl.config.commands import PlacesSettings as PlacesSettings
     from drone_rl.config.commands import ProvableSettings as ProvableSettings
     from drone_rl.config.commands import ProveSettings as ProveSettings
-    from drone_rl.config.commands import ServeSettings as ServeSettings
     from drone_rl.config.commands import ShiftSettings as ShiftSettings
     from drone_rl.config.registry import register_collector as register_collector
     from drone_rl.config.registry import register_learner as register_learner
@@ -64,6 +62,8 @@ if TYPE_CHECKING:
     from drone_rl.flight.fly_page.server import fly as fly
     from drone_rl.flight.image_types import ImageRequest as ImageRequest
     from drone_rl.flight.image_types import ImageType as ImageType
+    from drone_rl.flight.settings import FlySettings as FlySettings
+    from drone_rl.flight.settings import ServeSettings as ServeSettings
     from drone_rl.policies.environment import make_env as make_env
     from drone_rl.policies.external_policy import ExternalPolicy as ExternalPolicy
     from drone_rl.policies.external_policy import policy_from as policy_from
