@@ -7,7 +7,7 @@ import functools
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from drone_rl.utils.gymnasium_names import register
+from drone_rl.utils.gymnasium_names import register_environment
 
 if TYPE_CHECKING:
     from drone_rl.config import ActionSettings as ActionSettings
@@ -114,7 +114,8 @@ _HOMES = {name: module for _, module, _, name, *_ in _FOUND}
 
 __all__ = [*_HOMES]  # pyright: ignore[reportUnsupportedDunderAll] (aliases above are public)
 
-register()
+for _task in ("collect_cubes", "pillars"):  # those of `drone_rl.sim.tasks`, imported later
+    register_environment(_task)
 
 
 def __getattr__(name: str) -> Any:
