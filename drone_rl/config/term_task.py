@@ -177,7 +177,7 @@ class TermTaskSettings(BaseTaskSettings):
         every = self.objects.values()
         size = max(max(of.size[:2]) for of in every)
         color = next(of.color for of in every if of.role == "goal")
-        bound = max(abs(y) for of in every for y in of.range_of("y"))
+        bound = max(abs(y) for of in (self.start, *every) for y in of.range_of("y"))
         first = min(of.range_of("x")[0] for of in every)
         last = max(of.range_of("x")[1] for of in every)
         room = self.start.apart + 0.5 * self.drone_size

@@ -23,7 +23,6 @@ from drone_rl.envs.rollout import ActorAgent, Recording, Step, steps
 from drone_rl.explanations.hooks import entries_of, features, memory_in, probabilities
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.policies import ImageNetwork, RecurrentNetwork, greedy_agent
-from drone_rl.sim.dynamics.state import heading_of
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import Goals, State, Task
 from drone_rl.sim.worlds import Worlds
@@ -67,11 +66,7 @@ class RolloutDataset:
         """
         if worlds.task.edits is None:
             return np.full((len(self), 2), np.nan)
-        state = self.state(worlds)
-        x, y, _ = worlds.task.edits.next_offset(state).unbind(-1)
-        heading = heading_of(state.body.attitude)
-        cos, sin = heading.cos(), heading.sin()
-        return torch.stack([cos * x + sin * y, cos * y - sin * x], -1).cpu().numpy()
+        return worlds.task.edits.next_offset(self.state(worlds))[:, :2].cpu().numpy()
 
     def state(self, worlds: Worlds) -> State:
         """Return the recorded states (T) of environments like those of `worlds`."""

@@ -43,6 +43,8 @@ class ObjectState(State):
     """The last action: forward, left, up, turning left, as fractions of the greatest speed."""
     paid: Tensor  # (N, R) float64
     """Sum of each weighted reward term in this episode."""
+    sampled: Tensor  # (N, K) float64
+    """What a task of terms sampled for the episode; K is 0 for other tasks."""
 
 
 class ObjectEntity(VisualEntity):
@@ -59,6 +61,8 @@ class ObjectTask(Task[ObjectState]):
     """A task whose rules are Warp functions of objects; a subclass gives them to `__init__`."""
 
     strata = SIDES
+    num_sampled: int = 0
+    """K of `ObjectState.sampled`."""
 
     def __init__(
         self,
@@ -96,7 +100,7 @@ class ObjectTask(Task[ObjectState]):
         """Return the objects, in order."""
         return [ObjectEntity(of, name=name) for name, of in self.objects.items()]
 
-    def begun(self, body: BodyState, places: Tensor) -> ObjectState:
+    def begun(self, body: BodyState, places: Tensor, sampled: Tensor | None = None) -> ObjectState:
         """Return states at the start of episodes, with objects at places, (N, P, 3).
 
         Raises:
@@ -120,6 +124,7 @@ class ObjectTask(Task[ObjectState]):
             noted=torch.full(goals.shape, torch.nan, dtype=torch.float64, device=device),
             action=torch.zeros(count, 4, device=device),
             paid=torch.zeros(count, len(self.reward_terms), dtype=torch.float64, device=device),
+            sampled=places.new_zeros(count, self.num_sampled) if sampled is None else sampled,
         )
         self.look_ahead(state)
         return state

@@ -1,7 +1,8 @@
 """Changes of scenes that explanations make: targets that are removed, moved or placed.
 
 A target is an object to which the drone flies, or else one that it avoids, known by its number.
-Functions that take a state return a new one. World frame, metres.
+Functions that take a state return a new one. Metres. Offsets are forward, to the left and up as
+the drone is headed.
 """
 
 import dataclasses
@@ -13,6 +14,7 @@ from torch import Tensor
 from drone_rl.config import CameraSettings
 from drone_rl.sim.actions import Move
 from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.dynamics.state import heading_of
 from drone_rl.sim.tasks.common import Side, place_in_view, turn_towards
 from drone_rl.sim.tasks.geometry_kernel import GOAL, NOTHING, OBSTACLE
 from drone_rl.sim.tasks.objects import ObjectState, ObjectTask
@@ -35,6 +37,14 @@ class Range(NamedTuple):
     """To either side."""
 
 
+def turned(offset: Tensor, heading: Tensor) -> Tensor:
+    """Return offsets, (*, 2) or (*, 3), turned to the left by headings, radians, (*,)."""
+    cos, sin = heading.cos().to(offset), heading.sin().to(offset)
+    x, y = offset[..., 0], offset[..., 1]
+    flat = torch.stack([cos * x - sin * y, sin * x + cos * y], -1)
+    return torch.cat([flat, offset[..., 2:]], -1)
+
+
 @dataclasses.dataclass(frozen=True)
 class SceneEdits:
     """Questions about a task's targets, and changes of them."""
@@ -50,6 +60,8 @@ class SceneEdits:
     """Of targets above the drone's start."""
     is_sorted: bool = False
     """Whether the targets' numbers follow their order of x."""
+    course: float | None = 0.0
+    """Heading along which drones pass targets, radians; None if episodes have no common one."""
 
     @property
     def is_followed(self) -> bool:
@@ -66,7 +78,7 @@ class SceneEdits:
         return torch.where(ahead == NOTHING, len(self.task.each), ahead)
 
     def next_offset(self, state: ObjectState) -> Tensor:
-        """Return the next target's offset from the drone, metres; NaN if there is none. (N, 3).
+        """Return the next target's offset from the drone; NaN if there is none. (N, 3).
 
         That of an obstacle is horizontal.
         """
@@ -75,6 +87,7 @@ class SceneEdits:
         away = places[env, target.clamp(max=last)] - state.body.position
         if not self.is_followed:
             away = away * torch.tensor([1.0, 1.0, 0.0]).to(away)
+        away = turned(away, -heading_of(state.body.attitude))
         return torch.where((target <= last)[:, None], away, torch.nan)
 
     def is_reached(self, state: ObjectState, target: Tensor) -> Tensor:
@@ -86,9 +99,12 @@ class SceneEdits:
         return self.is_behind(state, target) & ~state.touched.any(-1)
 
     def is_behind(self, state: ObjectState, target: Tensor) -> Tensor:
-        """Return whether a target, or its place, lies behind the drone. Shape of both: (N,)."""
+        """Return whether the drone has passed a target, or its place. Shape of both: (N,)."""
+        if self.course is None:
+            return torch.zeros_like(target, dtype=torch.bool)
         env = torch.arange(len(state), device=target.device)
-        return state.body.position[:, 0] > self.task.places(state)[env, target, 0]
+        away = self.task.places(state)[env, target] - state.body.position
+        return turned(away, torch.full_like(away[:, 0], -self.course))[:, 0] < 0.0
 
     def needed(self, offset: Tensor) -> Tensor:
         """Return the move for a target at an offset from the drone. (N, 3) to (N,).
@@ -121,7 +137,7 @@ class SceneEdits:
         """
         first = int(self._targets.nonzero()[0, 0])
         places = body.position[:, None].repeat(1, len(self.task.each), 1).double()
-        places[:, first] += offset.to(places)
+        places[:, first] += turned(offset.to(places), heading_of(body.attitude))
         if not self.is_followed:
             places[..., 2] = self.task.each[first].half_size[2]
         state = self.task.begun(body, places)
@@ -138,10 +154,11 @@ class SceneEdits:
         return self._changed(state, present=state.present & ~self._is_next(state))
 
     def next_moved(self, state: ObjectState, metres: Tensor | float) -> ObjectState:
-        """Move the next target to the left. Shape of `metres`: (N,), or a number."""
-        places = state.places.clone()
-        metres = torch.as_tensor(metres, dtype=places.dtype, device=places.device)
-        places[..., 1] += metres.expand(len(places))[:, None] * self._is_next(state)
+        """Move the next target to the drone's left. Shape of `metres`: (N,), or a number."""
+        left = torch.zeros_like(state.body.position)
+        left[:, 1] = metres
+        shift = turned(left, heading_of(state.body.attitude))[:, None]
+        places = state.places + shift * self._is_next(state)[..., None]
         return self._changed(state, places=places)
 
     def elsewhere(
@@ -152,7 +169,8 @@ class SceneEdits:
         at, is_target = self.around, self._targets.to(state.places.device)
         away = place_in_view(draw[..., :2], camera, at.nearest, at.farthest, at.widest)
         places = state.places.clone()
-        random = state.drone[:, None, :2] + away.to(places)
+        away = turned(away.to(places), heading_of(state.body.attitude)[:, None])
+        random = state.drone[:, None, :2] + away
         places[..., :2] = torch.where(is_target[:, None], random, places[..., :2])
         if self.is_sorted:
             up = (2 * draw[..., 2] - 1) * max(self.heights)
