@@ -171,6 +171,18 @@ def test_the_image_is_that_of_the_heading():
     assert torch.equal(*shown) and len(shown[0].unique()) == 3  # sky, ground and ball
 
 
+def test_a_turned_box_is_drawn_and_touched_as_its_twin_that_is_not():
+    shown, ends = [], []
+    for size, heading in (([6.0, 1.0, 4.0], 0.0), ([1.0, 6.0, 4.0], 90.0)):
+        wall = {"size": size, "heading": heading, "x": 6.0, "y": 2.5}  # y is 2 to 3
+        made = worlds(objects={"ball": {**BALL, "x": 20.0}, "wall": wall})
+        shown.append(made.render(made.state))
+        clear = fly(made, *[FORWARD] * 6)[1]  # the drone's side is 1.6 m away
+        ends.append((clear, *fly(made, LEFT), *fly(made, LEFT)))
+    assert ends[0] == ends[1] and ends[0][0] == "RUNNING" and ends[0][-1] == "CONTACT"
+    assert (shown[0] != shown[1]).any(-1).float().mean() < 0.01  # but for rounding at edges
+
+
 def test_sampled_objects_keep_apart():
     box = {"count": 8, "size": [1.0, 1.0, 2.0], "x": [4.0, 12.0], "y": [-4.0, 4.0], "apart": 0.7}
     task = as_task(BaseTaskSettings.read({"name": "test_reach", "objects": {"b": BALL, "x": box}}))
