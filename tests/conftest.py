@@ -35,6 +35,19 @@ def exploration_stays():
     assert exploration_type() is None
 
 
+@pytest.fixture(autouse=True)
+def tasks_stay():
+    """Remove tasks that the test registered, whose names later tests must not find."""
+    from drone_rl.config.task import TASKS
+    from drone_rl.sim.tasks.task import MAKERS
+
+    before = dict(TASKS), dict(MAKERS)
+    yield
+    for registry, entries in zip((TASKS, MAKERS), before, strict=True):
+        registry.clear()
+        registry.update(entries)
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _no_fork_server_is_left():
     yield

@@ -11,8 +11,6 @@ import torch
 from torch import Tensor
 
 from drone_rl.sim.actions import MOVES, Entry
-from drone_rl.sim.coordinates import inverse
-from drone_rl.sim.dynamics.state import along_heading
 from drone_rl.sim.entities import Cube
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import Goals, Grid, OracleRule, State, Task
@@ -145,7 +143,6 @@ class Posts(Task[PostsState]):
         """Return where the next post stands, seen from the drone."""
         target = self.next_target(state).clamp(max=NUM_POSTS - 1)
         away = state.posts[torch.arange(len(state)), target] - state.body.position
-        away = along_heading(inverse(state.body.attitude), away)
         return torch.where(state.passed.all(-1)[:, None], torch.nan, away)
 
     def is_behind(self, state, target):
@@ -178,7 +175,7 @@ class Posts(Task[PostsState]):
         """Place the last post at an offset and the others behind the drone."""
         state = self.start(torch.ones(len(offset), NUM_POSTS).double(), body)
         state.posts[:, :-1] -= 100.0
-        state.posts[:, -1] = body.position + along_heading(body.attitude, offset)
+        state.posts[:, -1] = body.position + offset
         state.passed[:, :-1] = True
         return state
 
@@ -195,10 +192,10 @@ class Posts(Task[PostsState]):
 
     def next_moved(self, state, metres):
         """Move the next post to the left."""
-        move = torch.zeros(len(state), 3).double()
-        move[:, 1] = torch.as_tensor(metres)
-        move = along_heading(state.body.attitude, move)[:, None] * is_next(self, state)[..., None]
-        return dataclasses.replace(state, posts=state.posts + move)
+        posts = state.posts.clone()
+        move = torch.as_tensor(metres).expand(len(state))[:, None]
+        posts[..., 1] += move * is_next(self, state)
+        return dataclasses.replace(state, posts=posts)
 
     def elsewhere(self, state, camera, generator):
         """Place all posts at random positions ahead."""

@@ -15,9 +15,11 @@ from drone_rl.explanations.results import Outcomes, Truth
 from drone_rl.explanations.rollouts import Step, run_from, spread_frames
 from drone_rl.explanations.scenes import DARK_GROUND, Region, Scenes
 from drone_rl.policies import ImageNetwork
+from drone_rl.sim.dynamics.state import heading_of
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import State
+from drone_rl.sim.tasks.scene_edits import turned
 from drone_rl.utils.intervals import mean_interval
 
 
@@ -137,7 +139,8 @@ class TargetRollouts:
     collected: NDArray  # whether the target was reached. Shape: (N,), bool.
     decided: NDArray  # steps until then, or until the episode ended. Shape: (N,).
     lateral: NDArray
-    """The drone's y after each step, metres; constant once decided. Shape: (N, steps + 1)."""
+    """How far to the left of the world's origin, as each drone was headed at first, it was after
+    each step, metres; constant once decided. Shape: (N, steps + 1)."""
 
 
 def measure_outcomes(
@@ -186,13 +189,14 @@ def run_to_target(
     """Step until one target (N,) of each environment is reached or passed; see `run_from`."""
     task = scenes.task
     decided = torch.zeros_like(target)
-    lateral = [state.body.position[:, 1].clone()]
+    heading = heading_of(state.body.attitude)
+    lateral = [turned(state.body.position, -heading)[:, 1]]
 
     def goes_on(step: Step) -> Tensor:
         after, goal = step.after, target[step.rows]
         decided[step.rows] += 1
         lateral.append(lateral[-1].clone())
-        lateral[-1][step.rows] = after.body.position[:, 1]
+        lateral[-1][step.rows] = turned(after.body.position, -heading[step.rows])[:, 1]
         is_over = task.edits.is_behind(after, goal) | task.edits.is_reached(after, goal)
         return ~is_over & (after.end_reason == 0) & (len(lateral) <= PATIENCE)
 

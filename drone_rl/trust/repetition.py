@@ -165,7 +165,7 @@ def _again(agent: Agent, env: EnvBase, which: Tensor, *, flushes: bool = False) 
         for batch in which.split(env.batch_size[0]):
             chosen = [starts[episode] for episode in batch.tolist()]
             unused = state["random_states"][len(chosen) :]
-            base.load_state_dict({"random_states": [*chosen, *unused]})
+            base.load_state_dict({**state, "random_states": [*chosen, *unused]})
             parts.append(rollout(agent, env, len(batch), exact=True))
     base.load_state_dict(state)
     return CompleteEpisodes.joined(parts)

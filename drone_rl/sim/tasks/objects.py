@@ -1,6 +1,7 @@
 """Tasks whose rules are about objects: their state, and what their rules share."""
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -43,6 +44,8 @@ class ObjectState(State):
     """The last action: forward, left, up, turning left, as fractions of the greatest speed."""
     paid: Tensor  # (N, R) float64
     """Sum of each weighted reward term in this episode."""
+    sampled: Tensor  # (N, K) float64
+    """What a task of terms sampled for the episode; K is 0 for other tasks."""
 
 
 class ObjectEntity(VisualEntity):
@@ -53,12 +56,16 @@ class ObjectEntity(VisualEntity):
         half = settings.half_size
         size = {"ball": half[:1], "cylinder": (half[0], half[2]), "box": half}[settings.shape]
         self._add_geom(_KINDS[settings.shape], size, settings.color, name)
+        half_angle = 0.5 * math.radians(settings.heading)
+        self.geom.quat = math.cos(half_angle), 0.0, 0.0, math.sin(half_angle)
 
 
 class ObjectTask(Task[ObjectState]):
     """A task whose rules are Warp functions of objects; a subclass gives them to `__init__`."""
 
     strata = SIDES
+    num_sampled: int = 0
+    """K of `ObjectState.sampled`."""
 
     def __init__(
         self,
@@ -96,7 +103,7 @@ class ObjectTask(Task[ObjectState]):
         """Return the objects, in order."""
         return [ObjectEntity(of, name=name) for name, of in self.objects.items()]
 
-    def begun(self, body: BodyState, places: Tensor) -> ObjectState:
+    def begun(self, body: BodyState, places: Tensor, sampled: Tensor | None = None) -> ObjectState:
         """Return states at the start of episodes, with objects at places, (N, P, 3).
 
         Raises:
@@ -120,6 +127,7 @@ class ObjectTask(Task[ObjectState]):
             noted=torch.full(goals.shape, torch.nan, dtype=torch.float64, device=device),
             action=torch.zeros(count, 4, device=device),
             paid=torch.zeros(count, len(self.reward_terms), dtype=torch.float64, device=device),
+            sampled=places.new_zeros(count, self.num_sampled) if sampled is None else sampled,
         )
         self.look_ahead(state)
         return state
@@ -167,9 +175,10 @@ class ObjectTask(Task[ObjectState]):
         return state.places - torch.nn.functional.pad(hidden[..., None], (2, 0))
 
     def obstacles(self, state: ObjectState) -> Obstacles | None:
-        """Return what is solid, if all of it is of one size."""
+        """Return what is solid, if all of it is of one size and parallel to the axes."""
         solid = [i for i, of in enumerate(self.each) if of.role == "obstacle"]
-        if len({self.each[i].half_size for i in solid}) != 1:
+        is_turned = any(self.each[i].heading for i in solid)
+        if is_turned or len({self.each[i].half_size for i in solid}) != 1:
             return None
         return Obstacles(self.places(state)[:, solid], self.each[solid[0]].half_size)
 

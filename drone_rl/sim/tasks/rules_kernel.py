@@ -250,7 +250,7 @@ class Rules:
             env = wp.tid()
             of = constants.objects
             world = World(
-                Objects(of.shapes, of.roles, of.sizes, places, present, touched),
+                Objects(of.shapes, of.roles, of.sizes, of.turns, places, present, touched),
                 constants.low,
                 constants.high,
                 constants.radius,

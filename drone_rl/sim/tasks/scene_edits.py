@@ -1,8 +1,8 @@
 """Changes of scenes that explanations make: targets that are removed, moved or placed.
 
 A target is an object to which the drone flies, or else one that it avoids, known by its number.
-Functions that take a state return a new one. Metres; offsets are forward, to the left and up in the
-drone's heading.
+Functions that take a state return a new one. Metres. Offsets are forward, to the left and up as
+the drone is headed.
 """
 
 import dataclasses
@@ -13,9 +13,8 @@ from torch import Tensor
 
 from drone_rl.config import CameraSettings
 from drone_rl.sim.actions import Move
-from drone_rl.sim.coordinates import inverse
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.dynamics.state import along_heading
+from drone_rl.sim.dynamics.state import heading_of
 from drone_rl.sim.tasks.common import Side, place_in_view, turn_towards
 from drone_rl.sim.tasks.geometry_kernel import GOAL, NOTHING, OBSTACLE
 from drone_rl.sim.tasks.objects import ObjectState, ObjectTask
@@ -38,6 +37,14 @@ class Range(NamedTuple):
     """To either side."""
 
 
+def turned(offset: Tensor, heading: Tensor) -> Tensor:
+    """Return offsets, (*, 2) or (*, 3), turned to the left by headings, radians, (*,)."""
+    cos, sin = heading.cos().to(offset), heading.sin().to(offset)
+    x, y = offset[..., 0], offset[..., 1]
+    flat = torch.stack([cos * x - sin * y, sin * x + cos * y], -1)
+    return torch.cat([flat, offset[..., 2:]], -1)
+
+
 @dataclasses.dataclass(frozen=True)
 class SceneEdits:
     """Questions about a task's targets, and changes of them."""
@@ -53,6 +60,8 @@ class SceneEdits:
     """Of targets above the drone's start."""
     is_sorted: bool = False
     """Whether the targets' numbers follow their order of x."""
+    course: float | None = 0.0
+    """Heading along which drones pass targets, radians; None if episodes have no common one."""
 
     @property
     def is_followed(self) -> bool:
@@ -69,16 +78,16 @@ class SceneEdits:
         return torch.where(ahead == NOTHING, len(self.task.each), ahead)
 
     def next_offset(self, state: ObjectState) -> Tensor:
-        """Return the next target's offset from the drone, metres; NaN if there is none. (N, 3).
+        """Return the next target's offset from the drone; NaN if there is none. (N, 3).
 
         That of an obstacle is horizontal.
         """
         target, places = self.next_target(state), self.task.places(state)
         last, env = places.shape[1] - 1, torch.arange(len(state), device=places.device)
         away = places[env, target.clamp(max=last)] - state.body.position
-        away = along_heading(inverse(state.body.attitude), away)
         if not self.is_followed:
             away = away * torch.tensor([1.0, 1.0, 0.0]).to(away)
+        away = turned(away, -heading_of(state.body.attitude))
         return torch.where((target <= last)[:, None], away, torch.nan)
 
     def is_reached(self, state: ObjectState, target: Tensor) -> Tensor:
@@ -90,9 +99,12 @@ class SceneEdits:
         return self.is_behind(state, target) & ~state.touched.any(-1)
 
     def is_behind(self, state: ObjectState, target: Tensor) -> Tensor:
-        """Return whether a target, or its place, lies behind the drone. Shape of both: (N,)."""
+        """Return whether the drone has passed a target, or its place. Shape of both: (N,)."""
+        if self.course is None:
+            return torch.zeros_like(target, dtype=torch.bool)
         env = torch.arange(len(state), device=target.device)
-        return state.body.position[:, 0] > self.task.places(state)[env, target, 0]
+        away = self.task.places(state)[env, target] - state.body.position
+        return turned(away, torch.full_like(away[:, 0], -self.course))[:, 0] < 0.0
 
     def needed(self, offset: Tensor) -> Tensor:
         """Return the move for a target at an offset from the drone. (N, 3) to (N,).
@@ -125,7 +137,7 @@ class SceneEdits:
         """
         first = int(self._targets.nonzero()[0, 0])
         places = body.position[:, None].repeat(1, len(self.task.each), 1).double()
-        places[:, first] += along_heading(body.attitude, offset.to(places))
+        places[:, first] += turned(offset.to(places), heading_of(body.attitude))
         if not self.is_followed:
             places[..., 2] = self.task.each[first].half_size[2]
         state = self.task.begun(body, places)
@@ -142,12 +154,12 @@ class SceneEdits:
         return self._changed(state, present=state.present & ~self._is_next(state))
 
     def next_moved(self, state: ObjectState, metres: Tensor | float) -> ObjectState:
-        """Move the next target to the left. Shape of `metres`: (N,), or a number."""
-        left = state.drone.new_zeros(len(state), 3)
-        left[:, 1] = torch.as_tensor(metres, dtype=left.dtype, device=left.device)
-        left = along_heading(state.body.attitude, left)
-        is_next = self._is_next(state)[..., None]
-        return self._changed(state, places=state.places + left[:, None] * is_next)
+        """Move the next target to the drone's left. Shape of `metres`: (N,), or a number."""
+        left = torch.zeros_like(state.body.position)
+        left[:, 1] = metres
+        shift = turned(left, heading_of(state.body.attitude))[:, None]
+        places = state.places + shift * self._is_next(state)[..., None]
+        return self._changed(state, places=places)
 
     def elsewhere(
         self, state: ObjectState, camera: CameraSettings, generator: torch.Generator
@@ -157,8 +169,7 @@ class SceneEdits:
         at, is_target = self.around, self._targets.to(state.places.device)
         away = place_in_view(draw[..., :2], camera, at.nearest, at.farthest, at.widest)
         places = state.places.clone()
-        away = torch.nn.functional.pad(away.to(places), (0, 1))
-        away = along_heading(state.body.attitude[:, None], away)[..., :2]
+        away = turned(away.to(places), heading_of(state.body.attitude)[:, None])
         random = state.drone[:, None, :2] + away
         places[..., :2] = torch.where(is_target[:, None], random, places[..., :2])
         if self.is_sorted:

@@ -26,6 +26,7 @@ from drone_rl.utils.errors import InputError
 
 _MOST_TRIES, _TRIES = 1000, 20
 """Most samples of all objects until none is too near to another one; samples of each object."""
+_START = ("x", "y", "z", "heading")
 _SIDES = {"left": "on its left", "ahead": "ahead", "right": "on its right"}
 _LAST_ENDS = ("STEP_LIMIT", "LOST_CONTROL")
 
@@ -79,7 +80,7 @@ class TermTask(ObjectTask):
     success_end = SUCCESS
     largest_reward = None
     observed = ("reached", "end_reason")
-    scored = ("reached", "sides", "places", "end_reason")
+    scored = ("reached", "sides", "sampled", "end_reason")
 
     def __init__(self, settings: TermTaskSettings) -> None:
         """Take the settings of a task of terms."""
@@ -99,6 +100,7 @@ class TermTask(ObjectTask):
             high=s.high,
         )
         super().__init__(s, objects, rules)
+        self.num_sampled = 4 + 3 * len(objects)
         x, y, z = (sum(s.start.range_of(axis)) / 2 for axis in "xyz")
         self.origin = (x, y, z)
         own = [term.name.upper() for term in ends]
@@ -126,6 +128,7 @@ class TermTask(ObjectTask):
             "reached": Entry((goals,), torch.bool),
             "sides": Entry((goals,), torch.int64, -1, len(Side) - 1),
             "places": Entry((objects, 3), torch.float32),
+            "sampled": Entry((self.num_sampled,), torch.float32),
             "present": Entry((objects,), torch.bool),
             "touched": Entry((objects,), torch.bool),
             "goal": Entry((1,), torch.int64, 0, objects),
@@ -140,11 +143,9 @@ class TermTask(ObjectTask):
             InputError: A region has no room left for an object.
         """
         s = self.settings if self.curriculum is None else self.curriculum.ranges
-        *start, heading = (
-            random_state.uniform(*s.start.range_of(axis)) for axis in ("x", "y", "z", "heading")
-        )
         crowded = ""
         for _ in range(_MOST_TRIES):
+            *start, heading = (random_state.uniform(*s.start.range_of(axis)) for axis in _START)
             placed, crowded = self._placed(s, start, random_state)
             if not crowded:
                 places = np.concatenate([[*start, math.radians(heading)], *placed])
@@ -174,12 +175,12 @@ class TermTask(ObjectTask):
     def _has_room(self, of: ObjectSettings, place: Any, placed: list[Any], start: Any) -> bool:
         """Return whether boxes around an object, the ones before it and the drone keep apart."""
         s = self.settings
-        half, drone = np.array(of.half_size), np.array(start)
+        reach, drone = np.array(of.reach), np.array(start)
         if of.role != "decoration":
-            gap = np.abs(place - drone) - half - 0.5 * s.drone_size
+            gap = np.abs(place - drone) - reach - 0.5 * s.drone_size
             if np.linalg.norm(gap.clip(0)) <= s.start.apart:
                 return False
-        gaps = (np.abs(place - other) - half - np.array(o.half_size) for o, other in placed)
+        gaps = (np.abs(place - other) - reach - np.array(o.reach) for o, other in placed)
         return of.apart == 0 or all(np.linalg.norm(gap.clip(0)) >= of.apart for gap in gaps)
 
     def start(self, sampled: Tensor, body: BodyState) -> ObjectState:
@@ -188,7 +189,7 @@ class TermTask(ObjectTask):
         zero = torch.zeros_like(half)
         attitude = torch.stack([half.cos(), zero, zero, half.sin()], -1)
         places = sampled[:, 4:].reshape(len(sampled), len(self.each), 3).clone()
-        return self.begun(body.moved(sampled[:, :3].clone(), attitude), places)
+        return self.begun(body.moved(sampled[:, :3].clone(), attitude), places, sampled.clone())
 
     def info(self, state: ObjectState) -> dict[str, Tensor]:
         """See `entries`."""
@@ -197,6 +198,7 @@ class TermTask(ObjectTask):
             "reached": state.reached[:, goals],
             "sides": state.sides[:, goals].long(),
             "places": state.places.float(),
+            "sampled": state.sampled.float(),
             "present": state.present,
             "touched": state.touched,
             "goal": self.edits.next_target(state)[:, None],
@@ -210,20 +212,30 @@ class TermTask(ObjectTask):
         A success counts as all of them: its own meaning may need only some.
         """
         reached = info["reached"] | (info["end_reason"] == SUCCESS)
-        return Goals(reached, info["sides"], info["places"].flatten(1).double())
+        return Goals(reached, info["sides"], info["sampled"].double())
 
     def _edits(self) -> SceneEdits:
         """Return changes of its scenes; random goals are as far ahead as goals ever are."""
         s = self.settings
         goals = [of for of in self.each if of.role == "goal"]
-        reach = max(of.half_size[1] for of in goals) + 0.5 * self.drone_size
+        reach = max(of.reach[1] for of in goals) + 0.5 * self.drone_size
         near = reach + 0.5 * s.step_length
-        far = max(of.range_of("x")[1] for of in goals) - s.start.range_of("x")[0]
-        starts = s.start.range_of("y")
-        wide = max(abs(y - o) for of in goals for y in of.range_of("y") for o in starts)
+        far, wide = (
+            max(
+                abs(a - b)
+                for of in goals
+                for a in of.range_of(axis)
+                for b in s.start.range_of(axis)
+            )
+            for axis in "xy"
+        )
+        first, last = s.start.range_of("heading")
+        if first != 0.0 or last != 0.0:
+            far = wide = math.hypot(far, wide)
         ahead = Range(near, max(far, near + s.step_length), max(wide, 2 * reach))
         heights = sorted({z - self.origin[2] for of in goals for z in of.range_of("z")})
-        return SceneEdits(self, reach, ahead, ahead, tuple(heights))
+        course = math.radians(first) if first == last else None
+        return SceneEdits(self, reach, ahead, ahead, tuple(heights), course=course)
 
 
 def define_task(name: str, **settings: Any) -> type[TermTaskSettings]:

@@ -14,7 +14,7 @@ from drone_rl.envs import DroneEnv
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import CollectCubes, EndReason, Pillars, Task
-from drone_rl.sim.tasks.task import MAKERS, as_settings, as_task, register_task
+from drone_rl.sim.tasks.task import as_settings, as_task, register_task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from tests.composer_env import ComposerEnv
@@ -121,9 +121,7 @@ def test_invalid_settings_raise():
         as_task(PostsSettings())
 
 
-def test_user_tasks_can_be_registered(monkeypatch):
-    monkeypatch.setitem(MAKERS, PostsSettings, None)  # removed after the test
-    monkeypatch.setitem(TASKS, "posts", PostsSettings)
+def test_user_tasks_can_be_registered():
     register_task(PostsSettings, lambda _: Posts())
     register_task(PostsSettings, lambda _: Posts())  # a module may be imported twice
     assert isinstance(as_task(PostsSettings()), Posts)
@@ -151,24 +149,22 @@ def test_mistakes_in_settings_are_named_when_their_task_is_registered():
 
 
 def test_tasks_without_settings_are_registered_as_objects():
-    with patch.dict(TASKS), patch.dict(MAKERS):
-        settings, again = as_settings(Posts()), Posts()
-        assert BaseTaskSettings.read({"name": "posts"}, "task") == settings == as_settings(settings)
-        assert isinstance(as_task(settings), Posts)
-        register_task(again)  # a cell of a notebook ran twice
-        assert as_task(settings) is again
-        two_cubes = TaskSettings(num_cubes=2)
-        assert as_settings(CollectCubes(two_cubes)) == two_cubes
+    settings, again = as_settings(Posts()), Posts()
+    assert BaseTaskSettings.read({"name": "posts"}, "task") == settings == as_settings(settings)
+    assert isinstance(as_task(settings), Posts)
+    register_task(again)  # a cell of a notebook ran twice
+    assert as_task(settings) is again
+    two_cubes = TaskSettings(num_cubes=2)
+    assert as_settings(CollectCubes(two_cubes)) == two_cubes
 
-        class Variant(CollectCubes):
-            pass
+    class Variant(CollectCubes):
+        pass
 
-        with pytest.raises(InputError, match="there is a task called collect_cubes; give another"):
-            as_settings(Variant())
-        for wrong in ((PostsSettings,), (Posts, PostsSettings), (PostsSettings, 5)):
-            with pytest.raises(InputError, match="make no task; give a task, or the class of its"):
-                register_task(*wrong)
-    assert "posts" not in TASKS
+    with pytest.raises(InputError, match="there is a task called collect_cubes; give another"):
+        as_settings(Variant())
+    for wrong in ((PostsSettings,), (Posts, PostsSettings), (PostsSettings, 5)):
+        with pytest.raises(InputError, match="make no task; give a task, or the class of its"):
+            register_task(*wrong)
 
 
 def test_tasks_and_settings_need_a_name():
