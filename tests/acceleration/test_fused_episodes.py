@@ -144,12 +144,13 @@ def test_fused_episodes_equal_their_replay_by_torchrl_bit_for_bit(first, second)
 
 
 VELOCITY = ActionSettings(kind="velocity", forward_speed=4.0)
+CLIMBING = VELOCITY.replace(climb_speed=1.0, backward_speed=0.5)
 PILLARS = PillarsSettings(step_limit=40)
 
 
 @pytest.mark.parametrize("task", [SHORT.replace(step_limit=40), PILLARS])
 @pytest.mark.parametrize("dynamics", [None, FLYING, GIMBAL.replace(gusts=2.0, control_ticks=66)])
-@pytest.mark.parametrize("actions", [ActionSettings(), VELOCITY])
+@pytest.mark.parametrize("actions", [ActionSettings(), VELOCITY, CLIMBING])
 def test_flight_at_velocities_and_among_obstacles_is_fused(task, dynamics, actions):
     how = {"dynamics": dynamics, "actions": actions, "info": ("drone", "attitude")}
     collector = make(task, **how)
@@ -193,6 +194,23 @@ def test_cropped_frames_and_a_network_with_pooling_are_fused(is_cropped_first):
             assert torch.equal(one[key], other[key]), key
     assert torch.allclose(one["logits"], other["logits"], atol=1e-4)
     assert one["pixels"].shape[1:] == (1, 20, 64)
+
+
+@pytest.mark.parametrize("kind", ["moves_3d", "moves_turning", "moves_full"])
+@pytest.mark.parametrize("dynamics", [None, FLYING])
+def test_other_moves_and_turns_are_fused(kind, dynamics):
+    task = SHORT.replace(step_limit=25)
+    actions = ActionSettings(kind=kind, turn_step=25.0)
+    how = {"dynamics": dynamics, "actions": actions, "info": ("drone", "attitude")}
+    made = [make(task, compiled=compiled, **how) for compiled in (True, False)]
+    assert isinstance(made[0].fused, FusedEpisodes)
+    with set_exploration_type(DETERMINISTIC):
+        for _ in range(2):
+            one, other = (collector.collect() for collector in made)
+            for key in other.keys(True, True):
+                if key != "logits":
+                    assert torch.equal(one[key], other[key]), key
+            assert len(one["action"].unique()) > 1
 
 
 @pytest.mark.parametrize("longest_launch", [64, 2])

@@ -1,4 +1,4 @@
-"""Moves by a quadrotor for fused kernels, bit for bit those of `Quadrotor.step`."""
+"""Moves for fused kernels, bit for bit those of `ComputerVision.step` and `Quadrotor.step`."""
 
 import torch
 import warp as wp
@@ -18,9 +18,10 @@ class Fleet:
 
     command: FlightCommand
     lead: wp.float64
+    climbs: bool
     is_gimballed: int
     moves: wp.array2d[wp.float64]
-    """Velocity of the target position, one row an action; none if actions are continuous."""
+    """See `Moves.drifts`; none if actions are continuous."""
     numbers: wp.array2d[wp.float64]
     """See `FlightState`; no rows in computer-vision mode."""
 
@@ -36,12 +37,39 @@ def fly_move(fleet: Fleet, world: int, action: int) -> None:
     """Fly a drone through a move."""
     for axis in range(4):
         wanted = fleet.numbers[world, fs.REFERENCE + axis]
-        if axis < 2:
-            place = fleet.numbers[world, fs.POSITION + axis]
+        if axis < 2 or (axis == 3 and fleet.climbs):
+            place = fleet.numbers[world, fs.POSITION + wp.min(axis, 2)]
             wanted = place + wp.clamp(wanted - place, -fleet.lead, fleet.lead)
         fleet.command.goals[world, axis] = wanted
         fleet.command.drifts[world, axis] = fleet.moves[action, axis]
     run(fleet.command, fleet.numbers, fleet.numbers, world)
+
+
+LEAST = wp.constant(wp.float64(fs.LEAST))
+
+
+@wp.func
+def along_heading(attitude: wp.vec4d, vector: wp.vec3d) -> wp.vec3d:
+    """See the function of this name in `state`."""
+    w = attitude[0]
+    z = attitude[3]
+    square = wp.max(w * w + z * z, LEAST)
+    cos = (w * w - z * z) / square
+    sin = wp.float64(2.0) * w * z / square
+    return wp.vec3d(cos * vector[0] - sin * vector[1], sin * vector[0] + cos * vector[1], vector[2])
+
+
+@wp.func
+def turned(attitude: wp.vec4d, turn: wp.vec2d) -> wp.vec4d:
+    """See the function of this name in `state`."""
+    c = turn[0]
+    s = turn[1]
+    return wp.vec4d(
+        c * attitude[0] - s * attitude[3],
+        c * attitude[1] - s * attitude[2],
+        s * attitude[1] + c * attitude[2],
+        s * attitude[0] + c * attitude[3],
+    )
 
 
 @wp.func
@@ -79,6 +107,6 @@ def make_fleet(
         fleet.command = make_command(quadrotor.frame, goals, ticks, obstacles)
         fleet.is_gimballed = int(quadrotor.mount == "gimbal")
         if isinstance(steering, Moves):
-            fleet.lead = steering.lead
+            fleet.lead, fleet.climbs = steering.lead, steering.climbs
             fleet.moves = wp.from_torch(steering.drifts.contiguous())
     return fleet

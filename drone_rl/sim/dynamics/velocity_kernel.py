@@ -28,9 +28,8 @@ class Rates:
 def make_rates(actions: ContinuousActions) -> Rates:
     """Return the meaning of actions."""
     rates = Rates()
-    rates.most = wp.vec4d(*actions.speeds, *[0.0] * (4 - len(actions.speeds)))
-    rates.backward = getattr(actions, "backward", 0.0)
-    rates.range = 1.0 + rates.backward
+    rates.most = wp.vec4d(*actions.speeds)
+    rates.backward, rates.range = actions.backward, 1.0 + actions.backward
     return rates
 
 

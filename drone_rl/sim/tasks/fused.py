@@ -1,5 +1,6 @@
 """Environments of tasks of objects for the fused episode kernel."""
 
+import dataclasses
 from typing import Any
 
 import torch
@@ -61,10 +62,15 @@ class FusedObjects:
             self.arrays.speeds = wp.from_torch(speeds, dtype=wp.vec4)
         if isinstance(dynamics, ComputerVision):
             self.arrays.moves = wp.from_torch(dynamics.moves.contiguous(), dtype=wp.vec3d)
+            self.arrays.turns = wp.from_torch(dynamics.turns, dtype=wp.vec2d)
         quadrotor = dynamics if isinstance(dynamics, Quadrotor) else None
         self._numbers = torch.zeros(count if quadrotor else 0, NUMBERS, dtype=torch.float64)
-        self._obstacles = self._task.obstacles(state)
-        self.arrays.fleet = make_fleet(quadrotor, self._numbers, self._obstacles)
+        self._centers = torch.empty(0)
+        solid = self._task.obstacles(state)
+        if solid is not None:
+            self._centers = solid.centers.clone(memory_format=torch.contiguous_format)
+            solid = dataclasses.replace(solid, centers=self._centers)
+        self.arrays.fleet = make_fleet(quadrotor, self._numbers, solid)
         self.poses: Any = PoseArrays()
         frames = torch.zeros(count, 1 + DRONE_FRAME + len(task.objects), 3)
         self.poses.positions = wp.from_torch(frames, dtype=wp.vec3)
@@ -90,7 +96,7 @@ class FusedObjects:
         self._attitudes[:count] = state.body.attitude
         if isinstance(state.body, FlightState):
             self._numbers[:count] = state.body.numbers
-        if self._obstacles is not None:  # rules leave them where they are
-            self._obstacles.centers[:count] = self._task.obstacles(state).centers
+        if len(self._centers):  # which rules leave where they are
+            self._centers[:count] = self._task.obstacles(state).centers
         for values in (self.steps, self.end_reasons):
             values[:count] = 0

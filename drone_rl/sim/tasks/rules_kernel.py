@@ -9,7 +9,15 @@ import warp as wp
 
 from drone_rl.config.terms import Term
 from drone_rl.sim.dynamics.flight_kernel import four, three
-from drone_rl.sim.dynamics.moves_kernel import Fleet, camera_attitude, fly_move, is_flying, is_lost
+from drone_rl.sim.dynamics.moves_kernel import (
+    Fleet,
+    along_heading,
+    camera_attitude,
+    fly_move,
+    is_flying,
+    is_lost,
+    turned,
+)
 from drone_rl.sim.dynamics.rigid_body_kernel import axes_of
 from drone_rl.sim.dynamics.state import ATTITUDE, POSITION, THING, VELOCITY
 from drone_rl.sim.dynamics.velocity_kernel import Rates, fly_at, glide, rates_of, speeds_of
@@ -43,9 +51,10 @@ class Episodes:
     world: World
     drones: wp.array[wp.vec3d]
     attitudes: wp.array[wp.vec4d]
-    """Of drones that do not fly, as what follows."""
+    """Of drones that do not fly, as what follows up to `rates`."""
     moves: wp.array[wp.vec3d]
-    """One an action. Metres, world frame."""
+    """See `ComputerVision.moves`."""
+    turns: wp.array[wp.vec2d]
     seconds: wp.float64
     """Duration of a step at rates."""
     rates: Rates
@@ -286,8 +295,10 @@ class Rules:
                 fly_move(envs.fleet, env, action)
                 motion = flown(envs, env)
             else:
+                attitude = envs.attitudes[env]
                 motion.before = envs.drones[env]
-                motion.now = motion.before + envs.moves[action]
+                motion.now = motion.before + along_heading(attitude, envs.moves[action])
+                envs.attitudes[env] = turned(attitude, envs.turns[action])
                 motion.attitude = wp.vec4(envs.attitudes[env])
                 motion.thing = NOTHING
             motion.action = envs.speeds[action]
