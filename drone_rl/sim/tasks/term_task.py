@@ -18,7 +18,7 @@ from drone_rl.sim.tasks.applied_rules import AppliedRules, reward_terms
 from drone_rl.sim.tasks.common import Side
 from drone_rl.sim.tasks.geometry_kernel import GOAL
 from drone_rl.sim.tasks.objects import ObjectState, ObjectTask
-from drone_rl.sim.tasks.rules_kernel import SUCCESS, make_rules
+from drone_rl.sim.tasks.rules_kernel import RUNNING, SUCCESS, make_rules
 from drone_rl.sim.tasks.scene_edits import Range, SceneEdits
 from drone_rl.sim.tasks.strata import PHRASES, START_AXES, Strata
 from drone_rl.sim.tasks.task import Goals, register_task
@@ -113,6 +113,7 @@ class TermTask(ObjectTask):
             sides=self._strata.phrases,
             places=PHRASES,
             labels={"side": "bearing and distance at the start"},
+            **({} if success.name == "all_goals" else _own_success(success.name)),
         )
         self.edits = self._edits()
         self.curriculum = Curriculum(s) if s.curriculum else None
@@ -211,9 +212,11 @@ class TermTask(ObjectTask):
     def score(self, info: Mapping[str, Tensor]) -> Goals:
         """Return the goals; see `Strata`.
 
-        A success counts as all of them: its own meaning may need only some.
+        If success has another meaning, its episode's end counts for all of them.
         """
-        reached, sampled = info["reached"] | (info["end_reason"] == SUCCESS), info["sampled"]
+        reached, sampled, end = (info[name] for name in ("reached", "sampled", "end_reason"))
+        if self.vocabulary.succeed:
+            reached = torch.where(end == RUNNING, reached, end == SUCCESS)
         places = sampled[:, 4:].unflatten(1, (-1, 3))[:, self.goals.to(sampled.device)]
         stratum = self._strata.of(sampled[:, :4], places).where(info["sides"] >= 0, -1)
         return Goals(reached, stratum, sampled.double())
@@ -240,6 +243,11 @@ class TermTask(ObjectTask):
         heights = sorted({z - self.origin[2] for of in goals for z in of.range_of("z")})
         course = math.radians(first) if first == last else None
         return SceneEdits(self, reach, ahead, ahead, tuple(heights), course=course)
+
+
+def _own_success(name: str) -> dict[str, str]:
+    """Return the words of a task in which success is more than to reach every goal, or less."""
+    return {"reach": "succeed with", "reached": "with success", "succeed": f"succeed ({name})"}
 
 
 def define_task(name: str, **settings: Any) -> type[TermTaskSettings]:
