@@ -8,9 +8,18 @@ import warp as wp
 
 from drone_rl.config.terms import Term
 from drone_rl.sim.dynamics.flight_kernel import four, three
-from drone_rl.sim.dynamics.moves_kernel import Fleet, camera_attitude, fly_move, is_flying, is_lost
+from drone_rl.sim.dynamics.moves_kernel import (
+    Fleet,
+    along_heading,
+    camera_attitude,
+    fly_move,
+    is_flying,
+    is_lost,
+    turned,
+)
 from drone_rl.sim.dynamics.rigid_body_kernel import axes_of
-from drone_rl.sim.dynamics.state import ATTITUDE, VELOCITY
+from drone_rl.sim.dynamics.state import ATTITUDE, POSITION, THING, VELOCITY
+from drone_rl.sim.dynamics.velocity_kernel import Rates, fly_at, glide, rates_of, speeds_of
 from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, PoseArrays
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
@@ -40,10 +49,15 @@ class Episodes:
 
     world: World
     drones: wp.array[wp.vec3d]
-    attitudes: wp.array[wp.vec4]
-    """Of drones in computer-vision mode, which keep them."""
+    attitudes: wp.array[wp.vec4d]
+    """Of drones that do not fly, as what follows up to `rates`."""
     moves: wp.array[wp.vec3d]
-    """One an action, in computer-vision mode. Metres, world frame."""
+    """See `ComputerVision.moves`."""
+    turns: wp.array[wp.vec2d]
+    seconds: wp.float64
+    """Duration of a step at rates."""
+    rates: Rates
+    """Meaning of continuous actions."""
     speeds: wp.array[wp.vec4]
     """`Step.action` of each action."""
     fleet: Fleet
@@ -276,21 +290,41 @@ class Rules:
         def move(envs: Episodes, env: int, action: int) -> float:
             """Move a drone by its dynamics and apply the rules. Returns the reward."""
             motion = Motion()
-            motion.before = envs.drones[env]
-            motion.action = envs.speeds[action]
-            motion.thing = NOTHING
             if is_flying(envs.fleet):
-                motion.now = fly_move(envs.fleet, env, action)
-                motion.is_lost = is_lost(envs.fleet, env)
-                motion.attitude = four(envs.fleet.numbers, env, ATTITUDE)
-                motion.velocity = three(envs.fleet.numbers, env, VELOCITY)
+                fly_move(envs.fleet, env, action)
+                motion = flown(envs, env)
             else:
-                motion.now = motion.before + envs.moves[action]
-                motion.attitude = envs.attitudes[env]
+                attitude = envs.attitudes[env]
+                motion.before = envs.drones[env]
+                motion.now = motion.before + along_heading(attitude, envs.moves[action])
+                envs.attitudes[env] = turned(attitude, envs.turns[action])
+                motion.attitude = wp.vec4(envs.attitudes[env])
+                motion.thing = NOTHING
+            motion.action = envs.speeds[action]
             envs.drones[env] = motion.now
             return float(advance(envs.world, env, motion))
 
-        self.step_all, self.move = step_all, move
+        @wp.func
+        def steer(envs: Episodes, env: int, action: wp.array[float]) -> float:
+            """Do the same with a continuous action."""
+            motion = Motion()
+            rates = rates_of(envs.rates, action)
+            if is_flying(envs.fleet):
+                fly_at(envs.fleet, env, rates)
+                motion = flown(envs, env)
+            else:
+                motion.before = envs.drones[env]
+                after = glide(motion.before, envs.attitudes[env], rates, envs.seconds)
+                envs.attitudes[env] = after.attitude
+                motion.now = after.position
+                motion.attitude = wp.vec4(after.attitude)
+                motion.velocity = wp.vec3(after.velocity)
+                motion.thing = NOTHING
+            motion.action = speeds_of(envs.rates, action)
+            envs.drones[env] = motion.now
+            return float(advance(envs.world, env, motion))
+
+        self.step_all, self.move, self.steer = step_all, move, steer
 
     @functools.cache  # noqa: B019 (rules are kept for ever, see `make_rules`)
     def load(self) -> None:
@@ -342,11 +376,29 @@ def _returns(term: Term, is_reward: bool) -> bool:
 
 
 @wp.func
+def flown(envs: Episodes, env: int) -> Motion:
+    """Return the motion of a drone that has flown, without its action."""
+    numbers = envs.fleet.numbers
+    motion = Motion()
+    motion.before = envs.drones[env]
+    motion.now = wp.vec3d(
+        numbers[env, POSITION], numbers[env, POSITION + 1], numbers[env, POSITION + 2]
+    )
+    motion.is_lost = is_lost(envs.fleet, env)
+    motion.attitude = four(numbers, env, ATTITUDE)
+    motion.velocity = three(numbers, env, VELOCITY)
+    motion.thing = int(numbers[env, THING])
+    return motion
+
+
+@wp.func
 def place(envs: Episodes, env: int, poses: PoseArrays) -> None:
     """Write the poses of drone and objects for the renderer."""
     poses.positions[env, DRONE_FRAME] = wp.vec3(envs.drones[env])
     if is_flying(envs.fleet):
         poses.attitudes[env] = camera_attitude(envs.fleet, env)
+    else:
+        poses.attitudes[env] = wp.vec4(envs.attitudes[env])
     objects = envs.world.objects
     for i in range(objects.shapes.shape[0]):
         at = objects.places[env, i]
