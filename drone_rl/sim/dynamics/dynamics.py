@@ -11,15 +11,10 @@ from torch import Tensor
 
 from drone_rl.config import COMPUTER_VISION, MOVES_SETTINGS, ActionSettings, DynamicsSettings
 from drone_rl.sim.actions import MOVE_SETS, MOVES, Actions
-from drone_rl.sim.continuous_actions import ContinuousActions
+from drone_rl.sim.continuous_actions import YAW, ContinuousActions
 from drone_rl.sim.dynamics.quadrotor import Quadrotor
-from drone_rl.sim.dynamics.state import (
-    BodyState,
-    Obstacles,
-    along_heading,
-    heading_of,
-    turned,
-)
+from drone_rl.sim.dynamics.state import BodyState, Obstacles, along_heading, turned
+from drone_rl.sim.dynamics.velocity_kernel import glide_all
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance, shown
 
@@ -97,18 +92,17 @@ class Kinematic(Dynamics):
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
     ) -> BodyState:
         """Return the drones a time step later; velocities are those of the step."""
-        forward, left, rate, *climb = self._continuous.to_rates(action).unbind(-1)
-        heading = heading_of(body.attitude)
-        cos, sin, zero = heading.cos(), heading.sin(), torch.zeros_like(heading)
-        level = [cos * forward - sin * left, sin * forward + cos * left]
-        velocity = torch.stack([*level, *(climb or [zero])], -1)
-        half = (heading + rate * self._seconds) / 2
+        rates = self._continuous.to_rates(action)
+        moved = glide_all(body.position, body.attitude, rates, self._seconds)
+        position, attitude, velocity = moved
+        turn = rates[..., YAW]
+        zero = torch.zeros_like(turn)
         return dataclasses.replace(
             body,
-            position=body.position + velocity * self._seconds,
-            attitude=torch.stack([half.cos(), zero, zero, half.sin()], -1),
+            position=position,
+            attitude=attitude,
             velocity=velocity,
-            angular_velocity=torch.stack([zero, zero, rate], -1),
+            angular_velocity=torch.stack([zero, zero, turn], -1),
         )
 
 

@@ -21,7 +21,7 @@ class Fleet:
     climbs: bool
     is_gimballed: int
     moves: wp.array2d[wp.float64]
-    """See `Moves.drifts`."""
+    """See `Moves.drifts`; none if actions are continuous."""
     numbers: wp.array2d[wp.float64]
     """See `FlightState`; no rows in computer-vision mode."""
 
@@ -33,8 +33,8 @@ def is_flying(fleet: Fleet) -> bool:
 
 
 @wp.func
-def fly_move(fleet: Fleet, world: int, action: int) -> wp.vec3d:
-    """Fly a drone through a move. Returns its position, metres."""
+def fly_move(fleet: Fleet, world: int, action: int) -> None:
+    """Fly a drone through a move."""
     for axis in range(4):
         wanted = fleet.numbers[world, fs.REFERENCE + axis]
         if axis < 2 or (axis == 3 and fleet.climbs):
@@ -43,8 +43,6 @@ def fly_move(fleet: Fleet, world: int, action: int) -> wp.vec3d:
         fleet.command.goals[world, axis] = wanted
         fleet.command.drifts[world, axis] = fleet.moves[action, axis]
     run(fleet.command, fleet.numbers, fleet.numbers, world)
-    numbers = fleet.numbers[world]
-    return wp.vec3d(numbers[fs.POSITION], numbers[fs.POSITION + 1], numbers[fs.POSITION + 2])
 
 
 LEAST = wp.constant(wp.float64(fs.LEAST))
@@ -93,17 +91,22 @@ def is_lost(fleet: Fleet, world: int) -> bool:
     return fleet.numbers[world, fs.LOST] != wp.float64(0.0)
 
 
-def make_fleet(quadrotor: Quadrotor | None, numbers: Tensor) -> Fleet:
-    """Return drones whose `FlightState.numbers` are given; of no rows if `quadrotor` is None."""
+def make_fleet(
+    quadrotor: Quadrotor | None, numbers: Tensor, obstacles: fs.Obstacles | None = None
+) -> Fleet:
+    """Return drones whose `FlightState.numbers` are given; of no rows if `quadrotor` is None.
+
+    They share the memory of the obstacles' places.
+    """
     fleet = Fleet()
     fleet.numbers = wp.from_torch(numbers)
     if quadrotor is not None:
-        steering = quadrotor.steering
-        assert isinstance(steering, Moves)
+        steering, ticks = quadrotor.steering, quadrotor.settings.control_ticks
         zeros = torch.zeros(2, len(numbers), 4, dtype=torch.float64)
-        goals = FlightGoals(steering.MODES, *zeros)
-        fleet.command = make_command(quadrotor.frame, goals, quadrotor.settings.control_ticks)
-        fleet.lead, fleet.climbs = steering.lead, steering.climbs
+        goals = FlightGoals(steering.modes, *zeros)
+        fleet.command = make_command(quadrotor.frame, goals, ticks, obstacles)
         fleet.is_gimballed = int(quadrotor.mount == "gimbal")
-        fleet.moves = wp.from_torch(steering.drifts.contiguous())
+        if isinstance(steering, Moves):
+            fleet.lead, fleet.climbs = steering.lead, steering.climbs
+            fleet.moves = wp.from_torch(steering.drifts.contiguous())
     return fleet
