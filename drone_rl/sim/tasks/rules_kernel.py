@@ -2,7 +2,6 @@
 
 import functools
 import re
-from collections.abc import Iterable
 from typing import Any
 
 import warp as wp
@@ -137,7 +136,7 @@ def _checked(before: Any, term: Any, number: int) -> Any:
     @wp.func
     def find(world: World, step: Step) -> int:
         found = int(before(world, step))
-        if found == 0 and term(step, world.parameters):
+        if found == 0 and bool(term(step, world.parameters)):  # a vector is an error of Warp
             found = number
         return found
 
@@ -338,18 +337,42 @@ class Rules:
         try:
             wp.load_module(self.step_all.module, device="cpu")
         except Exception as error:
-            raise InputError(_compile_error(str(error), self.terms)) from error
+            raise InputError(self._compile_error(str(error))) from error
+
+    def _compile_error(self, text: str) -> str:
+        """Return one line about the innermost line of code that Warp's message names."""
+        places = re.findall(r'parsing function "(.*?)" at (.*?):(\d+)', text)
+        reason = text.splitlines()[-1].lstrip(";") if text else "no reason given"
+        if places and places[-1][1] != __file__:
+            function, file, line = places[-1]
+            where = f"line {line} of {file}: {function}"
+            return f"{where} can't be compiled by Warp ({reason}); correct it"
+        for number, term in enumerate(self.terms):  # what it returns is wrong
+            is_reward = number < len(self.rewards)
+            if not term.module.startswith("drone_rl.") and not _returns(term, is_reward):
+                what = "a number, as in -> float" if is_reward else "a truth value, as in -> bool"
+                return f"{place_of(term.function)}: no value to use ({reason}); return {what}"
+        return f"the terms can't be compiled by Warp ({reason}); correct them"
 
 
-def _compile_error(text: str, terms: Iterable[Term]) -> str:
-    """Return one line about the innermost line of code that Warp's message names."""
-    places = re.findall(r'parsing function "(.*?)" at (.*?):(\d+)', text)
-    reason = text.splitlines()[-1].lstrip(";") if text else "no reason given"
-    if not places or places[-1][1] == __file__:  # where it is called
-        names = ", ".join(term.name for term in terms if not term.module.startswith("drone_rl."))
-        return f"the terms {names} can't be compiled by Warp ({reason}); correct them"
-    function, file, line = places[-1]
-    return f"line {line} of {file}: {function} can't be compiled by Warp ({reason}); correct it"
+def _returns(term: Term, is_reward: bool) -> bool:
+    """Return whether Warp compiles a term alone: a number, or else a truth value."""
+    call = bound(term, 0)
+
+    @wp.kernel(module="unique", module_options=_OPTIONS)
+    def pay(numbers: wp.array[wp.float64]) -> None:
+        numbers[0] = wp.float64(call(Step(), numbers))
+
+    @wp.kernel(module="unique", module_options=_OPTIONS)
+    def check(numbers: wp.array[wp.float64]) -> None:
+        if bool(call(Step(), numbers)):
+            numbers[0] = wp.float64(1.0)
+
+    try:
+        wp.load_module((pay if is_reward else check).module, device="cpu")
+    except Exception:  # any of Warp's
+        return False
+    return True
 
 
 @wp.func
