@@ -66,11 +66,11 @@ class FusedObjects:
         """Return the sum of each reward term in the first episodes. Shape: (count, R), float32.
 
         Raises:
-            InputError: A term is not finite.
+            InputError: A term or an event is not finite.
         """
-        sums = self._state.paid[:count]
-        self._rules.check(sums)
-        return sums.float()
+        state = self._state[:count]
+        self._rules.check(state)
+        return state.paid.float()
 
     def begin(self, state: Any) -> None:
         """Copy states at the start of episodes."""
