@@ -1,9 +1,11 @@
 """Episodes of the fused kernel equal their replay step by step."""
 
 import threading
+from functools import partial
 
 import pytest
 import torch
+from torchrl.envs import CatFrames
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl.acceleration import FusedEpisodes, fused_episodes
@@ -145,6 +147,22 @@ def test_cropped_frames_and_a_network_with_pooling_are_fused(is_cropped_first):
             assert torch.equal(one[key], other[key]), key
     assert torch.allclose(one["logits"], other["logits"], atol=1e-4)
     assert one["pixels"].shape[1:] == (1, 20, 64)
+
+
+@pytest.mark.parametrize("longest_launch", [64, 2])
+@pytest.mark.parametrize("more", [(), (lambda: CropRows(3, 23),)])
+def test_stacks_of_frames_are_fused(monkeypatch, more, longest_launch):
+    """Also where an observation has frames of two launches."""
+    monkeypatch.setattr(fused_episodes, "_MAX_STEPS", longest_launch)
+    stack = partial(CatFrames, 3, dim=-3, in_keys=["pixels"])
+    transforms = [GrayPixels, stack, StandardizePixels, *more]
+    made = [make(transforms=transforms, compiled=compiled) for compiled in (True, False)]
+    assert isinstance(made[0].fused, FusedEpisodes)
+    with set_exploration_type(DETERMINISTIC):
+        for _ in range(2):
+            one, other = (collector.collect() for collector in made)
+            assert torch.equal(one["pixels"], other["pixels"]) and one["pixels"].shape[1] == 3
+            assert torch.equal(one["action"], other["action"])
 
 
 @pytest.mark.parametrize("how", [{"num_threads": 2}, {"num_threads": 3}])

@@ -104,7 +104,7 @@ def _defaults_of(command: type[CommandSettings]) -> tuple[dict[str, str | None],
         if name in GROUPS:
             groups[name] = GROUPS[name][1] if isinstance(value, Settings) else None
         if isinstance(kind, Changes):
-            values[name] = dict.fromkeys(kind.names)
+            groups[name], values[name] = None, dict.fromkeys(kind.names)
         elif name in SEVERAL:
             values[name] = {}  # without a choice, as in transforms=[], there are none
         elif groups.get(name) is None and name not in ("task", *PARTS):

@@ -14,12 +14,12 @@ import torch
 from PIL import Image
 from torch import Tensor
 
-from drone_rl.config.commands import CAMERAS, FLY_MODES, FlySettings
 from drone_rl.flight.fly_page.pilots import CONTROLS, Axes, Controls, VelocityPilot, make_pilot
 from drone_rl.flight.fly_page.recorder import Recorder
 from drone_rl.flight.fly_page.saliency import LiveSaliency
 from drone_rl.flight.fly_page.world import Seen, World
 from drone_rl.flight.image_types import encode
+from drone_rl.flight.settings import CAMERAS, FLY_MODES, FlySettings
 from drone_rl.policies.policy import Policy
 from drone_rl.sim.coordinates import Attitude
 from drone_rl.sim.dynamics import BodyState
