@@ -119,12 +119,12 @@ class AppliedRules:
 
     def check(self, state: Any) -> None:
         """Raise an `InputError` that names the terms whose sums in states are not finite."""
-        terms, values = self.compiled.rewards, state.paid
-        if self._events and not bool(state.places.isfinite().all()):
-            terms, values = self.compiled.events, state.places.flatten(1).sum(1, keepdim=True)
-        usable = values.isfinite().all(0).expand(len(terms))
-        if bool(usable.all()):
+        checked = (state.paid, state.places) if self._events else (state.paid,)
+        if all(bool(values.isfinite().all()) for values in checked):
             return
+        terms, usable = self.compiled.rewards, state.paid.isfinite().all(0)
+        if bool(usable.all()):
+            terms, usable = self.compiled.events, [False] * len(self.compiled.events)
         named = ", ".join(term.name for term, ok in zip(terms, usable, strict=True) if not ok)
         raise InputError(
             f"the terms {named} have values that are not finite; correct their functions, such as "
