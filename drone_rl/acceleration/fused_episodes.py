@@ -19,7 +19,7 @@ from drone_rl.acceleration.packed_layers import PackedNetwork, Reasons, unsuppor
 from drone_rl.envs import DroneEnv, Observer
 from drone_rl.envs.drone_env import Entries
 from drone_rl.envs.transforms import CropRows, StandardizePixels
-from drone_rl.policies.actor import CategoricalActor
+from drone_rl.policies.actor import CategoricalActor, SquashedActor
 from drone_rl.policies.networks import require_finite
 from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
 from drone_rl.sim.rendering.raytrace.renderer import Raytracer
@@ -47,7 +47,7 @@ class FusedEpisodes:
     def __init__(
         self,
         env: DroneEnv,
-        actor: CategoricalActor,
+        actor: CategoricalActor | SquashedActor,
         keeps_inputs: bool,
         network: PackedNetwork,
         rules: Any,
@@ -73,12 +73,15 @@ class FusedEpisodes:
         size_of_frames = self._num_frames * view.height * view.width
         self._length = max(1, min(_MAX_STEPS, _MAX_PIXELS // (count * size_of_frames)))
         self._num_rows = rows = count * self._length
-        num_actions = worlds.dynamics.actions.num_outputs
+        actions = worlds.dynamics.actions
+        self._is_continuous = _is_continuous(env)
+        kind = torch.float32 if self._is_continuous else torch.int32
+        self._num_draws = max(1, sum(actions.entry.shape))
         self._buffer = RolloutBuffer(
             {
                 "pixels": torch.empty(rows, self._num_frames, view.height, view.width),
-                "logits": torch.empty(rows, num_actions),
-                "action": torch.empty(rows, dtype=torch.int32),
+                "logits": torch.empty(rows, actions.num_outputs),
+                "action": torch.empty(rows, *actions.entry.shape, dtype=kind),
                 "reward": torch.empty(rows),
                 "end_reason": torch.empty(rows, dtype=torch.int32),
             }
@@ -88,7 +91,10 @@ class FusedEpisodes:
         self.activations = ActivationRecorder(launches * rows, size)
         """Of the last batch, for a `FusedNetwork` that learns from it."""
         self._owner = getattr(self._actor.network, "owner", "the policy")
-        self._kernel = rollout_kernel.make_kernel(*rules.functions)
+        decide = (
+            rollout_kernel.decide_numbers if self._is_continuous else rollout_kernel.decide_move
+        )
+        self._kernel = rollout_kernel.make_kernel(*rules.functions, decide)
         load_kernels(self._kernel.module)
 
     @classmethod
@@ -106,10 +112,9 @@ class FusedEpisodes:
         reasons = [*_not_fused(env), *_not_fused_policy(env, actor)]
         worlds = env.worlds
         rules = fused_rules(worlds.task, worlds.dynamics, worlds.state)
-        if rules is None:
-            names = f"{type(worlds.task).__name__} with {type(worlds.dynamics).__name__}"
-            reasons.append(f"task {names} is not fused")
-        if reasons or rules is None:
+        if isinstance(rules, str):
+            return Reasons([rules, *reasons])
+        if reasons:
             return Reasons(reasons)
         lines, view = _visible_lines(env.observer), env.observer.view
         hidden = view.height - (lines.stop - lines.start)
@@ -161,7 +166,7 @@ class FusedEpisodes:
             END_REASON: logged.pop("end_reason").long(),
             **terms,
             **logged,
-            "action": logged["action"].long(),
+            "action": logged["action"] if self._is_continuous else logged["action"].long(),
         }
 
     def close(self) -> None:
@@ -170,10 +175,12 @@ class FusedEpisodes:
 
     def _launch(self, num_envs: int, part: int, kept: Iterable[str]) -> Tensor:
         """Run up to `_length` steps; return the logits. `kept` are kept beyond the next launch."""
-        draws = torch.full((num_envs, self._length), -1.0)  # the most probable action
+        greedy = 0.0 if self._is_continuous else -1.0  # the most probable action
+        draws = torch.full((num_envs, self._length * self._num_draws), greedy)
         if self._actor.exploration == ExplorationType.RANDOM:
             source: Any = self._actor.generator
-            draws.uniform_(generator=source)
+            sample = draws.normal_ if self._is_continuous else draws.uniform_
+            sample(generator=source)
         opened, frames = self._buffer.open(part, kept), Images()
         pixels = opened["pixels"]
         gray: Any = wp.from_torch(pixels.flatten(2).flatten(0, 1))
@@ -185,7 +192,11 @@ class FusedEpisodes:
         rollout.observations = wp.from_torch(pixels.flatten(1))
         rollout.last_observations = wp.from_torch(self._last_observations)
         rollout.logits = wp.from_torch(opened["logits"])
-        rollout.actions = wp.from_torch(opened["action"])
+        rollout.num_steps = self._length
+        if self._is_continuous:
+            rollout.numbers = wp.from_torch(opened["action"])
+        else:
+            rollout.actions = wp.from_torch(opened["action"])
         rollout.rewards = wp.from_torch(opened["reward"])
         rollout.end_reasons = wp.from_torch(opened["end_reason"])
         first, last = part * self._num_rows, (part + 1) * self._num_rows
@@ -200,6 +211,11 @@ class FusedEpisodes:
             last_rows = pixels[self._length - 1 :: self._length][:num_envs]
             self._last_observations[:num_envs] = last_rows.flatten(1)
         return opened["logits"]
+
+
+def _is_continuous(env: DroneEnv) -> bool:
+    """Return whether actions are numbers instead of indices."""
+    return env.worlds.dynamics.actions.entry.dtype.is_floating_point
 
 
 def _mean_and_deviation(observer: Observer) -> tuple[float, float]:
@@ -253,7 +269,7 @@ def _not_fused(env: DroneEnv) -> list[str]:
 
 def _not_fused_policy(env: DroneEnv, actor: Any) -> list[str]:
     """Return reasons against fusing the actor."""
-    if type(actor) is not CategoricalActor:
+    if type(actor) is not (SquashedActor if _is_continuous(env) else CategoricalActor):
         return [f"policy {type(actor).__name__} is not fused"]
     network = actor.network
     if reasons := unsupported(network):

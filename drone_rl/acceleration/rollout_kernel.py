@@ -10,6 +10,8 @@ from typing import Any
 import warp as wp
 
 from drone_rl.acceleration.layers_kernel import Layers, copy, row_size, run_convolutions, run_linear
+from drone_rl.policies.actor import MAX_ACTION
+from drone_rl.sim.continuous_actions import LEAST_LOG, MOST_LOG, MOST_MEAN, SHIFT
 from drone_rl.sim.rendering.raytrace.plain_kernel import render_image
 from drone_rl.sim.rendering.raytrace.structs_kernel import (
     Geoms,
@@ -50,8 +52,9 @@ class Rollout:
     layers: Layers
     workspaces: wp.array2d[float]
     """Outputs of all layers for `TOGETHER` frames, one a worker."""
+    num_steps: int
     draws: wp.array2d[float]
-    """Uniform samples for actions; below 0 for the most probable one. Shape: (num_envs, steps)."""
+    """Samples for actions, see `choose` and `squash`. Shape: (num_envs, steps * numbers)."""
     frames: Images
     """Frames, `num_frames` a row: those of an observation, oldest first."""
     num_frames: int
@@ -61,6 +64,8 @@ class Rollout:
     """Of each environment, before the first step of the launch."""
     logits: wp.array2d[float]
     actions: wp.array[int]
+    numbers: wp.array2d[float]
+    """Continuous actions."""
     rewards: wp.array[float]
     end_reasons: wp.array[int]
     """0 while the episode goes on."""
@@ -101,6 +106,38 @@ def choose(logits: wp.array[float], at: int, count: int, draw: float) -> int:
 
 
 @wp.func
+def squash(mean: float, log: float, draw: float) -> float:
+    """Return a number of a continuous action from a standard normal sample; see `normal_of`."""
+    share = 1.0 / (1.0 + wp.exp(-(log + SHIFT)))
+    deviation = wp.exp(LEAST_LOG + (MOST_LOG - LEAST_LOG) * share)
+    number = MOST_MEAN * wp.tanh(mean / MOST_MEAN) + deviation * draw
+    return wp.clamp(wp.tanh(number), -MAX_ACTION, MAX_ACTION)
+
+
+@wp.func
+def decide_move(
+    rollout: Rollout, outputs: wp.array[float], at: int, env: int, step: int, row: int
+) -> int:
+    """Choose a discrete action from outputs of the network that begin at `at`, and record it."""
+    action = choose(outputs, at, rollout.logits.shape[1], rollout.draws[env, step])
+    rollout.actions[row] = action
+    return action
+
+
+@wp.func
+def decide_numbers(  # noqa: ANN201 (an array)
+    rollout: Rollout, outputs: wp.array[float], at: int, env: int, step: int, row: int
+):
+    """Sample a continuous action; see `decide_move`."""
+    numbers = rollout.numbers[row]
+    count = numbers.shape[0]
+    for i in range(count):
+        draw = rollout.draws[env, step * count + i]
+        numbers[i] = squash(outputs[at + i], outputs[at + count + i], draw)
+    return numbers
+
+
+@wp.func
 def stack(rollout: Rollout, env: int, step: int, row: int, is_start: bool) -> None:
     """Write the earlier frames of an observation; at an episode's start all are the newest."""
     seen = rollout.observations[row]
@@ -116,10 +153,11 @@ def stack(rollout: Rollout, env: int, step: int, row: int, is_start: bool) -> No
 
 
 @functools.cache
-def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (functions that Warp compiles)
+def make_kernel(states: Any, place: Any, move: Any, decide: Any) -> Any:  # noqa: C901 (functions that Warp compiles)
     """Return the kernel for the rules of a task; see `drone_rl.sim.tasks.fused.fused_rules`.
 
     Args:
+        decide: `decide_move` or `decide_numbers`.
         states: Warp structure of the environments, with "steps" and "end_reasons".
         place: Writes the poses that are rendered: (states, env, poses).
         move: Steps an environment: (states, env, action). Returns the reward.
@@ -135,7 +173,7 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
         running = int(0)
         for env in range(first, last):
             if envs.end_reasons[env] == 0:
-                row = env * rollout.draws.shape[1] + step
+                row = env * rollout.num_steps + step
                 place(envs, env, camera.poses)
                 render_image(
                     camera.view,
@@ -169,12 +207,11 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
         running = int(0)
         for env in range(first, last):
             if envs.end_reasons[env] == 0:
-                row = env * rollout.draws.shape[1] + step
+                row = env * rollout.num_steps + step
                 at = running * size + logits_offset
                 for i in range(num_actions):
                     rollout.logits[row, i] = workspace[at + i]
-                action = choose(workspace, at, num_actions, rollout.draws[env, step])
-                rollout.actions[row] = action
+                action = decide(rollout, workspace, at, env, step, row)
                 rollout.rewards[row] = move(envs, env, action)
                 rollout.end_reasons[row] = envs.end_reasons[env]
                 if rollout.outputs.shape[0] > 0:
@@ -191,7 +228,7 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
             end = wp.min(group + TOGETHER, last)
             step = int(0)
             running = int(1)
-            while step < rollout.draws.shape[1] and running > 0:
+            while step < rollout.num_steps and running > 0:
                 running = observe(group, end, step, worker, rollout, envs)
                 run_linear(rollout.layers, rollout.workspaces[worker], 0, running)
                 act(group, end, step, worker, rollout, envs)

@@ -13,9 +13,11 @@ from drone_rl.acceleration.fused_episodes import RolloutBuffer
 from drone_rl.acceleration.fused_network import FusedNetwork
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.config import (
+    ActionSettings,
     AppearanceSettings,
     CameraSettings,
     DynamicsSettings,
+    PillarsSettings,
     TaskSettings,
 )
 from drone_rl.envs import (
@@ -27,6 +29,7 @@ from drone_rl.envs import (
     StandardizePixels,
 )
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN, make_actor
+from drone_rl.policies.actor import SquashedNormal
 from drone_rl.sim.dynamics import Quadrotor
 from drone_rl.sim.dynamics.state import LOST
 from drone_rl.sim.tasks.collect_cubes import CubesEnd
@@ -47,14 +50,16 @@ def make(
     num_envs=5,
     network=None,
     dynamics=None,
+    actions=None,
     **how,
 ):
     made = [transform() for transform in transforms]
-    env = DroneEnv(num_envs, task, dynamics=dynamics, transforms=made)
+    env = DroneEnv(num_envs, task, dynamics=dynamics, actions=actions, transforms=made)
     generator = torch.Generator().manual_seed(0)
     if network is None:
         shape = tuple(env.observation_spec["pixels"].shape[1:])
-        network = SmallCNN(shape, 3, channels=(4,), hidden=(8,), generator=generator)
+        count = env.worlds.dynamics.actions.num_outputs
+        network = SmallCNN(shape, count, channels=(4,), hidden=(8,), generator=generator)
         with torch.no_grad():
             network.layers.logits.weight.mul_(100)
     actor = make_actor(network, env.action_spec, generator)
@@ -86,6 +91,27 @@ WORLDS = (
 )
 
 
+def assert_replayed(batch, env):
+    """Take the actions of a batch of five episodes again in equal environments."""
+    state, ids = env.reset(), batch["collector", "traj_ids"]
+    episodes = [batch[ids == i] for i in ids.unique()]
+    assert len(episodes) == 5 and ids.tolist() == sorted(ids.tolist())
+    for t in range(max(map(len, episodes))):
+        is_on = torch.tensor([t < len(episode) for episode in episodes])
+        rows = [episode[t] for episode in episodes if t < len(episode)]
+        assert torch.equal(torch.stack([r["pixels"] for r in rows]), state["pixels"][is_on])
+        action = env.action_spec.zero()
+        action[is_on] = torch.stack([row["action"] for row in rows])
+        state = env.step(state.set("action", action).set("_step", is_on))
+        for key in (("next", "reward"), ("next", "done"), ("next", "truncated"), REASON):
+            assert torch.equal(torch.stack([row[key] for row in rows]), state[key][is_on])
+        for name in ("drone", "attitude"):
+            if ("next", "info", name) in batch.keys(True):
+                reported = torch.stack([row["next", "info", name] for row in rows])
+                assert torch.equal(reported, state["next", "info", name][is_on])
+        state = state["next"]
+
+
 @pytest.mark.parametrize("first", range(3))
 @pytest.mark.parametrize("second", range(3))
 def test_fused_episodes_equal_their_replay_by_torchrl_bit_for_bit(first, second):
@@ -106,30 +132,51 @@ def test_fused_episodes_equal_their_replay_by_torchrl_bit_for_bit(first, second)
     with torch.no_grad():
         network.layers.logits.weight.mul_(100)
     actor = make_actor(network, env.action_spec, generator)
-    collector = EpisodeCollector(acting, actor, compiled=True, info=("collected", "drone"))
+    collector = EpisodeCollector(acting, actor, compiled=True, info=("drone", "attitude"))
     assert isinstance(collector.fused, FusedEpisodes)
     for _ in range(2):
-        batch, state = collector.collect(), env.reset()
-        ids = batch["collector", "traj_ids"]
-        episodes = [batch[ids == i] for i in ids.unique()]
-        assert len(episodes) == 5 and ids.tolist() == sorted(ids.tolist())
-        for t in range(max(map(len, episodes))):
-            is_on = torch.tensor([t < len(episode) for episode in episodes])
-            rows = [episode[t] for episode in episodes if t < len(episode)]
-            assert torch.equal(torch.stack([r["pixels"] for r in rows]), state["pixels"][is_on])
-            action = torch.zeros(5, dtype=torch.int64)
-            action[is_on] = torch.stack([row["action"] for row in rows])
-            state = env.step(state.set("action", action).set("_step", is_on))
-            for key in (("next", "reward"), ("next", "done"), ("next", "truncated"), REASON):
-                assert torch.equal(torch.stack([row[key] for row in rows]), state[key][is_on])
-            for name in ("collected", "drone"):
-                reported = torch.stack([row["next", "info", name] for row in rows])
-                assert torch.equal(reported, state["next", "info", name][is_on])
-            state = state["next"]
+        batch = collector.collect()
+        assert_replayed(batch, env)
         assert batch["next", "done"].sum() == 5
         network = collector.actor.module[0].module
         assert torch.allclose(network(batch["pixels"]), batch["logits"], atol=1e-5)
     assert collector.episodes == 10 and collector.frames > 10
+
+
+VELOCITY = ActionSettings(kind="velocity", forward_speed=4.0)
+CLIMBING = VELOCITY.replace(climb_speed=1.0, backward_speed=0.5)
+PILLARS = PillarsSettings(step_limit=40)
+
+
+@pytest.mark.parametrize("task", [SHORT.replace(step_limit=40), PILLARS])
+@pytest.mark.parametrize("dynamics", [None, FLYING, GIMBAL.replace(gusts=2.0, control_ticks=66)])
+@pytest.mark.parametrize("actions", [ActionSettings(), VELOCITY, CLIMBING])
+def test_flight_at_velocities_and_among_obstacles_is_fused(task, dynamics, actions):
+    how = {"dynamics": dynamics, "actions": actions, "info": ("drone", "attitude")}
+    collector = make(task, **how)
+    assert isinstance(collector.fused, FusedEpisodes)
+    env = make(task, **how).base_env
+    for _ in range(2):
+        batch = collector.collect()
+        assert_replayed(batch, env)
+    outputs = collector.actor.network(batch["pixels"])
+    torch.testing.assert_close(outputs, batch["logits"], atol=1e-4, rtol=1e-4)
+
+
+def test_continuous_actions_are_the_squashed_medians_or_samples():
+    how = {"dynamics": FLYING, "actions": VELOCITY, "num_envs": 100}
+    collector = make(**how)
+    with set_exploration_type(DETERMINISTIC):
+        batch = collector.collect()
+    expected = SquashedNormal(batch["logits"]).deterministic_sample
+    torch.testing.assert_close(batch["action"], expected)
+    batch = collector.collect()
+    normal = SquashedNormal(batch["logits"])
+    draws = (batch["action"].atanh() - normal.loc) / normal.scale
+    count = len(draws)
+    # four standard errors
+    assert draws.mean(0).tolist() == pytest.approx([0.0] * 3, abs=4 / count**0.5)
+    assert draws.std(0).tolist() == pytest.approx([1.0] * 3, abs=4 / (2 * count) ** 0.5)
 
 
 @pytest.mark.parametrize("is_cropped_first", [True, False])
@@ -147,6 +194,23 @@ def test_cropped_frames_and_a_network_with_pooling_are_fused(is_cropped_first):
             assert torch.equal(one[key], other[key]), key
     assert torch.allclose(one["logits"], other["logits"], atol=1e-4)
     assert one["pixels"].shape[1:] == (1, 20, 64)
+
+
+@pytest.mark.parametrize("kind", ["moves_3d", "moves_turning", "moves_full"])
+@pytest.mark.parametrize("dynamics", [None, FLYING])
+def test_other_moves_and_turns_are_fused(kind, dynamics):
+    task = SHORT.replace(step_limit=25)
+    actions = ActionSettings(kind=kind, turn_step=25.0)
+    how = {"dynamics": dynamics, "actions": actions, "info": ("drone", "attitude")}
+    made = [make(task, compiled=compiled, **how) for compiled in (True, False)]
+    assert isinstance(made[0].fused, FusedEpisodes)
+    with set_exploration_type(DETERMINISTIC):
+        for _ in range(2):
+            one, other = (collector.collect() for collector in made)
+            for key in other.keys(True, True):
+                if key != "logits":
+                    assert torch.equal(one[key], other[key]), key
+            assert len(one["action"].unique()) > 1
 
 
 @pytest.mark.parametrize("longest_launch", [64, 2])

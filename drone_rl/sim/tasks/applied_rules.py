@@ -119,16 +119,19 @@ class AppliedRules:
 
     def check(self, state: Any) -> None:
         """Raise an `InputError` that names the terms whose sums in states are not finite."""
-        checked = (state.paid, state.places) if self._events else (state.paid,)
-        if all(bool(values.isfinite().all()) for values in checked):
+        if self._events and not bool(state.places.isfinite().all()):
+            names = ", ".join(term.name for term in self.compiled.events)
+            raise InputError(
+                f"the events {names} return velocities that are not finite; correct them"
+            )
+        if bool(state.paid.isfinite().all()):
             return
-        terms, usable = self.compiled.rewards, state.paid.isfinite().all(0)
-        if bool(usable.all()):
-            terms, usable = self.compiled.events, [False] * len(self.compiled.events)
-        named = ", ".join(term.name for term, ok in zip(terms, usable, strict=True) if not ok)
+        unusable = zip(self.compiled.rewards, ~state.paid.isfinite().all(0), strict=True)
+        names = [term.name for term, is_unusable in unusable if is_unusable]
         raise InputError(
-            f"the terms {named} have values that are not finite; correct their functions, such as "
-            "a division by 0 or a logarithm of it"
+            f"the reward terms {', '.join(names)} have values that are not finite, also with a "
+            "weight of 0; correct their functions, such as a division by 0 or a logarithm of it, "
+            f"or leave them out: task.reward.{names[0]}=null"
         )
 
     def world(

@@ -9,12 +9,14 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 import drone_rl
 from drone_rl import InputError, Mover, Step, define_task, reward
 from drone_rl.acceleration import FusedEpisodes
+from drone_rl.config import ActionSettings
 from drone_rl.config.appearance import AppearanceSettings, check_appearance
 from drone_rl.config.camera import CameraSettings
 from drone_rl.config.task import TASKS, BaseTaskSettings
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.dynamics.state import heading_of
 from drone_rl.sim.tasks import as_task
+from drone_rl.sim.tasks.fused import fused_rules
 from drone_rl.sim.tasks.task import MAKERS
 from drone_rl.sim.worlds import Worlds
 from drone_rl.training.metrics import batch_metrics
@@ -71,6 +73,20 @@ def test_a_goal_is_reached_where_the_balls_touch():
     assert made.task.places(made.state)[0, 0, 2] < 0.0  # it has vanished
 
 
+def test_a_drone_turns_to_a_goal_beside_it():
+    """It looks to the left, along +y, and the ball is 6 m ahead on +x: a turn of 90 degrees."""
+    settings = {"name": "test_reach", "start": {"heading": 90.0}, "step_limit": 20}
+    actions = ActionSettings(kind="moves_turning", turn_step=45.0)
+    made = Worlds(1, BaseTaskSettings.read(settings), actions=actions)
+    made.reset(torch.arange(1), [np.random.RandomState(0)])
+    assert made.task.edits.next_offset(made.state)[0].tolist() == pytest.approx([0.0, -6.0, 0.0])
+    assert made.state.sides[0, 0] == 2  # on its right
+    rewards, end = fly(made, RIGHT, RIGHT, *[FORWARD] * 4)
+    assert rewards == pytest.approx([0, 0, 0.5, 0.5, 0.5, 0.5]) and end == "RUNNING"
+    assert fly(made, FORWARD)[1] == "SUCCESS"
+    assert made.state.body.position[0].tolist() == pytest.approx([5.0, 0.0, 2.5])
+
+
 def test_an_obstacle_is_touched_between_two_positions():
     made = worlds()
     fly(made, LEFT, LEFT, FORWARD, FORWARD)
@@ -125,8 +141,8 @@ def test_starts_turn_the_drone_and_the_offset_of_its_goal():
         return step.goal[1] + 100.0 * step.goal[0] + 10000.0 * step.heading
 
     made = worlds(start={"heading": 90.0}, reward={"test_offset": 1.0})
-    # at (1, 0), looking to y: the goal is 5 m to the right; a float's rounding of 10000 pi / 2
-    assert fly(made, FORWARD)[0] == pytest.approx([10000 * np.pi / 2 - 5.0], abs=0.01)
+    # at (0, 1), looking to y: the goal is 6 m to the right; a float's rounding of 10000 pi / 2
+    assert fly(made, FORWARD)[0] == pytest.approx([10000 * np.pi / 2 - 106.0], abs=0.01)
 
 
 def test_terms_see_the_goal_from_a_start_that_is_turned():
@@ -286,9 +302,27 @@ def test_dm_control_shows_moved_objects():
     assert ball.tolist() == pytest.approx([6.0, 1.0, 3.1])
 
 
-def test_events_that_are_not_finite_are_named():
-    with pytest.raises(InputError, match="test_lost"):
-        fly(worlds(objects={"ball": {**BALL, "event": ["test_lost"]}}), FORWARD)
+@drone_rl.event("test_number")
+def number(mover: Mover) -> float:
+    """No velocity."""
+    return mover.time
+
+
+@pytest.mark.parametrize(
+    ("event", "message"), [("test_lost", "test_lost"), ("test_number", "wp.vec3")]
+)
+def test_unusable_events_are_named(event, message):
+    with pytest.raises(InputError, match=message):
+        fly(worlds(objects={"ball": {**BALL, "event": [event]}}), FORWARD)
+
+
+def test_moving_obstacles_of_a_quadrotor_are_not_fused():
+    objects = {"ball": BALL, "post": {**POST, "event": ["shuttle"]}}
+    task = BaseTaskSettings.read({"name": "test_reach", "objects": objects})
+    made = Worlds(1, task, dynamics=drone_rl.DynamicsSettings(mode="simple_flight"))
+    assert "events" in fused_rules(made.task, made.dynamics, made.state)
+    made = Worlds(1, task)
+    assert not isinstance(fused_rules(made.task, made.dynamics, made.state), str)
 
 
 @reward("test_undefined")
@@ -303,10 +337,15 @@ def uncompiled(step: Step) -> float:
     return len([step.time])
 
 
-@pytest.mark.parametrize("term", ["test_undefined", "test_uncompiled"])
+@reward("test_nothing")
+def nothing(step: Step):
+    """Not a value."""
+
+
+@pytest.mark.parametrize("term", ["test_undefined", "test_uncompiled", "test_nothing"])
 def test_unusable_terms_are_named(term):
     with pytest.raises(InputError, match=term.removeprefix("test_")):
-        fly(worlds(reward={term: 1.0}), FORWARD)
+        fly(worlds(reward={"test_near": 1.0, term: 0.0}), FORWARD)
 
 
 @pytest.mark.parametrize("start", [{}, {"y": [-3.0, 3.0], "heading": [-90.0, 90.0]}])
@@ -329,6 +368,22 @@ def test_fused_episodes_are_the_stepped_ones(start, event):
     assert sum(sums) == pytest.approx(logged["train/reward"], abs=1e-5)
     shares = [logged[f"reward_share/{name}"] for name in rewards]
     assert sum(shares) == pytest.approx(1.0) and max(shares) < 1.0
+
+
+@pytest.mark.parametrize("kind", ["moves", "moves_turning", "moves_full"])
+def test_fused_episodes_with_headings_at_random_are_the_stepped_ones(kind):
+    values = {
+        "objects": {"ball": {**BALL, "y": [-3.0, 3.0]}},
+        "start": {"heading": [-180.0, 180.0]},
+    }
+    task = BaseTaskSettings.read({"name": "test_reach", **values})
+    how = {"task": task, "num_envs": 32, "actions": ActionSettings(kind=kind)}
+    collectors = [make(compiled=fused, info=("attitude",), **how) for fused in (True, False)]
+    assert isinstance(collectors[0].fused, FusedEpisodes)
+    with set_exploration_type(ExplorationType.DETERMINISTIC):
+        one, other = (collector.collect() for collector in collectors)
+    for key in ("pixels", "action", ("next", "reward"), ("next", "info", "attitude")):
+        assert torch.equal(one[key], other[key]), key
 
 
 def test_velocity_of_a_move_is_its_length_over_the_steps_time():
@@ -419,9 +474,24 @@ def any_goal(step: Step) -> bool:
     return step.remaining <= 1
 
 
-@pytest.mark.parametrize(("success", "reached"), [("test_any_goal", 2), ("all_goals", 1)])
-def test_a_success_counts_as_all_goals(success, reached):
+@drone_rl.success("test_late_goals")
+def late_goals(step: Step) -> bool:
+    """Every goal is reached, and a minute is over."""
+    return step.remaining == 0 and step.time > 60.0
+
+
+@pytest.mark.parametrize(
+    ("success", "reached", "finally_reached"),
+    [("test_any_goal", 2, 2), ("test_late_goals", 1, 0), ("all_goals", 1, 1)],
+)
+def test_goals_count_by_the_success_of_the_episode(success, reached, finally_reached):
     far = {**BALL, "x": 30.0}
     made = worlds(objects={"ball": BALL, "far": far}, success=[success])
     fly(made, *[FORWARD] * 5)  # at x = 5 the drone touches the nearer ball of radius 1 at x = 6
     assert int(made.task.score(made.info()).reached.sum()) == reached
+    fly(made, *[FORWARD] * 7)  # to the step limit
+    assert int(made.task.score(made.info()).reached.sum()) == finally_reached
+    words = made.task.vocabulary
+    assert words.succeeds == (
+        "reaches every goal" if success == "all_goals" else f"succeeds ({success})"
+    )
