@@ -12,8 +12,11 @@ import warp as wp
 from drone_rl.acceleration.layers_kernel import Layers, copy, row_size, run_convolutions, run_linear
 from drone_rl.policies.actor import MAX_ACTION
 from drone_rl.sim.continuous_actions import LEAST_LOG, MOST_LOG, MOST_MEAN, SHIFT
+from drone_rl.sim.rendering.raytrace.effects_kernel import render_image_with_effects
 from drone_rl.sim.rendering.raytrace.plain_kernel import render_image
 from drone_rl.sim.rendering.raytrace.structs_kernel import (
+    RGB,
+    Effects,
     Geoms,
     Images,
     Materials,
@@ -38,10 +41,20 @@ class CameraView:
     materials: Materials
     scratch: Scratch
     poses: PoseArrays
+    has_effects: bool
+    effects: Effects
+    rendered: Images
+    """An image a worker, before `develop`."""
+    shifts: wp.array2d[int]
+    """Pixels down and to the right of each environment, see `fault_models.shift`."""
+    num_channels: int
+    """1 for gray, 2 for chromaticities, 3 for colors."""
+    floor: float
+    """See `ChromaticityPixels`."""
     mean: float
-    """Subtracted from each pixel."""
+    """Subtracted from each number."""
     deviation: float
-    """Each pixel is divided by it."""
+    """Each number is divided by it."""
 
 
 @wp.struct
@@ -56,7 +69,7 @@ class Rollout:
     draws: wp.array2d[float]
     """Samples for actions, see `choose` and `squash`. Shape: (num_envs, steps * numbers)."""
     frames: Images
-    """Frames, `num_frames` a row: those of an observation, oldest first."""
+    """Gray frames, `num_frames` a row: those of an observation, oldest first."""
     num_frames: int
     observations: wp.array2d[float]
     """The same memory, a row an observation."""
@@ -79,6 +92,154 @@ for (int i = 0; i < count; ++i) values.data[i] = (values.data[i] - mean) / devia
 def standardise(values: wp.array[float], count: int, mean: float, deviation: float) -> None:
     """Subtract the mean and divide by the deviation."""
     ...
+
+
+@wp.func_native("""
+#pragma clang fp contract(off)
+for (int y = 0; y < height; ++y) {
+    const int from = wp::clamp(y - down, 0, height - 1) * width;
+    float* to = target.data + first + y * width;
+    for (int x = 0; x < width; ++x) {
+        const int at = from + wp::clamp(x - right, 0, width - 1);
+        to[x] = (source.data[at] - mean) / deviation;
+    }
+}""")
+def develop_gray(
+    source: wp.array[float],
+    width: int,
+    height: int,
+    down: int,
+    right: int,
+    mean: float,
+    deviation: float,
+    target: wp.array[float],
+    first: int,
+) -> None:
+    """Write a gray image to `target` from index `first` on, shifted and standardized."""
+    ...
+
+
+@wp.func_native("""
+#pragma clang fp contract(off)
+const int size = width * height;
+for (int y = 0; y < height; ++y) {
+    const int from = wp::clamp(y - down, 0, height - 1) * width;
+    float* to = target.data + first + y * width;
+    for (int x = 0; x < width; ++x) {
+        const auto color = source.data[from + wp::clamp(x - right, 0, width - 1)];
+        float red = color[0] / 255.0f, green = color[1] / 255.0f, blue = color[2] / 255.0f;
+        if (channels == 2) {
+            const float total = red + green + blue, third = total / 3.0f;
+            red = (red - third) / (total + floor);
+            blue = (blue - third) / (total + floor);
+        } else {
+            to[size + x] = (green - mean) / deviation;
+        }
+        to[x] = (red - mean) / deviation;
+        to[(channels - 1) * size + x] = (blue - mean) / deviation;
+    }
+}""")
+def develop_rgb(
+    source: wp.array[wp.vec3ub],
+    width: int,
+    height: int,
+    down: int,
+    right: int,
+    channels: int,
+    floor: float,
+    mean: float,
+    deviation: float,
+    target: wp.array[float],
+    first: int,
+) -> None:
+    """Write the same of an image in color, or of its chromaticities if there are two channels."""
+    ...
+
+
+@wp.func
+def show_plain(rollout: Rollout, env: int, row: int, worker: int) -> None:
+    """Render gray without effects, and standardize: the newest frame of observation `row`."""
+    camera = rollout.camera
+    newest = (row + 1) * rollout.num_frames - 1
+    render_image(
+        camera.view,
+        0,
+        camera.geoms,
+        camera.poses,
+        env,
+        camera.materials,
+        camera.scratch,
+        worker,
+        rollout.frames,
+        newest,
+    )
+    frame = rollout.frames.gray[newest]
+    standardise(frame, frame.shape[0], camera.mean, camera.deviation)
+
+
+@wp.func
+def show_any(rollout: Rollout, env: int, row: int, worker: int) -> None:
+    """Do the same with all effects, mountings and transforms."""
+    camera = rollout.camera
+    view = camera.view
+    mounted = env % view.cameras.shape[0]
+    if camera.has_effects:
+        render_image_with_effects(
+            view,
+            mounted,
+            camera.geoms,
+            camera.poses,
+            env,
+            camera.materials,
+            camera.scratch,
+            worker,
+            camera.rendered,
+            worker,
+            camera.effects,
+        )
+    else:
+        render_image(
+            view,
+            mounted,
+            camera.geoms,
+            camera.poses,
+            env,
+            camera.materials,
+            camera.scratch,
+            worker,
+            camera.rendered,
+            worker,
+        )
+    target = rollout.observations[row]
+    first = (rollout.num_frames - 1) * camera.num_channels * view.height * view.width
+    down = camera.shifts[env, 0]
+    right = camera.shifts[env, 1]
+    if (view.what & RGB) != 0:
+        develop_rgb(
+            camera.rendered.rgb[worker],
+            view.width,
+            view.height,
+            down,
+            right,
+            camera.num_channels,
+            camera.floor,
+            camera.mean,
+            camera.deviation,
+            target,
+            first,
+        )
+    else:
+        develop_gray(
+            camera.rendered.gray[worker],
+            view.width,
+            view.height,
+            down,
+            right,
+            camera.mean,
+            camera.deviation,
+            target,
+            first,
+        )
 
 
 @wp.func
@@ -153,14 +314,15 @@ def stack(rollout: Rollout, env: int, step: int, row: int, is_start: bool) -> No
 
 
 @functools.cache
-def make_kernel(states: Any, place: Any, move: Any, decide: Any) -> Any:  # noqa: C901 (functions that Warp compiles)
+def make_kernel(states: Any, place: Any, move: Any, decide: Any, show: Any) -> Any:  # noqa: C901 (functions that Warp compiles)
     """Return the kernel for the rules of a task; see `drone_rl.sim.tasks.fused.fused_rules`.
 
     Args:
-        decide: `decide_move` or `decide_numbers`.
         states: Warp structure of the environments, with "steps" and "end_reasons".
         place: Writes the poses that are rendered: (states, env, poses).
         move: Steps an environment: (states, env, action). Returns the reward.
+        decide: `decide_move` or `decide_numbers`.
+        show: `show_plain` or `show_any`.
     """
 
     @wp.func
@@ -168,28 +330,13 @@ def make_kernel(states: Any, place: Any, move: Any, decide: Any) -> Any:  # noqa
         first: int, last: int, step: int, worker: int, rollout: Rollout, envs: states
     ) -> int:
         """Render running environments, compute the convolutions; return how many are running."""
-        camera = rollout.camera
-        newest = rollout.num_frames - 1
         running = int(0)
         for env in range(first, last):
             if envs.end_reasons[env] == 0:
                 row = env * rollout.num_steps + step
-                place(envs, env, camera.poses)
-                render_image(
-                    camera.view,
-                    0,
-                    camera.geoms,
-                    camera.poses,
-                    env,
-                    camera.materials,
-                    camera.scratch,
-                    worker,
-                    rollout.frames,
-                    row * rollout.num_frames + newest,
-                )
-                frame = rollout.frames.gray[row * rollout.num_frames + newest]
-                standardise(frame, frame.shape[0], camera.mean, camera.deviation)
-                if newest > 0:
+                place(envs, env, rollout.camera.poses)
+                show(rollout, env, row, worker)
+                if rollout.num_frames > 1:
                     stack(rollout, env, step, row, envs.steps[env] == 0)
                 seen = rollout.observations[row]
                 run_convolutions(rollout.layers, seen, rollout.workspaces[worker], running)

@@ -205,7 +205,8 @@ class ContinuousActions(Actions):
     def is_reversible(self, kept: Mapping[str, Tensor]) -> Tensor:
         """Return whether actions go or turn to a side, forward at most at a third of full speed."""
         is_slow = kept["rates"][..., FORWARD].abs() <= ASIDE * self.speeds[FORWARD]
-        return self.can_be_undone(kept["actions"]) & is_slow
+        part = kept["actions"]
+        return self.can_be_undone(part) & ~self.goes_forward(part) & is_slow
 
 
 def normal_of(outputs: Tensor) -> tuple[Tensor, Tensor]:

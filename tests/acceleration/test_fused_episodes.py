@@ -21,11 +21,13 @@ from drone_rl.config import (
     TaskSettings,
 )
 from drone_rl.envs import (
+    ChromaticityPixels,
     CropRows,
     DroneEnv,
     GrayPixels,
     Resize,
     RgbPixels,
+    Shift,
     StandardizePixels,
 )
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN, make_actor
@@ -51,10 +53,18 @@ def make(
     network=None,
     dynamics=None,
     actions=None,
+    appearance=None,
     **how,
 ):
     made = [transform() for transform in transforms]
-    env = DroneEnv(num_envs, task, dynamics=dynamics, actions=actions, transforms=made)
+    env = DroneEnv(
+        num_envs,
+        task,
+        dynamics=dynamics,
+        actions=actions,
+        appearance=appearance,
+        transforms=made,
+    )
     generator = torch.Generator().manual_seed(0)
     if network is None:
         shape = tuple(env.observation_spec["pixels"].shape[1:])
@@ -295,7 +305,10 @@ def test_observations_are_optional():
             {"transforms": (GrayPixels, lambda: CropRows(2, 22), lambda: CropRows(1, 19))},
             "transform CropRows is not fused",
         ),
-        ({"transforms": (RgbPixels,)}, "frames that are not gray are not fused"),
+        (
+            {"transforms": (GrayPixels, lambda: CropRows(2, 20), lambda: Shift(1, 1))},
+            "transform Shift is not fused",
+        ),
         ({"task": Posts()}, "task Posts with ComputerVision is not fused"),
         ({"network": MLP((1, 25, 64), 3)}, "network MLP is not fused"),
     ],
@@ -303,8 +316,7 @@ def test_observations_are_optional():
 def test_log_states_why_a_collector_is_not_fused(how, reason):
     collector = make(**how) if "network" in how or "task" in how else None
     if collector is None:
-        channels = 3 if how["transforms"] == (RgbPixels,) else 1
-        collector = make(network=SmallCNN((channels, 18 if channels == 1 else 25, 64), 3), **how)
+        collector = make(network=SmallCNN((1, 18, 64), 3), **how)
     assert reason in collector.name and collector.name.startswith("stepping collector: ")
     assert make().name == "fused collector"
 
@@ -345,17 +357,41 @@ def test_shutdown_ends_the_threads():
     assert not any(thread.is_alive() for thread in begun)
 
 
-@pytest.mark.parametrize("visibility", [30.0, (10.0, 30.0)])
-def test_environments_with_fog_fall_back(visibility):
-    look = AppearanceSettings(fog_visibility=visibility)
-    env = DroneEnv(3, SHORT, appearance=look, transforms=[GrayPixels(), StandardizePixels()])
-    network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,))
-    actor = make_actor(network, env.action_spec, torch.Generator().manual_seed(0))
-    collector = EpisodeCollector(env, actor, compiled=True)
-    assert "visual randomization" in collector.name or "effects" in collector.name
-    batch, plain = collector.collect(), make(num_envs=3).collect()
-    assert batch["next", "done"].sum() == 3
-    assert batch["pixels"][0].mean() > plain["pixels"][0].mean()  # fog is bright
+STACK = partial(CatFrames, 2, dim=-3, in_keys=["pixels"])
+RANDOM = AppearanceSettings(
+    sun_elevation=(10.0, 80.0),
+    shadows=0.5,
+    sky_zenith=((0.1, 0.2, 0.4), (0.6, 0.7, 0.9)),
+    fog_visibility=(40.0, 100.0),
+    ground_texture=("none", "checker"),
+    object_texture=("none", "bricks"),
+    distractors=(0, 3),
+    camera_offset=((-0.2, -0.2, -0.2), (0.2, 0.2, 0.2)),
+    camera_turn=((-3.0, -3.0, -3.0), (3.0, 3.0, 3.0)),
+    camera_widening=(-5.0, 5.0),
+    exposure=(0.7, 1.4),
+)
+
+
+@pytest.mark.parametrize("look", [None, AppearanceSettings(fog_visibility=30.0), RANDOM])
+@pytest.mark.parametrize(
+    "transforms",
+    [
+        (GrayPixels,),
+        (GrayPixels, partial(Shift, 4, 6), STACK, StandardizePixels, partial(CropRows, 3, 23)),
+        (RgbPixels, StandardizePixels),
+        (RgbPixels, partial(Shift, 6, 9), ChromaticityPixels, StandardizePixels, STACK),
+    ],
+)
+def test_colors_shifts_and_visual_randomization_are_fused(look, transforms):
+    made = [make(transforms=transforms, appearance=look, compiled=c) for c in (True, False)]
+    assert isinstance(made[0].fused, FusedEpisodes)
+    with set_exploration_type(DETERMINISTIC):
+        for count in (5, 3):
+            one, other = (collector.collect(count) for collector in made)
+            for key in other.keys(True, True):
+                if key != "logits":
+                    assert torch.equal(one[key], other[key]), key
 
 
 def test_kernel_ends_the_episode_of_a_lost_drone():

@@ -18,7 +18,6 @@ from drone_rl.sim.dynamics import (
 from drone_rl.sim.dynamics.moves_kernel import make_fleet
 from drone_rl.sim.dynamics.state import NUMBERS
 from drone_rl.sim.dynamics.velocity_kernel import make_rates
-from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, PoseArrays
 from drone_rl.sim.tasks.objects import ObjectTask, follows_rules
 from drone_rl.sim.tasks.rules_kernel import Episodes, place
 from drone_rl.sim.tasks.task import State, Task
@@ -33,7 +32,7 @@ def fused_rules(task: Task[Any], dynamics: Dynamics, state: State) -> "FusedObje
 
 
 class FusedObjects:
-    """States for the fused kernel: `arrays`, `poses`, `steps` and `end_reasons`."""
+    """States for the fused kernel: `arrays`, `steps` and `end_reasons`."""
 
     def __init__(self, task: ObjectTask, dynamics: Dynamics, state: State) -> None:
         """Allocate the arrays of as many environments as states; see `fused_rules`."""
@@ -71,10 +70,6 @@ class FusedObjects:
             self._centers = solid.centers.clone(memory_format=torch.contiguous_format)
             solid = dataclasses.replace(solid, centers=self._centers)
         self.arrays.fleet = make_fleet(quadrotor, self._numbers, solid)
-        self.poses: Any = PoseArrays()
-        frames = torch.zeros(count, 1 + DRONE_FRAME + len(task.objects), 3)
-        self.poses.positions = wp.from_torch(frames, dtype=wp.vec3)
-        self.poses.attitudes = wp.zeros(count, dtype=wp.vec4, device="cpu")
 
     def paid(self, count: int) -> Tensor:
         """Return the sum of each reward term in the first episodes. Shape: (count, R), float32.
