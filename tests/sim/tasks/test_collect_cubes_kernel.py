@@ -147,4 +147,4 @@ FLIGHT, VELOCITIES = DynamicsSettings(mode="simple_flight"), ActionSettings(kind
 )
 def test_only_unchanged_rules_are_fused(task, dynamics, is_supported):
     worlds = Worlds(1, task(), dynamics=dynamics)
-    assert (fused_rules(worlds.task, dynamics, worlds.state) is not None) == is_supported
+    assert isinstance(fused_rules(worlds.task, dynamics, worlds.state), str) != is_supported
