@@ -55,7 +55,7 @@ class FusedEpisodes:
         """Build the kernel; see `try_create`."""
         self._env, self._actor, self._keeps_inputs = env, actor, keeps_inputs
         self._network, self._rules = network, rules
-        worlds, view = env.worlds, env.observer.view
+        worlds, view = env.worlds, env.observer.image.view
         count = worlds.num_envs
         self._workers = WorkerPool(count, num_threads)
         raytracer: Any = worlds.renderer
@@ -109,7 +109,7 @@ class FusedEpisodes:
             reasons.append(f"task {names} is not fused")
         if reasons or rules is None:
             return Reasons(reasons)
-        first_pixel = _visible_lines(env.observer).start * env.observer.view.width
+        first_pixel = _visible_lines(env.observer).start * env.observer.image.view.width
         network = PackedNetwork(actor.network, first_pixel)
         return cls(env, actor, keeps_inputs, network, rules, num_threads)
 
@@ -149,7 +149,7 @@ class FusedEpisodes:
             terms[PAID][envs.bincount().cumsum(0) - 1] = paid
         logged = self._buffer.read(rows, names)
         if self._keeps_inputs:
-            if self._visible != slice(0, self._env.observer.view.height):
+            if self._visible != slice(0, self._env.observer.image.view.height):
                 logged["pixels"] = logged["pixels"][..., self._visible, :].contiguous()
             self.activations.record(rows, self._network.weights, logged["pixels"])
         return {
@@ -194,7 +194,7 @@ class FusedEpisodes:
 
 def _mean_and_deviation(observer: Observer) -> tuple[float, float]:
     """Return what the kernel subtracts from gray pixels, and then divides them by."""
-    for transform in observer.pipeline.transforms:
+    for transform in observer.image.pipeline.transforms:
         if type(transform) is StandardizePixels:
             return transform.values.mean, transform.values.std
     return 0.0, 1.0
@@ -202,10 +202,10 @@ def _mean_and_deviation(observer: Observer) -> tuple[float, float]:
 
 def _visible_lines(observer: Observer) -> slice:
     """Return the rows of rendered frames that the policy sees."""
-    for transform in observer.pipeline.transforms:
+    for transform in observer.image.pipeline.transforms:
         if type(transform) is CropRows:
             return slice(transform.values.top, transform.values.bottom)
-    return slice(0, observer.view.height)
+    return slice(0, observer.image.view.height)
 
 
 def _not_fused(env: DroneEnv) -> list[str]:
@@ -216,10 +216,12 @@ def _not_fused(env: DroneEnv) -> list[str]:
         reasons.append(f"renderer {type(worlds.renderer).__name__} on {device} is not fused")
     if type(env) is not DroneEnv:
         reasons.append(f"environment {type(env).__name__} is not fused")
-    if env.observer.view.modalities != ("gray",):
+    if not env.observer.sees_pixels:
+        return [*reasons, f"inputs {', '.join(env.observer.sources)} are not fused"]
+    if env.observer.image.view.modalities != ("gray",):
         reasons.append("frames that are not gray are not fused")
     fusable: list[type] = [CropRows, StandardizePixels]
-    for transform in env.observer.pipeline.transforms:
+    for transform in env.observer.image.pipeline.transforms:
         if type(transform) in fusable:
             fusable.remove(type(transform))
         else:
@@ -236,8 +238,10 @@ def _not_fused_policy(env: DroneEnv, actor: Any) -> list[str]:
     network = actor.network
     if reasons := unsupported(network):
         return reasons
+    if not env.observer.sees_pixels:
+        return []  # see `_not_fused`
     rows, num_actions = _visible_lines(env.observer), env.worlds.dynamics.actions.num_outputs
-    shape = (1, rows.stop - rows.start, env.observer.view.width)
+    shape = (1, rows.stop - rows.start, env.observer.image.view.width)
     if (network.in_shape, network.num_actions) != (shape, num_actions):
         return [
             f"a network from {network.in_shape} to {network.num_actions} outputs is not fused "

@@ -24,7 +24,7 @@ from drone_rl.verification.prover.cube_images import camera_ahead
 def small():
     """A policy of 12x5 pixels with random weights and opinions."""
     good = drone_rl.load_policy("good")
-    image = good.description.image.replace(size=(5, 12))
+    image = good.description.inputs["pixels"].replace(size=(5, 12))
     description = good.description.replace(inputs={IMAGE: image}, network=Mlp(hidden=(8,)))
     network = description.build_network(torch.Generator().manual_seed(3))
     weights = {name: 20 * value for name, value in network.state_dict().items()}
