@@ -153,7 +153,7 @@ def shipped(absent: Tensor) -> dict[str, ImageNetwork]:
         is_of_moves = (
             description.actions.settings.kind == "moves"
         )  # else outputs are not three logits
-        if description.input.shape != tuple(absent.shape) or not is_of_moves:
+        if description.shapes["pixels"] != tuple(absent.shape) or not is_of_moves:
             continue
         parameters = exported.weights
         network = SmallCNN(absent.shape, 3, hidden=(128,))

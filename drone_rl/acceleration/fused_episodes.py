@@ -67,7 +67,7 @@ class FusedEpisodes:
         """
         self._env, self._actor, self._keeps_inputs = env, actor, keeps_inputs
         self._network, self._rules = network, rules
-        worlds, view = env.worlds, env.observer.view
+        worlds, view = env.worlds, env.observer.image.view
         count = worlds.num_envs
         self._workers = WorkerPool(count, num_threads)
         transforms = self._transforms = Transforms(env.observer)
@@ -137,7 +137,7 @@ class FusedEpisodes:
             return Reasons([rules, *reasons])
         if reasons:
             return Reasons(reasons)
-        lines, view = Transforms(env.observer).visible, env.observer.view
+        lines, view = Transforms(env.observer).visible, env.observer.image.view
         hidden = view.height - (lines.stop - lines.start)
         network = PackedNetwork(actor.network, lines.start * view.width, hidden * view.width)
         return cls(env, actor, keeps_inputs, network, rules, num_threads, num_steps)
@@ -206,7 +206,7 @@ class FusedEpisodes:
 
     def _seen(self, pixels: Tensor) -> Tensor:
         """Return the rows of frames that the policy sees."""
-        if self._visible == slice(0, self._env.observer.view.height):
+        if self._visible == slice(0, self._env.observer.image.view.height):
             return pixels
         return pixels[..., self._visible, :].contiguous()
 
@@ -216,7 +216,7 @@ class FusedEpisodes:
         worlds = env.worlds
         look = worlds.combine(env.appearances.current(torch.arange(len(started))))
         raytracer: Any = worlds.renderer
-        launch = raytracer.encode(env.observer.view, worlds.poses(started, look), look)
+        launch = raytracer.encode(env.observer.image.view, worlds.poses(started, look), look)
         camera.view, camera.geoms, camera.poses = launch.view, launch.geoms, launch.poses
         camera.materials, camera.has_effects = launch.materials, launch.effects is not None
         if launch.effects is not None:
@@ -290,12 +290,14 @@ class Transforms:
 
     def __init__(self, observer: Observer) -> None:
         """Read the settings of the transforms."""
-        self._view, self._pipeline = observer.view, observer.pipeline
-        self._by_type = {type(transform): transform for transform in observer.pipeline.transforms}
-        is_rgb = observer.view.modalities == ("rgb",)
+        self._view, self._pipeline = observer.image.view, observer.image.pipeline
+        self._by_type = {
+            type(transform): transform for transform in observer.image.pipeline.transforms
+        }
+        is_rgb = observer.image.view.modalities == ("rgb",)
         self.num_channels = 1 + is_rgb + (is_rgb and ChromaticityPixels not in self._by_type)
         """Of a frame."""
-        self.num_frames = observer.pipeline.earlier + 1
+        self.num_frames = observer.image.pipeline.earlier + 1
         """Of an observation."""
         crop: Any = self._by_type.get(CropRows)
         self.visible = slice(0, self._view.height)
@@ -331,11 +333,11 @@ class Transforms:
 
 def unfused_transforms(observer: Observer) -> list[str]:
     """Return reasons against fusing the transforms."""
-    first = next(map(type, observer.transforms), None)
-    if first not in (GrayPixels, RgbPixels) or observer.faults.stages:
+    first = next(map(type, observer.image.transforms), None)
+    if first not in (GrayPixels, RgbPixels) or observer.image.faults.stages:
         return ["frames that are neither gray nor rgb are not fused"]
     reasons, before = list[str](), set[type]()
-    for transform in observer.pipeline.transforms:
+    for transform in observer.image.pipeline.transforms:
         kind: Any = type(transform)
         is_known = kind in _AFTER and not before & {kind, *_AFTER[kind]}
         if kind is CatFrames:
@@ -354,6 +356,8 @@ def _not_fused(env: DroneEnv) -> list[str]:
         reasons.append(f"renderer {type(worlds.renderer).__name__} on {device} is not fused")
     if type(env) is not DroneEnv:
         reasons.append(f"environment {type(env).__name__} is not fused")
+    if not env.observer.sees_pixels:
+        return [*reasons, f"inputs {', '.join(env.observer.sources)} are not fused"]
     return [*reasons, *unfused_transforms(env.observer)]
 
 
@@ -364,9 +368,11 @@ def _not_fused_policy(env: DroneEnv, actor: Any) -> list[str]:
     network = actor.network
     if reasons := unsupported(network):
         return reasons
+    if not env.observer.sees_pixels:
+        return []  # see `_not_fused`
     transforms, num_actions = Transforms(env.observer), env.worlds.dynamics.actions.num_outputs
     rows, channels = transforms.visible, transforms.num_frames * transforms.num_channels
-    shape = (channels, rows.stop - rows.start, env.observer.view.width)
+    shape = (channels, rows.stop - rows.start, env.observer.image.view.width)
     if (network.in_shape, network.num_actions) != (shape, num_actions):
         return [
             f"a network from {network.in_shape} to {network.num_actions} outputs is not fused "

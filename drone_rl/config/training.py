@@ -15,6 +15,7 @@ from drone_rl.config import (
     TaskSettings,
 )
 from drone_rl.config.appearance import check_appearance
+from drone_rl.config.inputs import DEFAULT_INPUTS, Inputs
 from drone_rl.config.learning import (
     Adam,
     Collector,
@@ -107,6 +108,8 @@ class TrainSettings(Settings):
         DEFAULT_TRANSFORMS
     )
     """Transforms of the image, in this order."""
+    inputs: Inputs = DEFAULT_INPUTS
+    """Inputs of the policy by name; `pixels` is the image that camera and transforms describe."""
     network: Network = SmallCnn()
     """Network of the policy."""
     returns: Returns = LeaveOneOut()

@@ -182,6 +182,13 @@ class Noise(Fault, target="noise"):
     """Time after which the correlation of a pixel's noise has fallen to 1/e; white noise at 0."""
 
 
+class Bias(Fault, target="bias"):
+    """Constant error of each episode, clipped at black and white."""
+
+    most: Fraction = 0.02
+    """Bound of the error; black is 0 and white is 1. It is uniformly distributed."""
+
+
 class DeadRows(Fault, target="dead_rows"):
     """Dead rows of the sensor."""
 

@@ -12,6 +12,7 @@ from drone_rl.config import transforms as settings
 from drone_rl.config.registry import implements
 from drone_rl.envs.fault_models import (
     FaultModel,
+    bias,
     blur,
     dead_rows,
     frozen_frames,
@@ -92,6 +93,13 @@ class Noise(_BuiltInFault):
     """Add noise to each pixel; see `drone_rl.config.transforms.Noise`."""
 
     make_model = staticmethod(noise)
+
+
+@implements(settings.Bias)
+class Bias(_BuiltInFault):
+    """Add a constant to all pixels of an episode; see `drone_rl.config.transforms.Bias`."""
+
+    make_model = staticmethod(bias)
 
 
 @implements(settings.DeadRows)

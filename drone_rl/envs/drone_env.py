@@ -19,6 +19,7 @@ from drone_rl.config import (
     CameraSettings,
     DynamicsSettings,
 )
+from drone_rl.config.inputs import ImageInput, VectorInput
 from drone_rl.envs.observer import Observer, Starts
 from drone_rl.envs.transforms import is_of_pixels
 from drone_rl.sim.actions import Entry
@@ -39,9 +40,9 @@ Entries = dict[NestedKey, Tensor]
 class DroneEnv(EnvBase):
     """`num_envs` independent drones, stepped and rendered as one batch.
 
-    Observation "pixels": what its `observer` makes of the camera's images; without transforms
-    uint8, shape (num_envs, height, width, 3). The action space is that of the dynamics. The nested
-    "info" is the ground truth, see `Worlds.entries`.
+    Observations: the inputs by name, as its `observer` makes them; by default "pixels", without
+    transforms uint8, shape (num_envs, height, width, 3). The action space is that of the dynamics.
+    The nested "info" is the ground truth, see `Worlds.entries`.
 
     Partial resets and steps (TorchRL's masks "_reset" and "_step") leave the other environments
     alone and repeat their last images. Environment i samples its episodes from its own random
@@ -55,6 +56,7 @@ class DroneEnv(EnvBase):
         camera: CameraSettings | None = None,
         *,
         transforms: Iterable[Transform] = (),
+        inputs: Mapping[str, ImageInput | VectorInput] | None = None,
         seed: int = 0,
         stream: Stream = Stream.WORLDS,
         first_world: int = 0,
@@ -73,6 +75,7 @@ class DroneEnv(EnvBase):
             task: A task, its settings or its name; cube collection by default.
             camera: The policy's camera.
             transforms: From the camera's images to "pixels", in order.
+            inputs: The inputs by name, instead of "pixels".
             seed: Root of the environments' random streams.
             stream: Purpose of the environments; training and evaluation use different streams.
             first_world: Number of the first environment, so that workers use different streams.
@@ -118,17 +121,21 @@ class DroneEnv(EnvBase):
         self.pixels = pixels
         self.observer = Observer(
             self.worlds,
-            transforms,
+            transforms if inputs is None else inputs,
             appearance=self.appearances.current,
             streams=lambda rows, key: self.side_streams(rows, *key),
         )
-        """Makes "pixels"."""
+        """Makes the inputs of policies."""
         if pixels:
-            self.worlds.prepare(self.observer.view)
+            for image in self.observer.images.values():
+                self.worlds.prepare(image.view)
         self.stream = stream
         self.first_world = first_world
         self._make_specs()
-        self._pixels = self.observation_spec["pixels"].zero() if pixels else torch.empty(0)
+        self._seen: dict[str, Tensor] = {}
+        if pixels:
+            names = self.observer.sources
+            self._seen = {name: self.observation_spec[name].zero() for name in names}
         self.set_seed(seed)
         self.is_closed = False  # TorchRL's default is True
 
@@ -159,7 +166,7 @@ class DroneEnv(EnvBase):
     def running_state(self) -> dict[str, Any]:
         """Return the full state, which suffices to resume within episodes."""
         appearances = {"looks": self.appearances.values} if self.appearances.varies else {}
-        memory = {"observer": self.observer.pipeline.state_dict()}
+        memory = {"observer": self.observer.state_dict()}
         return {**self.state_dict(), "worlds": self.worlds.state.tensors(), **appearances, **memory}
 
     def load_running_state(self, state: Mapping[str, Any]) -> None:
@@ -168,7 +175,7 @@ class DroneEnv(EnvBase):
         self.worlds.state = self.worlds.state.with_tensors(state["worlds"])
         if self.appearances.varies:
             self.appearances.load(state["looks"])
-        self.observer.pipeline.load_state_dict(state["observer"])
+        self.observer.load_state_dict(state["observer"])
         self.observe(self._indices(None), None)
 
     def side_streams(self, env_ids: Tensor, *key: int) -> list[np.random.Generator]:
@@ -208,19 +215,23 @@ class DroneEnv(EnvBase):
         n = self.batch_size[0]
         entries = {name: _spec(entry, n) for name, entry in self.worlds.entries.items()}
         info = Composite(entries, shape=(n,))
-        observed = {"pixels": self._pixel_spec(), "info": info} if self.pixels else {"info": info}
+        inputs = self._input_specs() if self.pixels else {}
+        observed = {**inputs, "info": info}
         self.observation_spec = Composite(observed, shape=(n,)).to(self.device)
         self.action_spec = make_action_spec(self.worlds.dynamics.actions.entry, n).to(self.device)
         self.reward_spec = Unbounded(torch.Size((n, 1))).to(self.device)
         done = {name: Binary(1, torch.Size((n, 1)), dtype=torch.bool) for name in _DONE_KEYS}
         self.full_done_spec = Composite(done, shape=(n,)).to(self.device)
 
-    def _pixel_spec(self) -> TensorSpec:
-        example = self.observer.example()
-        shape = torch.Size((self.batch_size[0], *example.shape[1:]))
-        if example.dtype == torch.uint8:
-            return Bounded(0, 255, shape, dtype=torch.uint8, device=self.device)
-        return Unbounded(shape, dtype=example.dtype, device=self.device)
+    def _input_specs(self) -> dict[str, TensorSpec]:
+        specs: dict[str, TensorSpec] = {}
+        for name, example in self.observer.examples().items():
+            shape = torch.Size((self.batch_size[0], *example.shape[1:]))
+            if example.dtype == torch.uint8:
+                specs[name] = Bounded(0, 255, shape, dtype=torch.uint8, device=self.device)
+            else:
+                specs[name] = Unbounded(shape, dtype=example.dtype, device=self.device)
+        return specs
 
     def _set_seed(self, seed: int | None) -> None:
         if seed is None:
@@ -292,23 +303,24 @@ class DroneEnv(EnvBase):
                 "env.action_spec"
             )
 
-    def observe(self, env_ids: Tensor, starts: Starts) -> Tensor:
+    def observe(self, env_ids: Tensor, starts: Starts) -> dict[str, Tensor]:
         """Observe environments, (k,), once after each step and reset; see `Observer.observe`.
 
-        Returns the pixels of all; those of the others are as they were.
+        Returns the inputs of all; those of the others are as they were.
         """
         if self.pixels and len(env_ids):
-            is_whole = len(env_ids) == len(self._pixels)
+            is_whole = len(env_ids) == self.worlds.num_envs
             state = self.worlds.state if is_whole else self.worlds.state[env_ids]
             look = self.appearances.current(env_ids)
-            pixels = self.observer.observe(state, env_ids, starts, look)["pixels"]
-            self._pixels = pixels if is_whole else self._pixels.index_copy(0, env_ids, pixels)
-        return self._pixels
+            for name, values in self.observer.observe(state, env_ids, starts, look).items():
+                before = self._seen[name]
+                self._seen[name] = values if is_whole else before.index_copy(0, env_ids, values)
+        return self._seen
 
-    def _entries(self, entries: dict[str, Tensor]) -> TensorDict:
-        pixels = {"pixels": self._pixels} if self.pixels else {}
+    def _entries(self, entries: dict[str, Any]) -> TensorDict:
         info = TensorDict(self.worlds.info(), self.batch_size, device=self.device)
-        return TensorDict({**pixels, "info": info, **entries}, self.batch_size, device=self.device)
+        entries = {**self._seen, "info": info, **entries}
+        return TensorDict(entries, self.batch_size, device=self.device)
 
     def _indices(self, mask: Tensor | None) -> Tensor:
         if mask is None:

@@ -49,6 +49,14 @@ def noise(strength: float, correlation_time: float = 0.0) -> FaultModel:
     return FaultModel(show, begin, update)
 
 
+def bias(most: float) -> FaultModel:
+    """Add a constant of each episode, uniform within `most`, clipped at black and white."""
+    return FaultModel(
+        lambda images, memory, _: (images + memory).clamp(0.0, 1.0),
+        lambda images, sample: most * (2 * sample(1, 1, 1) - 1),
+    )
+
+
 def dead_rows(count: int, rows: Sequence[int] = (), level: float | None = None) -> FaultModel:
     """Blank `count` random rows per episode and always `rows`; `level` overrides the blank.
 

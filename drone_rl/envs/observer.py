@@ -1,5 +1,7 @@
-"""What policies see of environments: images, transforms, camera faults and stacks of frames."""
+"""What policies see of environments: images and vectors, transforms, faults, stacks of frames."""
 
+import dataclasses
+import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
@@ -8,10 +10,13 @@ import torch
 from torch import Tensor
 from torchrl.envs import CatFrames, Transform
 
+from drone_rl.config.inputs import CAMERAS, PIXELS, ImageInput, VectorInput
 from drone_rl.envs.camera_faults import CameraFault
 from drone_rl.envs.fault_models import FaultModel, Sample, stacked_frames
 from drone_rl.envs.transforms import GrayPixels, RgbPixels, is_of_pixels, without_identities
+from drone_rl.envs.vectors import error_models, measure
 from drone_rl.sim.rendering import Appearance
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import State
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
@@ -132,8 +137,12 @@ class Pipeline:
         num_envs: int = 0,
         *,
         stages: Iterable[Stage] = (),
+        key: tuple[int, ...] = (),
     ) -> None:
-        """Take transforms, of which those of images are applied, after `stages`."""
+        """Take transforms, of which those of images are applied, after `stages`.
+
+        `key` begins the keys of all random streams.
+        """
         self.transforms = tuple(t for t in transforms if is_of_pixels(t))
         self._steps: list[Transform | Stage] = [*stages]
         for i, transform in enumerate(self.transforms):
@@ -146,8 +155,8 @@ class Pipeline:
                 self._steps.append(transform)
             elif streams is not None:
                 number = sum(type(one) is type(transform) for one in self.transforms[:i])
-                key = (transform.key, number)
-                self._steps.append(Stage(transform.model, EpisodeStreams(streams, key, num_envs)))
+                of = (*key, transform.key, number)
+                self._steps.append(Stage(transform.model, EpisodeStreams(streams, of, num_envs)))
 
     @property
     def stages(self) -> list[Stage]:
@@ -213,54 +222,197 @@ class Pipeline:
                 stream.bit_generator.state = where
 
 
-class Observer:
-    """Renders the inputs of policies in states of environments, with the memory of their episodes.
+Seen = Sequence[Transform] | ImageInput | VectorInput
+"""An input: a description, or the transforms from the policy's camera, RGB bytes, to "pixels"."""
+_CLASS_CHANNELS = {
+    SemanticClass.TARGET: 0,
+    SemanticClass.OBSTACLE: 1,
+    SemanticClass.GROUND: 2,
+    SemanticClass.DRONE: 3,
+    SemanticClass.DISTRACTOR: 3,
+    SemanticClass.SKY: 4,
+}
+"""See `drone_rl.config.inputs.CLASSES`."""
+
+
+def key_of(name: str) -> tuple[int, ...]:
+    """Return the key of the random streams of an input."""
+    return () if name == PIXELS else (zlib.crc32(name.encode()),)
+
+
+class ImageSource:
+    """Renders an input of policies, an image, with the memory of its episodes.
 
     If the first transform is `GrayPixels`, gray images are rendered.
     """
 
     def __init__(
         self,
+        name: str,
         worlds: Worlds,
-        transforms: Iterable[Transform] = (),
+        seen: Sequence[Transform] | ImageInput,
+        streams: Streams | None,
+    ) -> None:
+        """Take the input's name, its worlds, what it is, and the random streams of its faults."""
+        self.worlds, self.seen, self.faults = worlds, seen, Pipeline()
+        self._modality, self._maximum = "rgb", 1.0
+        self._to_rgb = RgbPixels()
+        transforms, view = seen, worlds.policy_view
+        if isinstance(seen, ImageInput):
+            camera, (height, width) = seen.settings, seen.size
+            self._modality, self._maximum = seen.modality, seen.maximum or 1.0
+            transforms = [transform.make() for transform in seen.transforms]
+            view = worlds.view(CAMERAS[seen.camera.name], seen.modality, height, width)
+            view = dataclasses.replace(view, horizontal_fov=camera.horizontal_fov)
+        assert not isinstance(transforms, ImageInput)
+        self.transforms: tuple[Transform, ...] = tuple(t for t in transforms if is_of_pixels(t))
+        first, rest, self.view = next(iter(self.transforms), None), self.transforms, view
+        self._has_bytes = self._modality == "rgb" and type(first) not in (GrayPixels, RgbPixels)
+        if self._modality == "rgb" and type(first) is GrayPixels:
+            self.view = dataclasses.replace(view, modalities=("gray",))
+            frame = torch.zeros(1, view.height, view.width, 3, dtype=torch.uint8)
+            rest = without_identities(self.transforms, frame)[1:]
+        elif self._modality == "rgb" and type(first) is RgbPixels:
+            rest = self.transforms[1:]
+        self.pipeline = Pipeline(rest, streams, worlds.num_envs, key=key_of(name))
+        """Transforms after gray or rgb, if those are the first."""
+        self.last = torch.empty(0)
+        """The last images that entered the pipeline."""
+
+    def observe(
+        self, state: State, rows: Tensor, starts: Starts, appearance: Appearance | None
+    ) -> Tensor:
+        """See `Observer.observe`. Shape: (k, *)."""
+        images = self.worlds.render(state, self.view, appearance)
+        if self._modality == "rgb":
+            if self.view.modalities == ("gray",):
+                images = images[:, None]
+            elif self.faults.stages or not self._has_bytes:
+                images = self._to_rgb._apply_transform(images)
+        else:
+            images = self._measured(images)
+        images = self.faults(images, rows, starts)
+        if self.faults.stages and self._has_bytes:
+            images = (images * 255).round().to(torch.uint8).movedim(-3, -1)
+        self.last = images
+        return self.pipeline(images, rows, starts)
+
+    def _measured(self, images: Tensor) -> Tensor:
+        """Return rendered images of other modalities than colors as floats. Shape: (k, C, H, W)."""
+        if self._modality == "depth":  # 0 where nothing is hit
+            far = torch.where(images == 0, self._maximum, images)
+            return (far / self._maximum).clamp(max=1.0)[:, None]
+        if self._modality == "normals":
+            return ((images + 1.0) / 2.0).movedim(-1, -3).contiguous()
+        kinds = [*self.worlds.scene.semantic_classes, SemanticClass.SKY]
+        channels = torch.tensor([_CLASS_CHANNELS[kind] for kind in kinds], device=images.device)
+        of = channels[images.long()]  # -1, the sky, is the last one
+        return torch.stack([of == i for i in range(5)], 1).float()
+
+    def example(self) -> Tensor:
+        """Return the input of one environment for images of zeros."""
+        height, width, seen = self.view.height, self.view.width, self.seen
+        images = torch.zeros(1, height, width, 3, dtype=torch.uint8)
+        if isinstance(seen, ImageInput) and seen.modality != "rgb":
+            images = torch.zeros(1, *seen.frame.shape)
+        return Pipeline(self.transforms)(images.to(self.worlds.device))
+
+
+class VectorSource:
+    """Measures an input of policies, a vector, with the memory of its episodes."""
+
+    def __init__(
+        self, name: str, worlds: Worlds, seen: VectorInput, streams: Streams | None
+    ) -> None:
+        """See `ImageSource`.
+
+        Raises:
+            InputError: The drones or the task have no such quantity.
+        """
+        self.worlds, self.seen, self.faults = worlds, seen, Pipeline()
+        measure(seen.quantity, worlds, worlds.state[:1])  # refuses what the worlds lack
+        stages = []
+        for kind, model in error_models(seen, worlds).items():
+            key = (*key_of(name), zlib.crc32(kind.encode()))
+            if streams is not None or kind == "imu":
+                source = EpisodeStreams(streams, key, worlds.num_envs) if streams else None
+                stages.append(Stage(model, source))
+        self.pipeline = Pipeline(stages=stages)
+        self.last = torch.empty(0)
+        """The last values that entered the pipeline. Shape: (k, n, 1, 1)."""
+
+    def observe(
+        self, state: State, rows: Tensor, starts: Starts, appearance: Appearance | None
+    ) -> Tensor:
+        """See `Observer.observe`. Shape: (k, n)."""
+        del appearance
+        values = measure(self.seen.quantity, self.worlds, state)[..., None, None]
+        self.last = self.faults(values, rows, starts)
+        return self.pipeline(self.last, rows, starts)[..., 0, 0] / self.seen.scale
+
+    def example(self) -> Tensor:
+        """Return zeros. Shape: (1, n)."""
+        return torch.zeros(1, self.seen.size, device=self.worlds.device)
+
+
+class Observer:
+    """Makes the inputs of policies in states of environments, with the memory of their episodes."""
+
+    def __init__(
+        self,
+        worlds: Worlds,
+        inputs: Iterable[Transform] | Mapping[str, Seen] = (),
         *,
         appearance: Callable[[Tensor], Appearance | None] = lambda rows: None,
         streams: Streams | None = None,
-        faults: Pipeline | None = None,
+        faults: Mapping[str, Pipeline] | None = None,
         earlier: "Observer | None" = None,
     ) -> None:
         """Observe worlds.
 
         Args:
             worlds: The environments.
-            transforms: From the camera's image, RGB bytes, to the network's input; others that do
-                not change "pixels" are ignored.
+            inputs: The inputs by name. Transforms alone are those of "pixels"; others that do not
+                change images are ignored.
             appearance: Returns the appearance of environments, (k,).
-            streams: Random streams of camera faults among the transforms; without, they have no
-                effect.
-            faults: Further camera faults, which act before all transforms but gray or rgb.
+            streams: Random streams of faults among the inputs; without, they have no effect.
+            faults: Further faults of inputs by name, which act before all transforms but gray or
+                rgb.
             earlier: Observer of the same environments whose memory goes on.
+
+        Raises:
+            InputError: The worlds lack what an input measures.
         """
         self.worlds, self.appearance = worlds, appearance
-        self.faults = faults or Pipeline()
-        self._to_rgb = RgbPixels()
-        self.transforms = tuple(t for t in transforms if is_of_pixels(t))
-        first = next(iter(self.transforms), None)
-        self._has_bytes = type(first) not in (GrayPixels, RgbPixels)
-        self.view = worlds.policy_view
-        camera, rest = worlds.camera, self.transforms
-        if type(first) is GrayPixels:
-            self.view = worlds.view(modality="gray")
-            frame = torch.zeros(1, camera.height, camera.width, 3, dtype=torch.uint8)
-            rest = without_identities(self.transforms, frame)[1:]
-        elif type(first) is RgbPixels:
-            rest = self.transforms[1:]
-        self.pipeline = (
-            Pipeline(rest, streams, worlds.num_envs) if earlier is None else earlier.pipeline
-        )
-        """Transforms after gray or rgb, if those are the first."""
-        self.images = torch.empty(0)
-        """The last images that entered the pipeline."""
+        self.inputs: Mapping[str, Seen]
+        named: Any = inputs if isinstance(inputs, Mapping) else {PIXELS: tuple(inputs)}
+        self.inputs = named
+        """The inputs by name, for observers of other worlds."""
+        self.sources: dict[str, ImageSource | VectorSource] = {}
+        for name, seen in self.inputs.items():
+            make = VectorSource if isinstance(seen, VectorInput) else ImageSource
+            source: Any = make(name, worlds, seen, streams)  # pyright: ignore[reportArgumentType]
+            source.faults = (faults or {}).get(name, source.faults)
+            if earlier is not None:
+                source.pipeline = earlier.sources[name].pipeline
+            self.sources[name] = source
+
+    @property
+    def sees_pixels(self) -> bool:
+        """Whether the only input is the image of the policy's camera."""
+        return [*self.inputs] == [PIXELS] and isinstance(self.inputs[PIXELS], tuple)
+
+    @property
+    def images(self) -> dict[str, ImageSource]:
+        """Those of the inputs that are images, by name."""
+        return {n: s for n, s in self.sources.items() if isinstance(s, ImageSource)}
+
+    @property
+    def image(self) -> ImageSource:
+        """The first image among the inputs; an `InputError` if there is none."""
+        for source in self.images.values():
+            return source
+        raise InputError(f"the policy sees no image, only {', '.join(self.sources)}")
 
     def observe(
         self,
@@ -269,7 +421,7 @@ class Observer:
         starts: Starts,
         appearance: Appearance | None,
     ) -> dict[str, Tensor]:
-        """Return the inputs of policies by name: "pixels", of shape (k, *).
+        """Return the inputs of policies by name, of shapes (k, *).
 
         Args:
             state: States of environments.
@@ -277,19 +429,20 @@ class Observer:
             starts: Where episodes start; see `Starts`.
             appearance: Their appearance.
         """
-        images = self.worlds.render(state, self.view, appearance)
-        if self.view.modalities == ("gray",):
-            images = images[:, None]
-        elif self.faults.stages or not self._has_bytes:
-            images = self._to_rgb._apply_transform(images)
-        images = self.faults(images, rows, starts)
-        if self.faults.stages and self._has_bytes:
-            images = (images * 255).round().to(torch.uint8).movedim(-3, -1)
-        self.images = images
-        return {"pixels": self.pipeline(images, rows, starts)}
+        return {
+            name: source.observe(state, rows, starts, appearance)
+            for name, source in self.sources.items()
+        }
 
-    def example(self) -> Tensor:
-        """Return an input of one environment for images of zeros, to know its shape and type."""
-        camera = self.worlds.camera
-        images = torch.zeros(1, camera.height, camera.width, 3, dtype=torch.uint8)
-        return Pipeline(self.transforms)(images.to(self.worlds.device))
+    def examples(self) -> dict[str, Tensor]:
+        """Return inputs of one environment without content, to know their shapes and types."""
+        return {name: source.example() for name, source in self.sources.items()}
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return memory and random streams of each input."""
+        return {name: source.pipeline.state_dict() for name, source in self.sources.items()}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Resume from a `state_dict` of as many environments."""
+        for name, source in self.sources.items():
+            source.pipeline.load_state_dict(state[name])

@@ -190,8 +190,8 @@ def steps(
 class ActorAgent:
     """A TorchRL actor, which reads entries of a `DroneEnv` and writes "action".
 
-    The entries are "pixels", "done", ("info", NAME), and for recurrent actors "is_init" and their
-    state, which is that of `network.start` when an episode starts.
+    The entries are inputs such as "pixels", "done", ("info", NAME), and for recurrent actors
+    "is_init" and their state, which is that of `network.start` when an episode starts.
     """
 
     def __init__(self, actor: TensorDictModuleBase) -> None:
@@ -255,7 +255,7 @@ class DelayedAgent:
 
 
 class Recording:
-    """An agent whose acts have "pixels" and ground truth among their entries, too."""
+    """An agent whose acts have the inputs and ground truth among their entries, too."""
 
     def __init__(self, agent: Agent, info: Iterable[str] = (), *, states: bool = False) -> None:
         """Take the agent and the names of the ground truth; see `Worlds.entries`.
@@ -268,7 +268,7 @@ class Recording:
     def act(self, context: StepContext) -> Act:
         """See `Agent`."""
         act = self._agent.act(context)
-        entries = {**act.entries, "pixels": context.observe()}
+        entries = {**act.entries, **context.inputs}
         entries |= {("info", name): context.info[name] for name in self._info}
         if self._states:
             state = TensorDict(context.state.tensors(), [len(context.rows)]).flatten_keys("/")

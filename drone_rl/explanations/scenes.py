@@ -51,7 +51,8 @@ class Scenes:
 
     def __init__(self, env: EnvBase) -> None:
         base = base_env(env)
-        self.worlds, self._transforms = base.worlds, base.observer.transforms
+        self.worlds, self._inputs = base.worlds, base.observer.inputs
+        self._transforms = base.observer.image.transforms
         self.task = self.worlds.task
         self.actions = self.worlds.dynamics.actions
         kinds = {type(transform) for transform in self._transforms}
@@ -101,7 +102,7 @@ class Scenes:
 
     def observer(self, appearance: Appearance | None = None) -> Observer:
         """Return what observes rollouts in one appearance, without camera faults."""
-        return Observer(self.worlds, self._transforms, appearance=lambda rows: appearance)
+        return Observer(self.worlds, self._inputs, appearance=lambda rows: appearance)
 
     def to_frame(self, maps: Tensor) -> Tensor:
         """Transform heat maps back to the coordinates of the camera's frame.

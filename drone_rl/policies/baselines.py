@@ -43,7 +43,7 @@ class OracleAgent:
         """Return the index of the nearest visible cube, or the number of cubes. Shape: (n, 1)."""
         props = torch.tensor([*context.worlds.scene.props, -1], device=next_cube.device)
         numbers = props[context.render("segmentation").long()].float()[:, None]
-        faults, starts = context.observer.faults, context.starts
+        faults, starts = context.observer.image.faults, context.starts
         numbers = faults(numbers, context.rows, starts, _NOTHING).flatten(1)
         count = context.worlds.task.places(context.state).shape[1]  # distractors come after
         is_cube = (numbers >= next_cube) & (numbers < count)

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from drone_rl.config import ActionSettings
+from drone_rl.config.inputs import PIXELS
 from drone_rl.config.task import DEFAULT_TASK
 from drone_rl.policies.zoo.description import (
     FORMAT_VERSION,
-    IMAGE,
     ActionSpace,
     PolicyDescription,
 )
@@ -181,6 +181,7 @@ def _converted_description(former: Mapping[str, Any]) -> PolicyDescription:
     try:
         task, camera = _with_reward_terms(former["task"]), former["camera"]
         image = {
+            "kind": "image",
             "camera": {"horizontal_fov": camera["horizontal_fov"]},
             "size": [camera["height"], camera["width"]],
             "transforms": former["transforms"],
@@ -192,7 +193,7 @@ def _converted_description(former: Mapping[str, Any]) -> PolicyDescription:
                 "rewards": task.pop("reward", {}),
                 "parameters": task,
             },
-            "inputs": {IMAGE: image},
+            "inputs": {PIXELS: image},
             "actions": ActionSpace.of(ActionSettings.read(former.get("actions", {}), "actions")),
             "network": former["network"],
             **optional,

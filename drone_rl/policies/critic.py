@@ -11,10 +11,17 @@ from tensordict.nn import (
 from torch import nn
 
 from drone_rl.policies.actor import KeepsModes, distribution_of
-from drone_rl.policies.networks import ImageNetwork, PolicyNetwork, Trunk, orthogonal
+from drone_rl.policies.networks import (
+    ImageNetwork,
+    InputsNetwork,
+    InputsTrunk,
+    PolicyNetwork,
+    Trunk,
+    orthogonal,
+)
 from drone_rl.utils.errors import InputError
 
-PIXELS, FEATURES = "pixels", "features"
+FEATURES = "features"
 LOG_PROB = "action_log_prob"
 VALUE = "state_value"
 
@@ -44,15 +51,21 @@ class ActorCritic(nn.Module):
             generator: Source of that layer's initial weights.
         """
         super().__init__()
-        if not isinstance(network, PolicyNetwork) or not network.is_sequential:
+        if isinstance(network, InputsNetwork):
+            trunk: nn.Module = InputsTrunk(network)
+        elif isinstance(network, PolicyNetwork) and network.is_sequential:
+            trunk = Trunk(network)
+        else:
             raise InputError(
                 f"a critic needs a policy of layers, which {type(network).__name__} is not; give "
                 "objective=reinforce, or derive it from drone_rl.policies.PolicyNetwork and "
                 "keep its forward"
             )
         *_, last = network.layers
-        self.trunk = TensorDictModule(Trunk(network), in_keys=[PIXELS], out_keys=[FEATURES])
-        """"pixels" to "features"."""
+        self.inputs = network.in_keys
+        """Names of the inputs."""
+        self.trunk = TensorDictModule(trunk, in_keys=[*self.inputs], out_keys=[FEATURES])
+        """Inputs to "features"."""
         head = ProbabilisticTensorDictModule(
             in_keys=["logits"],
             out_keys=["action"],
@@ -65,10 +78,10 @@ class ActorCritic(nn.Module):
         """"features" to "logits" and the distribution of "action"."""
         self.critic = TensorDictModule(
             own or _one_number(last, generator),
-            in_keys=[FEATURES if own is None else PIXELS],
+            in_keys=[FEATURES] if own is None else [*own.in_keys],
             out_keys=[VALUE],
         )
-        """"features" or "pixels" to "state_value"."""
+        """"features" or inputs to "state_value"."""
 
 
 def _one_number(logits: nn.Module, generator: torch.Generator | None) -> nn.Linear:

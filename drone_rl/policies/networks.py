@@ -7,7 +7,7 @@ Layers are named, and explanations address them by name. The registered networks
 
 import itertools
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import torch
 from tensordict.utils import NestedKey
@@ -134,6 +134,116 @@ class PolicyNetwork(ImageNetwork):
         return logits.reshape(*pixels.shape[:-3], logits.shape[-1])
 
 
+class InputsNetwork(ImageNetwork):
+    """A network of several inputs, joined: layers for each image, one for all vectors, and a trunk.
+
+    Initial weights are orthogonal, the logits near zero.
+    """
+
+    def __init__(
+        self,
+        in_shapes: Mapping[str, Sequence[int]],
+        images: Mapping[str, PolicyNetwork],
+        num_actions: int,
+        *,
+        hidden: Sequence[int],
+        generator: torch.Generator | None = None,
+    ) -> None:
+        """Take the shapes of inputs, and networks of the images, whose layers up to Flatten remain.
+
+        Args:
+            in_shapes: Of each input by name: (C, H, W) of an image, (n,) of a vector.
+            images: A network of each image, by its name.
+            num_actions: Number of logits.
+            hidden: Widths of the trunk's layers before the logits.
+            generator: Source of the initial weights.
+        """
+        super().__init__()
+        self.in_shapes = {name: tuple(shape) for name, shape in in_shapes.items()}
+        self.in_keys = tuple(self.in_shapes)
+        self.in_shape = self.in_shapes[next(iter(images), self.in_keys[0])]
+        self.branches = nn.ModuleDict()
+        vectors = sum(shape[0] for shape in self.in_shapes.values() if len(shape) == 1)
+        width = VECTOR_FEATURES if vectors else 0
+        for name, network in images.items():
+            kinds = [*map(type, network.layers)]
+            end = kinds.index(nn.Flatten) + 1
+            self.branches[name] = network.layers[:end]
+            width += network.layers[:end](torch.zeros(1, *network.in_shape)).shape[1]
+        initialise = orthogonal(generator)
+        if vectors:
+            self.branches["vectors"] = nn.Sequential(nn.Linear(vectors, VECTOR_FEATURES), nn.ReLU())
+            initialise(self.branches["vectors"][0], False)  # pyright: ignore[reportIndexIssue]
+        self.layers = nn.Sequential(_linear(width, hidden, num_actions))
+        for layer in self.layers:
+            if isinstance(layer, nn.Linear):
+                initialise(layer, layer is self.layers[-1])
+
+    @property
+    def num_actions(self) -> int:
+        """Number of outputs, see `Actions.num_outputs`."""
+        return len(self.layers.get_parameter("logits.weight"))
+
+    @torch.no_grad()
+    def rescale(self, factor: Tensor, shift: Tensor) -> None:
+        """See `ImageNetwork`; the last layer changes."""
+        weight, bias = (self.layers.get_parameter(f"logits.{n}") for n in ("weight", "bias"))
+        weight.mul_(factor[:, None])
+        bias.mul_(factor).add_(shift)
+
+    def features(self, *inputs: Tensor) -> Tensor:
+        """Return the joined outputs of all branches. Shapes: (N, *) to (N, F)."""
+        seen, vectors = [], []
+        for (name, shape), values in zip(self.in_shapes.items(), inputs, strict=True):
+            if tuple(values.shape[1:]) != shape:
+                raise InputError(
+                    f"the policy was built for {name} of shape {shape}, not "
+                    f"{tuple(values.shape[1:])}; give the inputs that it was trained with"
+                )
+            if len(shape) == 1:
+                vectors.append(values)
+            else:
+                seen.append(self.branches[name](values))
+        if vectors:
+            seen.append(self.branches["vectors"](torch.cat(vectors, -1)))
+        return torch.cat(seen, -1)
+
+    def forward(self, *inputs: Tensor) -> Tensor:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Inputs in the order of `in_keys`, each (*, its shape), to logits (*, num_actions).
+
+        Raises:
+            InputError: An input has another shape or, without gradients, an output is not finite.
+        """
+        shapes = self.in_shapes.values()
+        if len(inputs) != len(shapes):
+            raise InputError(
+                f"the policy reads {', '.join(self.in_keys)}, and got {len(inputs)} of them"
+            )
+        batch = inputs[0].shape[: inputs[0].ndim - len(self.in_shapes[self.in_keys[0]])]
+        flat = [v.reshape(-1, *v.shape[len(batch) :]) for v in inputs]
+        logits = self.layers(self.features(*flat))
+        if not (torch.is_grad_enabled() or torch.compiler.is_compiling()):
+            require_finite(logits, self.owner)
+        return logits.reshape(*batch, logits.shape[-1])
+
+
+VECTOR_FEATURES = 64
+"""Width of the layer that takes all vectors."""
+
+
+class InputsTrunk(nn.Module):
+    """An `InputsNetwork` without its last layer: inputs (N, *) to features (N, F)."""
+
+    def __init__(self, network: InputsNetwork) -> None:
+        super().__init__()
+        self._features, self.branches = network.features, network.branches
+        self.layers = network.layers[:-1]
+
+    def forward(self, *inputs: Tensor) -> Tensor:
+        """Return the features."""
+        return self.layers(self._features(*inputs))
+
+
 class Trunk(nn.Module):
     """A policy network without its last layer: frames (*, C, H, W) to features (*, F)."""
 
@@ -238,6 +348,13 @@ def _with_head(
     layers = OrderedDict(convolutions)
     width = _flat_size(convolutions, in_shape)
     layers["flatten"] = nn.Flatten()
+    layers.update(_linear(width, hidden, num_actions))
+    return layers
+
+
+def _linear(width: int, hidden: Sequence[int], num_actions: int) -> "OrderedDict[str, nn.Module]":
+    """Return linear layers from `width` features to logits."""
+    layers: OrderedDict[str, nn.Module] = OrderedDict()
     for i, size in enumerate(hidden, start=1):
         layers[f"fc{i}"] = nn.Linear(width, size)
         layers[f"fc_relu{i}"] = nn.ReLU()

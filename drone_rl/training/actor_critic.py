@@ -4,7 +4,7 @@ import copy
 import dataclasses
 import logging
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import torch
 from tensordict import TensorDict, TensorDictBase
@@ -20,7 +20,7 @@ from drone_rl.config.registry import implements
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.objectives import Advantages
 from drone_rl.policies import ActorCritic
-from drone_rl.policies.critic import LOG_PROB, PIXELS, VALUE
+from drone_rl.policies.critic import LOG_PROB, VALUE
 from drone_rl.policies.zoo import describe
 from drone_rl.sim.tasks import FailureReplayTask
 from drone_rl.training.learners import (
@@ -84,10 +84,11 @@ class ActorCriticLearner(GradientLearner):
     """Approximate number of steps for one step of the optimizer; None for all."""
     chunk_frames: int = TrainerSettings().chunk_frames
     """See `ReinforceLearner`."""
-    in_keys: ClassVar[Sequence[NestedKey]] = (
-        *(PIXELS, "action", LOG_PROB, VALUE),
-        *(ADVANTAGE, TARGET, ENTROPY),
-    )
+
+    @property
+    def in_keys(self) -> Sequence[NestedKey]:
+        """Entries of a batch that are read: the inputs, and what `estimate` adds."""
+        return (*self.model.inputs, "action", LOG_PROB, VALUE, ADVANTAGE, TARGET, ENTROPY)
 
     def update(self, batch: TensorDictBase) -> dict[str, float]:
         """Learn from a rollout of shape (num_envs, T), as returned by `estimate`.
@@ -118,9 +119,10 @@ class ActorCriticLearner(GradientLearner):
         They are log-probability, entropy and value of the policy that collected, "advantage" and
         "value_target". See `check_batch` for errors.
         """
-        following = [("next", key) for key in (PIXELS, "reward", "done", "terminated")]
-        check_batch(batch, [PIXELS, "action", *following], type(self).__name__)
-        seen = self._evaluate(batch.get(PIXELS).flatten(0, batch.ndim - 1))
+        inputs = self.model.inputs
+        following = [("next", key) for key in (*inputs, "reward", "done", "terminated")]
+        check_batch(batch, [*inputs, "action", *following], type(self).__name__)
+        seen = self._evaluate(batch.select(*inputs).reshape(-1))
         policy = self.model.actor.get_dist(seen)
         value = seen.get(VALUE).reshape(*batch.shape, 1)
         after = batch.get("next").select("reward", "done", "terminated")
@@ -138,13 +140,14 @@ class ActorCriticLearner(GradientLearner):
         cut = batch.get(("next", "done")).clone()
         cut[..., -1, :] = True
         cut = (cut & ~batch.get(("next", "terminated")))[..., 0]
-        after[cut] = self._evaluate(batch.get(("next", PIXELS))[cut]).get(VALUE)
+        after[cut] = self._evaluate(batch.get("next").select(*self.model.inputs)[cut]).get(VALUE)
         return after
 
-    def _evaluate(self, pixels: Tensor) -> TensorDictBase:
-        """Return features and values of frames, without the frames. Shape: (num_frames,)."""
-        chunks = (TensorDict({PIXELS: c}, [len(c)]) for c in pixels.split(self.chunk_frames))
-        seen = [self.model.critic(self.model.trunk(chunk)).exclude(PIXELS) for chunk in chunks]
+    def _evaluate(self, inputs: TensorDictBase) -> TensorDictBase:
+        """Return features and values of inputs, without these. Shape: (num_frames,)."""
+        model, names, size = self.model, self.model.inputs, self.chunk_frames
+        chunks = (inputs[i : i + size] for i in range(0, max(1, len(inputs)), size))
+        seen = [model.critic(model.trunk(chunk)).exclude(*names) for chunk in chunks]
         # it takes TensorDicts, too, which its annotation lacks
         return torch.cat(seen)  # pyright: ignore[reportReturnType]
 

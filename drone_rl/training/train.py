@@ -208,10 +208,10 @@ def _require_batch(settings: TrainSettings) -> None:
 
     Complete episodes count a quarter of the longest one, which untrained policies reach on average.
     """
-    chosen, frame = settings.collector, describe(settings).input
+    chosen, shapes = settings.collector, describe(settings).shapes.values()
     longest = getattr(settings.task, "step_limit", 1)
     steps = getattr(settings.objective, "num_steps", max(1, longest // 4))
-    needed = chosen.num_envs * steps * math.prod(frame.shape) * (4 if frame.is_float else 1)
+    needed = chosen.num_envs * steps * sum(4 * math.prod(shape) for shape in shapes)
     setting = f"collector.num_envs={chosen.num_envs}, batches of about {steps} steps of each,"
     require_memory(needed, setting, "give fewer environments, steps or pixels")
 

@@ -1,12 +1,11 @@
 """Run a policy under conditions, from the same initial states in each of them."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import torch
 from torch import Tensor
-from torchrl.envs import Transform
 
 from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.config import (
@@ -20,7 +19,9 @@ from drone_rl.config import (
     DynamicsSettings,
 )
 from drone_rl.config.commands import Mode
+from drone_rl.config.inputs import VectorInput
 from drone_rl.envs import Observer, base_env, worlds_of
+from drone_rl.envs.observer import Seen
 from drone_rl.envs.rollout import Agent, DelayedAgent, steps
 from drone_rl.policies import ImageNetwork, greedy_agent
 from drone_rl.policies.baselines import (
@@ -64,7 +65,7 @@ class EvaluatedPolicy:
     network: ImageNetwork
     task: BaseTaskSettings
     camera: CameraSettings
-    transforms: Sequence[Transform]
+    inputs: Mapping[str, Seen]
     appearance: AppearanceSettings = MINIMAL
     device: str = "cpu"
     renderer: str = "raytrace"
@@ -92,14 +93,14 @@ class EvaluatedPolicy:
             )
         env: Any = policy.make_env(1, device=device, renderer=renderer)
         try:
-            camera, transforms = worlds_of(env).camera, base_env(env).observer.transforms
+            camera, inputs = worlds_of(env).camera, base_env(env).observer.inputs
         finally:
             env.close()
         network = policy.make_network(device).eval()
         described = getattr(policy, "description", None)  # only policies from files have one
         look = MINIMAL if described is None else described.appearance
         where, moved = (device, renderer), (policy.dynamics, policy.actions)
-        return cls(network, task, camera, transforms, look, *where, *moved)
+        return cls(network, task, camera, inputs, look, *where, *moved)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -197,7 +198,9 @@ class PairedEvaluator:
             for step in steps(delayed, observer, state, rows, starts=starts, num_steps=most):
                 number += 1
                 if step.act.distribution is not None:
-                    seen = observer.images.flatten(1).double().sum(-1)
+                    seen = sum(
+                        s.last.double().flatten(1).sum(-1) for s in observer.sources.values()
+                    )
                     trace[step.rows] += number * seen
                 final[step.rows] = step.after
             rows = (final.end_reason == 0).nonzero()[:, 0]
@@ -241,9 +244,15 @@ class PairedEvaluator:
         hiding_only = getattr(agent, "needs_only_hiding_faults", False)
         return Observer(
             worlds,
-            self.subject.transforms,
+            self.subject.inputs,
             appearance=appearance,
-            faults=make_faults(condition.faults, self.episodes, self.seed, hiding_only=hiding_only),
+            faults={
+                name: make_faults(
+                    condition.faults, self.episodes, self.seed, hiding_only=hiding_only
+                )
+                for name, seen in self.subject.inputs.items()
+                if not isinstance(seen, VectorInput)
+            },
             earlier=earlier,
         )
 

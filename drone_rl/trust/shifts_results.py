@@ -216,9 +216,12 @@ class NetworkIdentity(Stored):
     def camera_faults(self) -> list[str]:
         """Camera faults that the policy's transforms simulate."""
         faults = {fault.name for fault in Fault.__subclasses__()}
-        image = self.description["inputs"]["pixels"]
-        names = [step["name"] for step in image["transforms"]]
-        return [name for name in names if name in faults]
+        steps = [
+            step["name"]
+            for seen in self.description["inputs"].values()
+            for step in seen.get("transforms", ())
+        ]
+        return [name for name in steps if name in faults]
 
 
 class Robustness(Seeded, Provenance):

@@ -113,7 +113,7 @@ class FrameRecorder:
     def act(self, context: StepContext) -> Act:
         """See `Agent`."""
         images = context.render("rgb").movedim(-1, 1).float() / 255.0
-        images = context.observer.faults(images, context.rows, context.starts)
+        images = context.observer.image.faults(images, context.rows, context.starts)
         self.image = (images[0] * 255).round().to(torch.uint8).movedim(0, -1)
         ahead = context.actions.always(context.actions.names[0])
         return Act(ahead.expand(len(context.rows), *ahead.shape).to(context.rows.device))

@@ -120,9 +120,7 @@ def view(
         random_state=legacy_seed(seed),
         appearance=base.appearances.settings,
     )
-    observer = Observer(
-        worlds, base.observer.transforms, appearance=lambda rows: shown.task.appearance
-    )
+    observer = Observer(worlds, base.observer.inputs, appearance=lambda rows: shown.task.appearance)
 
     @torch.no_grad()
     def act(timestep: dm_env.TimeStep) -> np.ndarray:

@@ -17,7 +17,6 @@ from drone_rl.config.registry import (
     register_transform,
 )
 from drone_rl.config.training import TrainSettings
-from drone_rl.config.transforms import Frame
 from drone_rl.envs.transforms import PixelTransform
 from drone_rl.objectives import ReturnEstimator
 from drone_rl.policies import MLP
@@ -89,7 +88,7 @@ def test_a_transform_is_selected_by_its_key_and_measured_by_a_call(registered):
         {"transforms": {"gray": {}, "mirror": {}, "standardize": {"mean": 0.5}}}
     )
     assert [step.name for step in training.transforms] == ["gray", "mirror", "standardize"]
-    assert describe(training).input == Frame((1, 25, 32), True)
+    assert describe(training).shapes == {"pixels": (1, 25, 32)}
 
 
 def test_a_return_estimator(registered):

@@ -99,7 +99,7 @@ def test_noise_is_independent_across_environments_episodes_and_faults():
     env, memories = DroneEnv(2, SHORT, SMALL, transforms=pipeline), []
     for _ in range(2):
         env.reset()
-        memories += [s.memory[w] for s in env.observer.pipeline.stages for w in (0, 1)]
+        memories += [s.memory[w] for s in env.observer.image.pipeline.stages for w in (0, 1)]
     for i in range(len(memories)):
         for j in range(i):
             both = torch.stack([memories[i].flatten(), memories[j].flatten()])
@@ -231,7 +231,7 @@ def test_gpu_samples_equal_cpu():
     one, other = make_env(num_envs=2), make_env(num_envs=2, device="cuda")
     for env in (one, other):
         env.reset()
-    memories = [env.observer.pipeline.stages[0].memory for env in (one, other)]
+    memories = [env.observer.image.pipeline.stages[0].memory for env in (one, other)]
     assert memories[1].is_cuda and torch.equal(memories[0], memories[1].cpu())
     check_env_specs(other, break_when_any_done="both")
 

@@ -35,7 +35,7 @@ def test_observations_equal_transformed_images(first, modality):
     """Gray is rendered directly, with the same result as from colors."""
     transforms = [first, CropRows(5, 25), StandardizePixels()]
     env = DroneEnv(3, SHORT, transforms=transforms)
-    assert env.observer.view.modalities == (modality,)
+    assert env.observer.image.view.modalities == (modality,)
     plain = TransformedEnv(DroneEnv(3, SHORT), Compose(*transforms))
     assert torch.equal(env.reset()["pixels"], plain.reset()["pixels"])
     assert env.observation_spec["pixels"].shape == plain.observation_spec["pixels"].shape
@@ -46,7 +46,7 @@ def test_resize_to_the_camera_size_is_skipped(size, kept):
     camera = CameraSettings(height=size[0], width=size[1])
     transforms = [GrayPixels(), Resize(height=25, width=64), StandardizePixels()]
     env = DroneEnv(2, SHORT, camera, transforms=transforms)
-    steps = [type(t) for t in env.observer.pipeline.transforms]
+    steps = [type(t) for t in env.observer.image.pipeline.transforms]
     assert steps == [Resize, StandardizePixels][-kept:]
     assert env.reset()["pixels"].shape == (2, 1, 25, 64)
 
@@ -117,7 +117,9 @@ def test_faults_of_an_evaluation_act_before_the_transforms():
     moved, _ = worlds.advance(state, torch.tensor([0]))
     for transforms in ((), (RgbPixels(),), (GrayPixels(),)):
         seen = Observer(worlds, transforms).observe(state, rows, True, None)["pixels"]
-        late = Observer(worlds, transforms, faults=Pipeline(stages=[Stage(late_frames(1))]))
+        late = Observer(
+            worlds, transforms, faults={"pixels": Pipeline(stages=[Stage(late_frames(1))])}
+        )
         assert torch.equal(late.observe(state, rows, True, None)["pixels"], seen)
         assert torch.equal(late.observe(moved, rows, False, None)["pixels"], seen)
         assert not torch.equal(late.observe(moved, rows, False, None)["pixels"], seen)

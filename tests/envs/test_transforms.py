@@ -119,7 +119,7 @@ def test_stacks_equal_those_of_torchrl(sizes, padding):
     state, expected = env.reset(), other.reset()
     for _ in range(6):
         assert torch.equal(state["pixels"], expected["pixels"])
-        pipeline, _ = Pipeline(env.observer.transforms), film.append(env.last_pixels)
+        pipeline, _ = Pipeline(env.observer.image.transforms), film.append(env.last_pixels)
         seen = pipeline.of_frames(film[-1 - pipeline.earlier :])
         if padding == "same":
             torch.testing.assert_close(seen, state["pixels"])

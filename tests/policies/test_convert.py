@@ -25,7 +25,7 @@ def former_description(policy):
     del task["reward"]
     if described.task.name == "pillars":
         task["collision_penalty"] = -weights["contact"]
-    parts = {"transforms": described.image.transforms, "network": [described.network]}
+    parts = {"transforms": described.transforms, "network": [described.network]}
     parts = {name: [part.model_dump(mode="json") for part in of] for name, of in parts.items()}
     former = {
         "format": "drone_rl policy",

@@ -26,7 +26,7 @@ def test_images_are_resized_to_the_network():
     settings = drone_rl.TrainSettings(camera=drone_rl.CameraSettings(width=128, height=50))
     assert [step.name for step in settings.transforms] == ["gray", "resize", "standardize"]
     described = describe(settings)
-    assert described.input.shape == (1, 25, 64)
+    assert described.shapes["pixels"] == (1, 25, 64)
 
 
 def test_task_is_selected_by_name():

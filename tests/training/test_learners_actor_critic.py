@@ -172,7 +172,9 @@ def test_learns_policy_and_value(make_learner, kind, own):
     for _ in range(60):
         learner.update(learner.estimate(batch))
     assert (learner.network(look).softmax(-1)[..., 2] > 0.9).all()
-    value = learner._evaluate(look[:, 0])["state_value"].detach()
+    value = learner._evaluate(TensorDict({"pixels": look[:, 0]}, [len(look)]))[
+        "state_value"
+    ].detach()
     assert float(value.mean()) == pytest.approx(1 / 3, abs=0.1)  # mean reward of the batch
 
 

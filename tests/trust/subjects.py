@@ -45,5 +45,5 @@ def subject(network=None, task=TASK, transforms=None, camera=SMALL):
         network or Steering(),
         task,
         camera,
-        [GrayPixels()] if transforms is None else transforms,
+        {"pixels": [GrayPixels()] if transforms is None else transforms},
     )

@@ -17,7 +17,7 @@ from drone_rl.utils.errors import InputError
 def flown(make_pipeline):
     """Worlds, a policy, and the same policy as a function of frames."""
     env, actor = make_pipeline(8, seed=3)
-    network, transform = actor.module[0].module, Pipeline(env.observer.transforms)
+    network, transform = actor.module[0].module, Pipeline(env.observer.image.transforms)
     network.layers.logits.weight.data.mul_(100)  # so that pictures matter
     return env, actor, lambda frames: network(transform(frames)).softmax(-1)
 

@@ -34,6 +34,7 @@ from drone_rl.config import (
 )
 from drone_rl.config.commands import PathsSettings, ProvableSettings
 from drone_rl.config.configuration import Changes
+from drone_rl.config.inputs import PIXELS, Input
 from drone_rl.config.learning import Collector, Objective, Optimizer, Returns, Scheduler
 from drone_rl.config.networks import Network
 from drone_rl.config.parts import Part
@@ -68,6 +69,8 @@ PARTS: dict[str, type[Part]] = {
 """Groups whose choices are the variants of a part."""
 SEVERAL: dict[str, type[Part]] = {"transforms": Transform, "logger": Logger}
 """Groups whose files name several variants, each by `schema@<name>: <the variant's name>`."""
+CHOSEN: dict[str, tuple[type[Part], str]] = {"inputs": (Input, PIXELS)}
+"""Groups of which several variants are chosen, each under its name, with the default one."""
 _LARGEST_WHOLE = 10**15
 
 
@@ -87,6 +90,9 @@ def store_defaults(commands: Mapping[str, type[CommandSettings]]) -> None:
             chosen = [{f"override /{g}@_global_.{g}": need.name} for g, need in needs.items()]
             within = f"{group}/schema" if group in SEVERAL else group
             store(group=within, name=name, node={"defaults": chosen, **variant().config()})
+    for group, (part, _) in CHOSEN.items():
+        for name, variant in part.registry.items():
+            store(group=group, name=name, node=variant().config(), package=f"{group}.{name}")
     for name, command in commands.items():
         groups, values = _defaults_of(command)
         has_file = (conf_dir() / f"{name}.yaml").is_file()  # which lists the groups
@@ -95,9 +101,9 @@ def store_defaults(commands: Mapping[str, type[CommandSettings]]) -> None:
         store(name="base_" * has_file + name, node={"defaults": defaults, **values})
 
 
-def _defaults_of(command: type[CommandSettings]) -> tuple[dict[str, str | None], dict[str, Any]]:
+def _defaults_of(command: type[CommandSettings]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the choice of each group of a command, and its other values."""
-    groups: dict[str, str | None] = {}
+    groups: dict[str, Any] = {}
     values: dict[str, Any] = {"plugins": []}
     for name, value in command():
         (kind, *_) = inner_types(hints_of(command)[name])
@@ -105,6 +111,8 @@ def _defaults_of(command: type[CommandSettings]) -> tuple[dict[str, str | None],
             groups[name] = GROUPS[name][1] if isinstance(value, Settings) else None
         if isinstance(kind, Changes):
             groups[name], values[name] = None, dict.fromkeys(kind.names)
+        elif name in CHOSEN:
+            groups[name] = [CHOSEN[name][1]]
         elif name in SEVERAL:
             values[name] = {}  # without a choice, as in transforms=[], there are none
         elif groups.get(name) is None and name not in ("task", *PARTS):

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from drone_rl.config import BaseTaskSettings, TaskSettings
 from drone_rl.config.commands import GymnasiumSettings
+from drone_rl.config.inputs import PIXELS
 from drone_rl.envs import DroneEnv
 from drone_rl.envs.observer import Starts
 from drone_rl.sim.actions import Actions, Entry
@@ -137,7 +138,7 @@ class WorldBatch:
         self.names = tuple(name for name in self.worlds.entries if name != END)
         """Entries of `info` that make up the state vector, in order."""
         self.observation_space: spaces.Box = (
-            image_space(self._env.observer.example()[0])
+            image_space(self._env.observer.image.example()[0])
             if self.has_images
             else vector_space({name: self.worlds.entries[name] for name in self.names})
         )
@@ -163,8 +164,8 @@ class WorldBatch:
             env_ids: Environments with a new state, (k,); all by default.
         """
         if self.has_images:
-            pixels = self._env.observe(self._every if env_ids is None else env_ids, starts)
-            return pixels.cpu().numpy().copy()
+            seen = self._env.observe(self._every if env_ids is None else env_ids, starts)
+            return seen[PIXELS].cpu().numpy().copy()
         info = self.worlds.info()
         flat = [info[name][:, None].flatten(1).float().nan_to_num() for name in self.names]
         return torch.cat(flat, 1).cpu().numpy()

@@ -72,7 +72,7 @@ class World:
         self.scenes = Scenes(self._env)
         self._observer = Observer(
             self.worlds,
-            self._base.observer.transforms,
+            self._base.observer.inputs,
             appearance=lambda rows: self._look(),
             streams=lambda rows, key: self._base.side_streams(rows, *key),
         )
@@ -168,7 +168,7 @@ class World:
             starts = torch.tensor([self._memory is None])
             if self._memory is not None:  # the state may have been seen before, in another light
                 seen, self._actor.memory = self._memory
-                self._observer.pipeline.load_state_dict(seen)
+                self._observer.load_state_dict(seen)
             context = StepContext(self._observer, self.worlds.state, self._every, starts)
             shares = probabilities(act := self._agent.act(context), self.actions)
             frame, observation = context.render(), context.observe()
@@ -179,7 +179,7 @@ class World:
     def step(self, action: Tensor) -> float:
         """Take an action, (1,) and then its shape; return the reward."""
         self.see()
-        self._memory = self._observer.pipeline.state_dict(), self._actor.memory
+        self._memory = self._observer.state_dict(), self._actor.memory
         reward = float(self.worlds.step(self._every, action)[0])
         self.reward += reward
         self._change()

@@ -29,14 +29,23 @@ from drone_rl.config import (
     DynamicsSettings,
 )
 from drone_rl.config.dynamics import Axis
+from drone_rl.config.inputs import (
+    MOST_INPUTS,
+    PIXELS,
+    ImageInput,
+    InputDescription,
+    describe_inputs,
+    require_name,
+)
 from drone_rl.config.networks import Lstm, Network
 from drone_rl.config.parts import load_entry_points
 from drone_rl.config.registry import own_place
 from drone_rl.config.training import TrainSettings
-from drone_rl.config.transforms import MOST_TRANSFORMS, Fault, Frame, Stack, Transform
+from drone_rl.config.transforms import Fault, Frame, Stack, Transform
 from drone_rl.envs import DroneEnv, with_others
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.environment import EnvOptions, check_names
+from drone_rl.policies.networks import InputsNetwork
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import Dynamics, make_dynamics
 from drone_rl.sim.tasks import Task, as_task
@@ -52,20 +61,9 @@ FORMAT = "drone_rl policy"
 FORMAT_VERSION = 3
 MAX_PARAMETERS = 2**24
 """Of a network: 64 MiB."""
-MAX_PIXELS = 2**18
-"""Of a camera's frame."""
 MAX_NUMBERS = 2**20
 """Of one image after any transform."""
 Name = Annotated[str, Text(200)]
-IMAGE = "pixels"
-"""Name of the image among the inputs, see `Observer.observe`."""
-
-
-def _by_name(part: Any) -> Any:
-    if isinstance(part, Mapping) and "_target_" in part:
-        target = shown(part["_target_"])
-        raise InputError(f"_target_={target} is refused; files name registered parts alone")
-    return part
 
 
 class Source(Model):
@@ -151,51 +149,6 @@ class TaskDescription(Model):
         return self
 
 
-class Camera(Model):
-    """A camera on the drone."""
-
-    name: Literal["front"] = "front"
-    horizontal_fov: float
-    """Horizontal field of view, degrees."""
-
-
-class ImageInput(Model):
-    """An input that is an image: who takes it, and what is done with it."""
-
-    kind: Literal["image"] = "image"
-    camera: Camera
-    size: tuple[int, int]
-    """Height and width of the camera's frame, pixels."""
-    transforms: Annotated[
-        tuple[Annotated[Transform, pydantic.BeforeValidator(_by_name)], ...],
-        MaxLen(MOST_TRANSFORMS),
-    ]
-    """In the order in which they are applied."""
-
-    @classmethod
-    def of(cls, camera: CameraSettings, transforms: tuple[Transform, ...]) -> Self:
-        """Return the input of a policy with such a camera."""
-        return cls(
-            camera=Camera(horizontal_fov=camera.horizontal_fov),
-            size=(camera.height, camera.width),
-            transforms=transforms,
-        )
-
-    @property
-    def settings(self) -> CameraSettings:
-        """Settings of the camera and its frame."""
-        height, width = self.size
-        fov = self.camera.horizontal_fov
-        return CameraSettings(height=height, width=width, horizontal_fov=fov)
-
-    @pydantic.model_validator(mode="after")
-    def _check(self) -> Self:
-        pixels = self.settings.width * self.settings.height
-        if pixels > MAX_PIXELS:
-            raise InputError(f"camera has {pixels} pixels; give at most {MAX_PIXELS}")
-        return self
-
-
 class ActionSpace(Model):
     """The actions: what builds them, and their axes for other programs."""
 
@@ -224,10 +177,10 @@ class PolicyDescription(Model):
     format: Literal["drone_rl policy"] = FORMAT
     format_version: Literal[3] = FORMAT_VERSION
     task: TaskDescription
-    inputs: Annotated[dict[Literal["pixels"], ImageInput], MinLen(1)]
+    inputs: Annotated[dict[Name, InputDescription], MinLen(1), MaxLen(MOST_INPUTS)]
     """By name, as the `Observer` returns them."""
     actions: ActionSpace
-    network: Annotated[Network, pydantic.BeforeValidator(_by_name)]
+    network: Annotated[Network, pydantic.BeforeValidator(require_name)]
     appearance: AppearanceSettings = MINIMAL
     """Appearance of the scenes in training."""
     dynamics: DynamicsSettings = COMPUTER_VISION
@@ -244,8 +197,7 @@ class PolicyDescription(Model):
     def _check(self) -> Self:
         """Check that it can be built with bounded memory."""
         self.dynamics.check_air()
-        if not self.input.is_float:
-            raise InputError("the network needs floats; add a transform such as gray")
+        self.shapes  # noqa: B018 (checks them)
         expected = self.expected_weights()
         count = sum(value.numel() for value in expected.values())
         if count > MAX_PARAMETERS:
@@ -255,32 +207,49 @@ class PolicyDescription(Model):
         return self
 
     @property
-    def image(self) -> ImageInput:
-        """The image among the inputs."""
-        return self.inputs[IMAGE]
+    def images(self) -> dict[str, ImageInput]:
+        """The images among the inputs, by name."""
+        return {n: i for n, i in self.inputs.items() if isinstance(i, ImageInput)}
 
     @property
     def camera(self) -> CameraSettings:
-        """The camera of the image."""
-        return self.image.settings
+        """The camera of the first image; the default one without images."""
+        return next((image.settings for image in self.images.values()), CameraSettings())
 
     @property
     def transforms(self) -> tuple[Transform, ...]:
-        """The transforms of the image."""
-        return self.image.transforms
+        """The transforms of the first image; none without images."""
+        return next((image.transforms for image in self.images.values()), ())
 
     @property
-    def input(self) -> Frame:
-        """Shape and type of the network's input."""
-        frame = Frame((self.camera.height, self.camera.width, 3))
-        for transform in self.transforms:
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Shape of each input as the network gets it: (C, H, W) of an image, (n,) of a vector."""
+        return {
+            name: self._frame(seen).shape if isinstance(seen, ImageInput) else (seen.size,)
+            for name, seen in self.inputs.items()
+        }
+
+    def _frame(self, image: ImageInput) -> Frame:
+        """Return shape and type of an image after its transforms."""
+        frame = image.frame
+        for transform in image.transforms:
             frame = output_of(transform, frame)
             if math.prod(frame.shape) > MAX_NUMBERS:
                 raise InputError(
                     f"the transform {transform.name} makes images of shape {frame.shape}; give "
                     f"sizes that make at most {MAX_NUMBERS} numbers"
                 )
+        if not frame.is_float:
+            raise InputError("the network needs floats; add a transform such as gray")
         return frame
+
+    @property
+    def sees_pixels(self) -> bool:
+        """Whether its only input is the image that `camera` and `transforms` describe."""
+        seen = self.inputs.get(PIXELS)
+        if len(self.inputs) > 1 or not isinstance(seen, ImageInput):
+            return False
+        return (seen.modality, seen.camera.name) == ("rgb", "front")
 
     @property
     def frames(self) -> int:
@@ -299,8 +268,7 @@ class PolicyDescription(Model):
 
     def without_faults(self) -> Self:
         """Return the same description without camera faults."""
-        sound = tuple(t for t in self.transforms if not isinstance(t, Fault))
-        return self.replace(inputs={IMAGE: self.image.replace(transforms=sound)})
+        return self.replace(inputs={n: seen.without_errors() for n, seen in self.inputs.items()})
 
     def build_env(
         self,
@@ -327,6 +295,7 @@ class PolicyDescription(Model):
             task or self.task.parameters,
             self.camera,
             transforms=transforms,
+            inputs=None if self.sees_pixels else self.inputs,
             seed=seed,
             stream=stream,
             device=device,
@@ -383,12 +352,31 @@ class PolicyDescription(Model):
     def _layers(self, outputs: int, generator: torch.Generator | None) -> ImageNetwork:
         layers = None if generator is None else plain_generator(generator.initial_seed() + 1)
         with as_global_stream(layers):  # layers draw from it what the generator then replaces
-            return self.network.make(self.input.shape, outputs, generator=generator)
+            if self.sees_pixels:
+                return self.network.make(self.shapes[PIXELS], outputs, generator=generator)
+            return self._joined(outputs, generator)
+
+    def _joined(self, outputs: int, generator: torch.Generator | None) -> ImageNetwork:
+        """Return a network of all inputs: the named one's layers for each image, and its trunk."""
+        hidden = getattr(self.network, "hidden", None)
+        if own_place(self.network) or self.is_recurrent or hidden is None:
+            raise InputError(
+                f"network={self.network.name} takes pixels alone, and not "
+                f"{', '.join(self.inputs)}; give network=small_cnn, original_cnn or mlp"
+            )
+        networks = {
+            name: self.network.make(self.shapes[name], outputs, generator=generator)
+            for name in self.images
+        }
+        return InputsNetwork(self.shapes, networks, outputs, hidden=hidden, generator=generator)
 
     def _checked(self, network: ImageNetwork, outputs: int) -> ImageNetwork:
         """Return a network; raise an `InputError` if it is the user's own with other outputs."""
         if place := own_place(self.network):
-            who, zeros = f"network={self.network.name}: {place}", torch.zeros(2, *self.input.shape)
+            who, zeros = (
+                f"network={self.network.name}: {place}",
+                torch.zeros(2, *self.shapes[PIXELS]),
+            )
             with torch.enable_grad(), errors_of(f"network={self.network.name}", place):
                 outputs_of_zeros: Any = network.eval()(
                     zeros
@@ -412,7 +400,7 @@ def describe(settings: TrainSettings) -> PolicyDescription:
             )
     return PolicyDescription(
         task=TaskDescription.of(settings.task),
-        inputs={IMAGE: ImageInput.of(settings.camera, settings.transforms)},
+        inputs=describe_inputs(settings.inputs, settings.camera, settings.transforms),
         actions=ActionSpace.of(settings.actions),
         network=settings.network,
         appearance=settings.appearance,

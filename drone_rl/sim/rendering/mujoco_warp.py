@@ -54,7 +54,7 @@ class WarpRenderer:
 
     def prepare(self, view: View) -> None:
         """Allocate buffers and build kernels; see `Renderer.prepare` and `SUPPORTED`."""
-        view.check_modalities(self, SUPPORTED)
+        check_view(self, view)
         for camera in view.cameras:
             for modality in view.modalities:
                 self._shards_of(_single(view, camera, modality))
@@ -68,7 +68,7 @@ class WarpRenderer:
                 "fog, shadows, textures, a sky of two colors, an exposure and other fields of "
                 "view can't be rendered by WarpRenderer; give renderer=raytrace"
             )
-        view.check_modalities(self, SUPPORTED)
+        check_view(self, view)
         images = view.new_images(len(poses), self.device)
         for modality, several in images.items():
             for i, camera in enumerate(view.cameras):
@@ -229,6 +229,16 @@ class ModelAppearance:
 def _is_supported(appearance: Appearance) -> bool:
     zoom = None if appearance.camera is None else appearance.camera.zoom
     return appearance.is_plain and appearance.exposure is None and zoom is None
+
+
+def check_view(renderer: object, view: View) -> None:
+    """Raise an `InputError` for a view that this renderer does not support."""
+    view.check_modalities(renderer, SUPPORTED)
+    if view.horizontal_fov is not None:
+        raise InputError(
+            "inputs with cameras of their own can't be rendered by mujoco_warp; give "
+            "renderer=raytrace"
+        )
 
 
 def _single(view: View, camera: str, modality: Modality) -> View:

@@ -37,6 +37,8 @@ class View:
     modalities: tuple[Modality, ...] = ("rgb",)
     show_drone: bool = False
     """Whether to render the drone's own body, which its own cameras leave out."""
+    horizontal_fov: float | None = None
+    """Horizontal field of view, degrees; the cameras' own if None."""
 
     def __post_init__(self) -> None:
         if not self.cameras:

@@ -125,7 +125,7 @@ class Simulator:
         self._env = described.build_env(count, seed=0, device=device, renderer=renderer)
         self._worlds = worlds_of(self._env)
         self._task = require_cubes(described, "certificates")
-        self._transforms = base_env(self._env).observer.transforms
+        self._transforms = base_env(self._env).observer.image.transforms
         self._network = described.load_network(weights).to(self._worlds.device)
 
     def fly(

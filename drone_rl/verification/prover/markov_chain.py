@@ -126,7 +126,7 @@ class NodeEvaluator:
         self.num_images = 0  # images rendered so far
         self._worlds, self._network = worlds_of(env), network
         self._rounding = RoundingBound.find(network)
-        self._transforms = base_env(env).observer.transforms
+        self._transforms = base_env(env).observer.image.transforms
 
     def on(self, graph: Graph) -> Evaluate:
         """Return a function from nodes of a graph to action probabilities; it caches images."""

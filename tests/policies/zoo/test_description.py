@@ -50,6 +50,8 @@ DEFAULT = {
             "kind": "image",
             "camera": {"name": "front", "horizontal_fov": 135.0},
             "size": [25, 64],
+            "modality": "rgb",
+            "maximum": None,
             "transforms": [{"name": "gray"}, {"name": "standardize", "mean": 0.53, "std": 0.21}],
         }
     },
@@ -191,7 +193,7 @@ def test_expected_weights_are_known_without_building():
 )
 def test_image_shape_is_predicted(camera, transforms, shape):
     described = parse(with_image(size=camera, transforms=transforms))
-    assert described.input.shape == shape
+    assert described.shapes["pixels"] == shape
     env = described.build_env(1, seed=0, device="cpu")
     assert tuple(env.reset()["pixels"].shape[1:]) == shape
     env.close()
@@ -215,9 +217,8 @@ def test_image_shape_is_predicted(camera, transforms, shape):
         ("task.scene", {"name": "house.xml"}, "task.scene is not supported"),
         ("task.code", {"name": "a", "hash": "0" * 63}, "task.code.hash"),
         ("inputs", {}, "inputs=.* at least 1 item"),
-        ("inputs", {"depth": DEFAULT["inputs"]["pixels"]}, "inputs.depth='depth'"),
-        (f"{IMAGE}.kind", "vector", "kind='vector'"),
-        (f"{IMAGE}.camera.name", "down", "camera.name='down'"),
+        (f"{IMAGE}.kind", "vector", "vector.quantity is missing"),
+        (f"{IMAGE}.camera.name", "roof", "camera.name='roof'"),
         (f"{IMAGE}.size", [25, 4096], "width=4096"),
         (f"{IMAGE}.size", [25, 1024], None),
         (f"{IMAGE}.transforms", [], "needs floats"),

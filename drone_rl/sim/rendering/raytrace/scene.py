@@ -1,5 +1,6 @@
 """Encode a scene for the kernels, in reference frames: 0 world, 1 drone, props from 2."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -100,7 +101,8 @@ def make_view(scene: Scene, frames: Frames, view: View, device: str) -> structs.
     """Return a view for the kernels; the caller sets its modalities, `what`."""
     model: Any = scene.model
     made: Any = structs.ViewArrays()
-    cameras = [make_camera(scene, frames, name, view.width / view.height) for name in view.cameras]
+    aspect, fov = view.width / view.height, view.horizontal_fov
+    cameras = [make_camera(scene, frames, name, aspect, fov) for name in view.cameras]
     rays = np.stack([make_rays(camera, view.height, view.width) for camera in cameras])
     rays = rays.reshape(len(cameras), -1, 3)
     made.cameras = wp.array(cameras, dtype=structs.Camera, device=device)
@@ -111,8 +113,14 @@ def make_view(scene: Scene, frames: Frames, view: View, device: str) -> structs.
     return made
 
 
-def make_camera(scene: Scene, frames: Frames, name: str, aspect: float) -> structs.Camera:
-    """Return a camera for the kernels; `aspect` is the width of its image over the height."""
+def make_camera(
+    scene: Scene, frames: Frames, name: str, aspect: float, horizontal_fov: float | None = None
+) -> structs.Camera:
+    """Return a camera for the kernels.
+
+    `aspect` is the width of its image over the height, `horizontal_fov` its field of view in
+    degrees if it is not the model's.
+    """
     model = scene.model
     number = scene.camera(name)
     camera = model.camera(number)
@@ -128,6 +136,9 @@ def make_camera(scene: Scene, frames: Frames, name: str, aspect: float) -> struc
     half_angle = np.float32(0.5) * np.float32(camera.fovy[0]) * np.float32(np.pi / 180.0)
     made.half_height = float(np.tan(half_angle))
     made.half_width = made.half_height * aspect
+    if horizontal_fov is not None:
+        made.half_width = math.tan(math.radians(horizontal_fov) / 2)
+        made.half_height = made.half_width / aspect
     return made
 
 
