@@ -28,7 +28,8 @@ def test_settings_of_a_training_are_taken_over(noted):
         *("experiment=smoke", "logger=csv", "network=mlp", "collector=ray", "transforms=stack"),
         *("network.hidden=[128,64]", "network.hidden=[128, 64]", "network.channels=[]"),
         *("optimizer.lr=1e-3", "task.spacing=-9.5", "trainer.total_episodes=null"),
-        "++task.reward.near_wall.weight=-0.5",
+        *("++task.reward.near_wall.weight=-0.5", "task.objects.ball.event.flee.speed=0.5"),
+        *("inputs=[gray,goal]", "inputs.goal.noise=0.5", "+inputs@inputs.down=depth"),
         *("task.cube_color=[0.1, 0.2, 0.3]", "transforms.crop.top=3", "~transforms.standardize"),
         *("+optimizer.amsgrad=true", "objective.reduction=sum", "collector.num_envs=8"),
         *("cloning.epochs=5", "collector.compiled=false", "renderer=mujoco_warp"),
@@ -62,7 +63,14 @@ def test_paths_of_the_first_run_are_left_out(noted):
         *("network=../x", "network=/x", "network=a/b", "experiment=[a,b]", "+network=mlp"),
         *("seed=${oc.env:HOME}", "task.spacing=${task.num_cubes}", "seed=1,2", "seed=range(9)"),
         *("--config-dir=/x", "-m", "seed", "~network", "seed=1\nx=2", "device=os.system"),
-        *("trainer.w.x.y.z=1", "task.spacing=a b", "optimizer.lr='1'", "seed=`id`", "seed=\x1b"),
+        *(
+            "trainer.u.v.w.x.y.z=1",
+            "inputs=[{_target_:os.system}]",
+            "task.spacing=a b",
+            "optimizer.lr='1'",
+            "seed=`id`",
+            "seed=\x1b",
+        ),
     ],
 )
 def test_unsafe_settings_are_refused(noted, setting):
