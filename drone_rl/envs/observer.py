@@ -230,6 +230,7 @@ _CLASS_CHANNELS = {
     SemanticClass.GROUND: 2,
     SemanticClass.DRONE: 3,
     SemanticClass.DISTRACTOR: 3,
+    SemanticClass.DECORATION: 3,
     SemanticClass.SKY: 4,
 }
 """See `drone_rl.config.inputs.CLASSES`."""

@@ -46,6 +46,7 @@ CLASS_COLORS: Mapping[SemanticClass, palette.Rgb] = {
     SemanticClass.OBSTACLE: palette.DOWN,
     SemanticClass.DRONE: palette.FAINT,
     SemanticClass.DISTRACTOR: palette.MUTED,
+    SemanticClass.DECORATION: palette.PAPER,
 }
 """Colors of the segmentation image and of the boxes."""
 _CAMERA = "world/drone/camera"

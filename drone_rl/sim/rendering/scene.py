@@ -36,6 +36,7 @@ class SemanticClass(enum.IntEnum):
     OBSTACLE = 3
     DRONE = 4
     DISTRACTOR = 5
+    DECORATION = 6
 
 
 class PropBox(NamedTuple):

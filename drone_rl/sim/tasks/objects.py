@@ -17,7 +17,7 @@ from drone_rl.sim.tasks.common import HIDDEN_DEPTH, SIDES
 from drone_rl.sim.tasks.geometry_kernel import NOTHING
 from drone_rl.sim.tasks.task import State, Task
 
-_CLASSES = (SemanticClass.TARGET, SemanticClass.OBSTACLE, SemanticClass.GROUND)
+_CLASSES = (SemanticClass.TARGET, SemanticClass.OBSTACLE, SemanticClass.DECORATION)
 _KINDS = {"ball": "sphere", "cylinder": "cylinder", "box": "box"}
 _PLAIN = torch.contiguous_format
 

@@ -12,7 +12,9 @@ from drone_rl.acceleration import FusedEpisodes
 from drone_rl.config import ActionSettings
 from drone_rl.config.appearance import AppearanceSettings, check_appearance
 from drone_rl.config.camera import CameraSettings
+from drone_rl.config.inputs import SegmentationImage
 from drone_rl.config.task import TASKS, BaseTaskSettings
+from drone_rl.envs import Observer
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.dynamics.state import heading_of
 from drone_rl.sim.tasks import as_task
@@ -186,6 +188,17 @@ def test_the_image_is_that_of_the_heading():
         made = worlds(objects={"ball": ball}, start={"heading": heading})
         shown.append(made.render(made.state, made.view(modality="segmentation")))
     assert torch.equal(*shown) and len(shown[0].unique()) == 3  # sky, ground and ball
+
+
+def test_segmentation_shows_each_object_in_the_channel_of_its_role():
+    sides = {"goal": 4.0, "obstacle": 0.0, "decoration": -4.0}
+    box = {"size": [2.0, 2.0, 2.0], "x": 6.0, "z": 2.5}
+    made = worlds(objects={role: {**box, "role": role, "y": y} for role, y in sides.items()})
+    inputs = {"seen": SegmentationImage(size=(24, 64)).described(CameraSettings(), ())}
+    images = Observer(made, inputs).observe(made.state, torch.arange(1), True, None)["seen"]
+    seen = images[0].argmax(0)  # a box is 2 / 5 * 32 / tan(135 / 2 degrees) = 5 pixels wide
+    assert [seen[11, column].item() for column in (21, 32, 42)] == [0, 1, 3]
+    assert seen[0, 32] == 4 and seen[-1, 32] == 2
 
 
 def test_a_turned_box_is_drawn_and_touched_as_its_twin_that_is_not():
