@@ -13,7 +13,7 @@ import pydantic
 from drone_rl.config import TASKS, DynamicsSettings
 from drone_rl.utils.errors import InputError, did_you_mean, shown
 from drone_rl.utils.schema import Annotation
-from drone_rl.utils.settings import Settings
+from drone_rl.utils.settings import Settings, prefixed_errors
 
 S = TypeVar("S", bound=Settings)
 
@@ -63,6 +63,26 @@ def as_changes(value: Any, where: str) -> Mapping[str, Any]:
         f"{where}={shown(value)} gives no changes; give values by name, as in "
         "task={'num_cubes': 5} or dynamics={'wind': [5, 0, 0]}"
     )
+
+
+def changed(settings: S, given: Any, changes: Mapping[str, Any], where: str) -> S:
+    """Return settings with changes: single entries of those that are mappings, such as `start`.
+
+    `given` are further changes as a mapping, or settings, which replace all.
+
+    Raises:
+        InputError: A setting is unknown or out of range; `where` is its prefix.
+    """
+    named = Changes(type(settings)).read({**as_changes(given, where), **changes}, where)
+    before = {} if isinstance(given, Settings) else settings.values()
+    with prefixed_errors(where):
+        return settings.replace(**{n: _merged(before.get(n), of) for n, of in named.items()})
+
+
+def _merged(before: Any, change: Any) -> Any:
+    if not (isinstance(before, Mapping) and isinstance(change, Mapping)):
+        return change
+    return {**before, **{name: _merged(before.get(name), of) for name, of in change.items()}}
 
 
 @functools.cache

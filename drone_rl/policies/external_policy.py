@@ -21,7 +21,7 @@ from drone_rl.config import (
     DynamicsSettings,
     TaskSettings,
 )
-from drone_rl.config.configuration import Changes, as_changes
+from drone_rl.config.configuration import as_changes, changed
 from drone_rl.config.transforms import (
     Fault,
     Frame,
@@ -43,7 +43,7 @@ from drone_rl.utils.display import table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance, shown
 from drone_rl.utils.seeding import Stream
-from drone_rl.utils.settings import Settings, prefixed_errors
+from drone_rl.utils.settings import Settings
 
 _TASK = TaskSettings()
 
@@ -79,26 +79,20 @@ class ExternalPolicy(BasePolicy):
 
     def in_task(self, task: Mapping[str, Any] | None = None, /, **changes: Any) -> "ExternalPolicy":
         """See `BasePolicy`."""
-        changes = {**as_changes(task, "task"), **changes}
         if not isinstance(self.task, Settings):
-            if changes:
+            if changes := {**as_changes(task, "task"), **changes}:
                 raise InputError(
                     f"task.{min(changes)} can't be changed in a task object; give policy_from the "
                     "task's settings"
                 )
             return self
-        changed = Changes(type(self.task)).read(changes, "task")
-        with prefixed_errors("task"):
-            return dataclasses.replace(self, task=self.task.replace(**changed))
+        return dataclasses.replace(self, task=changed(self.task, task, changes, "task"))
 
     def in_dynamics(
         self, dynamics: Mapping[str, Any] | None = None, /, **changes: Any
     ) -> "ExternalPolicy":
         """See `BasePolicy`."""
-        changes = {**as_changes(dynamics, "dynamics"), **changes}
-        changed = Changes(DynamicsSettings).read(changes, "dynamics")
-        with prefixed_errors("dynamics"):
-            now = self.dynamics.replace(**changed)
+        now = changed(self.dynamics, dynamics, changes, "dynamics")
         now.check_air()
         return dataclasses.replace(self, dynamics=now)
 

@@ -21,7 +21,7 @@ from drone_rl.config import (
     BaseTaskSettings,
     DynamicsSettings,
 )
-from drone_rl.config.configuration import Changes, as_changes
+from drone_rl.config.configuration import changed
 from drone_rl.envs import Pipeline
 from drone_rl.policies import ImageNetwork, RecurrentNetwork, make_actor
 from drone_rl.policies.environment import EnvOptions
@@ -248,18 +248,14 @@ class Policy(BasePolicy):
 
     def in_task(self, task: Mapping[str, Any] | None = None, /, **changes: Any) -> "Policy":
         """See `BasePolicy`."""
-        changes = {**as_changes(task, "task"), **changes}
-        changed = Changes(type(self.task)).read(changes, "task")
+        changed_task = changed(self.task, task, changes, "task")
         with prefixed_errors("task"):
-            described = TaskDescription.of(self.task.replace(**changed))
+            described = TaskDescription.of(changed_task)
         return self._described(task=described)
 
     def in_dynamics(self, dynamics: Mapping[str, Any] | None = None, /, **changes: Any) -> "Policy":
         """See `BasePolicy`."""
-        changes = {**as_changes(dynamics, "dynamics"), **changes}
-        changed = Changes(DynamicsSettings).read(changes, "dynamics")
-        with prefixed_errors("dynamics"):
-            return self._described(dynamics=self.dynamics.replace(**changed))
+        return self._described(dynamics=changed(self.dynamics, dynamics, changes, "dynamics"))
 
     def in_appearance(self, appearance: AppearanceSettings | str) -> "Policy":
         """Return the same policy in scenes of another appearance, which may be a name."""

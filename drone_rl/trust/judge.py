@@ -9,7 +9,7 @@ from torchrl.envs import EnvBase
 
 from drone_rl.config import AppearanceSettings, BaseTaskSettings, DynamicsSettings
 from drone_rl.config.commands import HeldOutSettings, JudgeSettings
-from drone_rl.config.configuration import Changes, as_changes, from_arguments
+from drone_rl.config.configuration import Changes, as_changes, changed, from_arguments
 from drone_rl.envs import DroneEnv
 from drone_rl.envs.rollout import Agent
 from drone_rl.policies.baselines import make_baseline
@@ -275,7 +275,9 @@ def _task_of(given: Any) -> Task[Any]:
     """Return a task, by its name or settings, or with changes of the default one's."""
     if given is None or isinstance(given, str | BaseTaskSettings | Task):
         return as_task(given)
-    return as_task(BaseTaskSettings.read(Changes().read(as_changes(given, "task"), "task"), "task"))
+    changes = Changes().read(as_changes(given, "task"), "task")
+    named = {name: value for name, value in changes.items() if name == "name"}
+    return as_task(changed(BaseTaskSettings.read(named, "task"), changes, {}, "task"))
 
 
 @contextmanager

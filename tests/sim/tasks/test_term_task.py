@@ -181,6 +181,17 @@ def test_starts_and_headings_are_drawn_from_their_ranges_away_from_objects():
     assert len(made.task.score(made.task.info(state)).world.unique(dim=0)) == 200
 
 
+def test_changes_of_a_policys_task_keep_the_rest_of_start_and_objects():
+    start, ball = {"x": [-1.0, 1.0], "z": 2.5}, {"x": 7.0}
+    task = BaseTaskSettings.read({"name": "test_reach", "start": start})
+    policy = drone_rl.policy_from(lambda images: images[:, 0, 0, :3], task=task)
+    made = policy.in_task(start={"z": 1.5}, objects={"ball": ball}).task
+    assert made.start == task.start.replace(z=1.5)
+    assert made.objects == {**task.objects, "ball": task.objects["ball"].replace(x=7.0)}
+    fewer = task.replace(objects={"ball": BALL})
+    assert policy.in_task(fewer).task == fewer
+
+
 def test_the_image_is_that_of_the_heading():
     shown = []
     for heading, place in ((0.0, (6.0, 1.0)), (90.0, (-1.0, 6.0))):
