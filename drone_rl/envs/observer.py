@@ -305,7 +305,7 @@ class ImageSource:
             far = torch.where(images == 0, self._maximum, images)
             return (far / self._maximum).clamp(max=1.0)[:, None]
         if self.modality == "normals":
-            return images.movedim(-1, -3).contiguous()
+            return ((images + 1.0) / 2.0).movedim(-1, -3).contiguous()
         kinds = [*self.worlds.scene.semantic_classes, SemanticClass.SKY]
         channels = torch.tensor([_CLASS_CHANNELS[kind] for kind in kinds], device=images.device)
         of = channels[images.long()]  # -1, the sky, is the last one
