@@ -171,7 +171,7 @@ def class_models(
     with subject.flying(min(settings.episodes, _BATCH), seed=seed.value) as (env, actor):
         scenes = Scenes(env, settings.image)
         if scenes.image is None:
-            raise InputError(f"class models need an image, and the policy sees {scenes.seen}")
+            raise InputError(f"class models are images, and {scenes.name} is none; see image")
         network = of_input(network, scenes.name)
         data = collect(env, actor, num_episodes=settings.episodes, observations=scenes.name)
     statistics = image_statistics(data.tensor("observations"))

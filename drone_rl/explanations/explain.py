@@ -12,7 +12,15 @@ from typing import Any
 
 from drone_rl.config.configuration import from_arguments
 from drone_rl.envs import base_env
-from drone_rl.explanations import attribution, behavior, class_models, embedding, response, truth
+from drone_rl.explanations import (
+    attribution,
+    behavior,
+    class_models,
+    embedding,
+    importance,
+    response,
+    truth,
+)
 from drone_rl.explanations.context import Context, LeftOutError, find_lacking
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.results import Explanation
@@ -46,6 +54,7 @@ SECTIONS: dict[str, Section] = {
     "tsne": embedding.section,
     "verdict": behavior.verdict_section,
     "flaws": behavior.flaws_section,
+    "importance": importance.section,
     "response": response.section,
     "asymmetry": response.asymmetry_section,
     "shifts": behavior.shifts_section,

@@ -74,9 +74,8 @@ class Scenes:
         base = base_env(env)
         self.worlds, self.inputs = base.worlds, base.observer.inputs
         images = base.observer.images
-        if name not in (None, *images):
-            names = ", ".join(images) or "none"
-            raise InputError(f"image={name} is not an image that the policy sees: {names}")
+        if name not in (None, *self.inputs):
+            raise InputError(f"the policy does not see {name}, only {', '.join(self.inputs)}")
         self.name: str = name or next(iter([*images, *self.inputs]))
         """Name of the input."""
         self.image: ImageSource | None = images.get(self.name)
