@@ -117,10 +117,11 @@ class AppliedRules:
         if bool(paid.isfinite().all()):
             return
         unusable = zip(self.compiled.rewards, ~paid.isfinite().all(0), strict=True)
-        named = ", ".join(term.name for term, is_unusable in unusable if is_unusable)
+        names = [term.name for term, is_unusable in unusable if is_unusable]
         raise InputError(
-            f"the reward terms {named} have values that are not finite; correct "
-            "their functions, such as a division by 0 or a logarithm of it"
+            f"the reward terms {', '.join(names)} have values that are not finite, also with a "
+            "weight of 0; correct their functions, such as a division by 0 or a logarithm of it, "
+            f"or leave them out: task.reward.{names[0]}=null"
         )
 
     def world(

@@ -2,7 +2,6 @@
 
 import functools
 import re
-from collections.abc import Iterable
 from typing import Any
 
 import warp as wp
@@ -19,7 +18,8 @@ from drone_rl.sim.dynamics.moves_kernel import (
     turned,
 )
 from drone_rl.sim.dynamics.rigid_body_kernel import axes_of
-from drone_rl.sim.dynamics.state import ATTITUDE, VELOCITY
+from drone_rl.sim.dynamics.state import ATTITUDE, POSITION, THING, VELOCITY
+from drone_rl.sim.dynamics.velocity_kernel import Rates, fly_at, glide, rates_of, speeds_of
 from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, PoseArrays
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
@@ -50,10 +50,14 @@ class Episodes:
     world: World
     drones: wp.array[wp.vec3d]
     attitudes: wp.array[wp.vec4d]
-    """Of drones in computer-vision mode."""
+    """Of drones that do not fly, as what follows up to `rates`."""
     moves: wp.array[wp.vec3d]
     """See `ComputerVision.moves`."""
     turns: wp.array[wp.vec2d]
+    seconds: wp.float64
+    """Duration of a step at rates."""
+    rates: Rates
+    """Meaning of continuous actions."""
     speeds: wp.array[wp.vec4]
     """`Step.action` of each action."""
     fleet: Fleet
@@ -132,7 +136,7 @@ def _checked(before: Any, term: Any, number: int) -> Any:
     @wp.func
     def find(world: World, step: Step) -> int:
         found = int(before(world, step))
-        if found == 0 and term(step, world.parameters):
+        if found == 0 and bool(term(step, world.parameters)):  # a vector is an error of Warp
             found = number
         return found
 
@@ -286,23 +290,41 @@ class Rules:
         def move(envs: Episodes, env: int, action: int) -> float:
             """Move a drone by its dynamics and apply the rules. Returns the reward."""
             motion = Motion()
-            motion.before = envs.drones[env]
-            motion.action = envs.speeds[action]
-            motion.thing = NOTHING
             if is_flying(envs.fleet):
-                motion.now = fly_move(envs.fleet, env, action)
-                motion.is_lost = is_lost(envs.fleet, env)
-                motion.attitude = four(envs.fleet.numbers, env, ATTITUDE)
-                motion.velocity = three(envs.fleet.numbers, env, VELOCITY)
+                fly_move(envs.fleet, env, action)
+                motion = flown(envs, env)
             else:
                 attitude = envs.attitudes[env]
+                motion.before = envs.drones[env]
                 motion.now = motion.before + along_heading(attitude, envs.moves[action])
                 envs.attitudes[env] = turned(attitude, envs.turns[action])
                 motion.attitude = wp.vec4(envs.attitudes[env])
+                motion.thing = NOTHING
+            motion.action = envs.speeds[action]
             envs.drones[env] = motion.now
             return float(advance(envs.world, env, motion))
 
-        self.step_all, self.move = step_all, move
+        @wp.func
+        def steer(envs: Episodes, env: int, action: wp.array[float]) -> float:
+            """Do the same with a continuous action."""
+            motion = Motion()
+            rates = rates_of(envs.rates, action)
+            if is_flying(envs.fleet):
+                fly_at(envs.fleet, env, rates)
+                motion = flown(envs, env)
+            else:
+                motion.before = envs.drones[env]
+                after = glide(motion.before, envs.attitudes[env], rates, envs.seconds)
+                envs.attitudes[env] = after.attitude
+                motion.now = after.position
+                motion.attitude = wp.vec4(after.attitude)
+                motion.velocity = wp.vec3(after.velocity)
+                motion.thing = NOTHING
+            motion.action = speeds_of(envs.rates, action)
+            envs.drones[env] = motion.now
+            return float(advance(envs.world, env, motion))
+
+        self.step_all, self.move, self.steer = step_all, move, steer
 
     @functools.cache  # noqa: B019 (rules are kept for ever, see `make_rules`)
     def load(self) -> None:
@@ -315,18 +337,58 @@ class Rules:
         try:
             wp.load_module(self.step_all.module, device="cpu")
         except Exception as error:
-            raise InputError(_compile_error(str(error), self.terms)) from error
+            raise InputError(self._compile_error(str(error))) from error
+
+    def _compile_error(self, text: str) -> str:
+        """Return one line about the innermost line of code that Warp's message names."""
+        places = re.findall(r'parsing function "(.*?)" at (.*?):(\d+)', text)
+        reason = text.splitlines()[-1].lstrip(";") if text else "no reason given"
+        if places and places[-1][1] != __file__:
+            function, file, line = places[-1]
+            where = f"line {line} of {file}: {function}"
+            return f"{where} can't be compiled by Warp ({reason}); correct it"
+        for number, term in enumerate(self.terms):  # what it returns is wrong
+            is_reward = number < len(self.rewards)
+            if not term.module.startswith("drone_rl.") and not _returns(term, is_reward):
+                what = "a number, as in -> float" if is_reward else "a truth value, as in -> bool"
+                return f"{place_of(term.function)}: no value to use ({reason}); return {what}"
+        return f"the terms can't be compiled by Warp ({reason}); correct them"
 
 
-def _compile_error(text: str, terms: Iterable[Term]) -> str:
-    """Return one line about the innermost line of code that Warp's message names."""
-    places = re.findall(r'parsing function "(.*?)" at (.*?):(\d+)', text)
-    reason = text.splitlines()[-1].lstrip(";") if text else "no reason given"
-    if not places or places[-1][1] == __file__:  # where it is called
-        names = ", ".join(term.name for term in terms if not term.module.startswith("drone_rl."))
-        return f"the terms {names} can't be compiled by Warp ({reason}); correct them"
-    function, file, line = places[-1]
-    return f"line {line} of {file}: {function} can't be compiled by Warp ({reason}); correct it"
+def _returns(term: Term, is_reward: bool) -> bool:
+    """Return whether Warp compiles a term alone: a number, or else a truth value."""
+    call = bound(term, 0)
+
+    @wp.kernel(module="unique", module_options=_OPTIONS)
+    def pay(numbers: wp.array[wp.float64]) -> None:
+        numbers[0] = wp.float64(call(Step(), numbers))
+
+    @wp.kernel(module="unique", module_options=_OPTIONS)
+    def check(numbers: wp.array[wp.float64]) -> None:
+        if bool(call(Step(), numbers)):
+            numbers[0] = wp.float64(1.0)
+
+    try:
+        wp.load_module((pay if is_reward else check).module, device="cpu")
+    except Exception:  # any of Warp's
+        return False
+    return True
+
+
+@wp.func
+def flown(envs: Episodes, env: int) -> Motion:
+    """Return the motion of a drone that has flown, without its action."""
+    numbers = envs.fleet.numbers
+    motion = Motion()
+    motion.before = envs.drones[env]
+    motion.now = wp.vec3d(
+        numbers[env, POSITION], numbers[env, POSITION + 1], numbers[env, POSITION + 2]
+    )
+    motion.is_lost = is_lost(envs.fleet, env)
+    motion.attitude = four(numbers, env, ATTITUDE)
+    motion.velocity = three(numbers, env, VELOCITY)
+    motion.thing = int(numbers[env, THING])
+    return motion
 
 
 @wp.func

@@ -18,16 +18,15 @@ from drone_rl.sim.tasks.applied_rules import AppliedRules, reward_terms
 from drone_rl.sim.tasks.common import Side
 from drone_rl.sim.tasks.geometry_kernel import GOAL
 from drone_rl.sim.tasks.objects import ObjectState, ObjectTask
-from drone_rl.sim.tasks.rules_kernel import SUCCESS, make_rules
+from drone_rl.sim.tasks.rules_kernel import RUNNING, SUCCESS, make_rules
 from drone_rl.sim.tasks.scene_edits import Range, SceneEdits
+from drone_rl.sim.tasks.strata import PHRASES, START_AXES, Strata
 from drone_rl.sim.tasks.task import Goals, register_task
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.utils.errors import InputError
 
 _MOST_TRIES, _TRIES = 1000, 20
 """Most samples of all objects until none is too near to another one; samples of each object."""
-_START = ("x", "y", "z", "heading")
-_SIDES = {"left": "on its left", "ahead": "ahead", "right": "on its right"}
 _LAST_ENDS = ("STEP_LIMIT", "LOST_CONTROL")
 
 
@@ -107,10 +106,14 @@ class TermTask(ObjectTask):
         kinds: Any = enum.IntEnum("End", ["RUNNING", "SUCCESS", *own, *_LAST_ENDS], start=0)
         self.ends = kinds
         self.truncation = self.expected_end = kinds["STEP_LIMIT"]
+        self._strata = Strata(s)
+        self.strata = tuple(self._strata.phrases)
         self.vocabulary = TaskVocabulary(
             tested=f"scenes of the task {s.name}",
-            sides=_SIDES,
-            places=_SIDES,
+            sides=self._strata.phrases,
+            places=PHRASES,
+            labels={"side": "bearing and distance at the start"},
+            **({} if success.name == "all_goals" else _own_success(success.name)),
         )
         self.edits = self._edits()
         self.curriculum = Curriculum(s) if s.curriculum else None
@@ -145,7 +148,7 @@ class TermTask(ObjectTask):
         s = self.settings if self.curriculum is None else self.curriculum.ranges
         crowded = ""
         for _ in range(_MOST_TRIES):
-            *start, heading = (random_state.uniform(*s.start.range_of(axis)) for axis in _START)
+            *start, heading = (random_state.uniform(*s.start.range_of(axis)) for axis in START_AXES)
             placed, crowded = self._placed(s, start, random_state)
             if not crowded:
                 places = np.concatenate([[*start, math.radians(heading)], *placed])
@@ -207,12 +210,16 @@ class TermTask(ObjectTask):
         }
 
     def score(self, info: Mapping[str, Tensor]) -> Goals:
-        """Return the goals; their strata are the sides on which they came up.
+        """Return the goals; see `Strata`.
 
-        A success counts as all of them: its own meaning may need only some.
+        If success has another meaning, its episode's end counts for all of them.
         """
-        reached = info["reached"] | (info["end_reason"] == SUCCESS)
-        return Goals(reached, info["sides"], info["sampled"].double())
+        reached, sampled, end = (info[name] for name in ("reached", "sampled", "end_reason"))
+        if self.vocabulary.succeed:
+            reached = torch.where(end == RUNNING, reached, end == SUCCESS)
+        places = sampled[:, 4:].unflatten(1, (-1, 3))[:, self.goals.to(sampled.device)]
+        stratum = self._strata.of(sampled[:, :4], places).where(info["sides"] >= 0, -1)
+        return Goals(reached, stratum, sampled.double())
 
     def _edits(self) -> SceneEdits:
         """Return changes of its scenes; random goals are as far ahead as goals ever are."""
@@ -236,6 +243,11 @@ class TermTask(ObjectTask):
         heights = sorted({z - self.origin[2] for of in goals for z in of.range_of("z")})
         course = math.radians(first) if first == last else None
         return SceneEdits(self, reach, ahead, ahead, tuple(heights), course=course)
+
+
+def _own_success(name: str) -> dict[str, str]:
+    """Return the words of a task in which success is more than to reach every goal, or less."""
+    return {"reach": "succeed with", "reached": "with success", "succeed": f"succeed ({name})"}
 
 
 def define_task(name: str, **settings: Any) -> type[TermTaskSettings]:

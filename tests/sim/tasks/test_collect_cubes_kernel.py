@@ -137,14 +137,14 @@ FLIGHT, VELOCITIES = DynamicsSettings(mode="simple_flight"), ActionSettings(kind
         (CollectCubes, ComputerVision(), True),
         (CollectCubes, Quadrotor(FLIGHT), True),
         (CollectCubes, Windy(), False),
-        (CollectCubes, Quadrotor(FLIGHT, VELOCITIES), False),
+        (CollectCubes, Quadrotor(FLIGHT, VELOCITIES), True),
         (Strict, ComputerVision(), False),
         (Raised, ComputerVision(), False),
         (Solid, Quadrotor(FLIGHT), False),
         (Pillars, ComputerVision(), True),
-        (Pillars, Quadrotor(FLIGHT), False),
+        (Pillars, Quadrotor(FLIGHT), True),
     ],
 )
-def test_only_unchanged_rules_and_moves_are_fused(task, dynamics, is_supported):
+def test_only_unchanged_rules_are_fused(task, dynamics, is_supported):
     worlds = Worlds(1, task(), dynamics=dynamics)
     assert (fused_rules(worlds.task, dynamics, worlds.state) is not None) == is_supported

@@ -256,10 +256,15 @@ def uncompiled(step: Step) -> float:
     return len([step.time])
 
 
-@pytest.mark.parametrize("term", ["test_undefined", "test_uncompiled"])
+@reward("test_nothing")
+def nothing(step: Step):
+    """Not a value."""
+
+
+@pytest.mark.parametrize("term", ["test_undefined", "test_uncompiled", "test_nothing"])
 def test_unusable_terms_are_named(term):
     with pytest.raises(InputError, match=term.removeprefix("test_")):
-        fly(worlds(reward={term: 1.0}), FORWARD)
+        fly(worlds(reward={"test_near": 1.0, term: 0.0}), FORWARD)
 
 
 @pytest.mark.parametrize("start", [{}, {"y": [-3.0, 3.0], "heading": [-90.0, 90.0]}])
@@ -387,9 +392,24 @@ def any_goal(step: Step) -> bool:
     return step.remaining <= 1
 
 
-@pytest.mark.parametrize(("success", "reached"), [("test_any_goal", 2), ("all_goals", 1)])
-def test_a_success_counts_as_all_goals(success, reached):
+@drone_rl.success("test_late_goals")
+def late_goals(step: Step) -> bool:
+    """Every goal is reached, and a minute is over."""
+    return step.remaining == 0 and step.time > 60.0
+
+
+@pytest.mark.parametrize(
+    ("success", "reached", "finally_reached"),
+    [("test_any_goal", 2, 2), ("test_late_goals", 1, 0), ("all_goals", 1, 1)],
+)
+def test_goals_count_by_the_success_of_the_episode(success, reached, finally_reached):
     far = {**BALL, "x": 30.0}
     made = worlds(objects={"ball": BALL, "far": far}, success=[success])
     fly(made, *[FORWARD] * 5)  # at x = 5 the drone touches the nearer ball of radius 1 at x = 6
     assert int(made.task.score(made.info()).reached.sum()) == reached
+    fly(made, *[FORWARD] * 7)  # to the step limit
+    assert int(made.task.score(made.info()).reached.sum()) == finally_reached
+    words = made.task.vocabulary
+    assert words.succeeds == (
+        "reaches every goal" if success == "all_goals" else f"succeeds ({success})"
+    )
