@@ -1,8 +1,8 @@
 """Section "importance": how far the actions depend on each input of a policy that has several.
 
-An input is replaced by that of another episode, all others stay as they are. Its control is a
-placebo: the same input, measured twice in the same states. Both differ by the input's own random
-errors alone, so an input that holds nothing but random numbers has no more effect than its control.
+An input is replaced by that of another episode, all others stay as they are. The placebo is the
+same input, measured twice in the same states. Both differ by the input's own random errors alone,
+so an input that holds nothing but random numbers has no more effect than its placebo.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ from drone_rl.explanations.hooks import probabilities, rest_in
 from drone_rl.explanations.results import Importance, InputEffect, Median
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.sim.tasks import State
-from drone_rl.utils.intervals import episode_means, mean_interval, median_bounds
+from drone_rl.utils.intervals import episode_means, median_bounds
 
 DRAWS = 4
 """Other frames, and pairs of measurements, for each frame."""
@@ -35,7 +35,7 @@ def section(context: Context) -> Importance | None:
     state, seed, episode = data.state(scenes.worlds), context.seed.value, data.episode
     base = _evaluate(context, inputs)
     effects = {name: np.zeros(len(data)) for name in inputs}
-    controls = {name: np.zeros(len(data)) for name in inputs}
+    placebos = {name: np.zeros(len(data)) for name in inputs}
     for draw in range(DRAWS):
         other = torch.from_numpy(other_frames(episode, np.random.default_rng([seed, draw])))
         again = [measured(scenes, state, (seed, draw, number)) for number in range(2)]
@@ -43,20 +43,25 @@ def section(context: Context) -> Importance | None:
             changed = _evaluate(context, {**inputs, name: values[other]})
             effects[name] += _distance(context, changed, base) / DRAWS
             one, two = (_evaluate(context, {**inputs, name: of[name]}) for of in again)
-            controls[name] += _distance(context, one, two) / DRAWS
-    found = {name: compare(effects[name], controls[name], episode) for name in scenes.inputs}
+            placebos[name] += _distance(context, one, two) / DRAWS
+    found = {name: compare(effects[name], placebos[name], episode) for name in scenes.inputs}
     return Importance(inputs=found, least=LEAST, level=LEVEL)
 
 
-def compare(effect: NDArray, control: NDArray, episode: NDArray) -> InputEffect:
-    """Return the effect of an input in frames next to its control. Shapes: (T,)."""
-    excess = episode_means(effect - control, episode)
-    lower, upper = median_bounds(excess, 1.0 - 2 * LEVEL) or (None, None)
+def compare(effect: NDArray, placebo: NDArray, episode: NDArray) -> InputEffect:
+    """Compare the effect of an input in frames with that of its placebo. Shapes: (T,)."""
+
+    def median(values: NDArray) -> Median:
+        means = episode_means(values, episode)
+        lower, upper = median_bounds(means, 1.0 - 2 * LEVEL) or (None, None)
+        return Median(median=float(np.median(means)), lower=lower, upper=upper)
+
+    excess = median(effect - placebo)
     return InputEffect(
-        effect=mean_interval(effect, episode),
-        control=mean_interval(control, episode),
-        excess=Median(median=float(np.median(excess)), lower=lower, upper=upper),
-        matters=lower is not None and lower > LEAST,
+        effect=median(effect),
+        placebo=median(placebo),
+        excess=excess,
+        matters=(excess.lower or 0.0) > LEAST,
     )
 
 

@@ -184,14 +184,14 @@ class Median(Model):
 
 
 class InputEffect(Model):
-    """How far the action probabilities depend on one input."""
+    """How far the action probabilities depend on one input; bounds hold with 1 - level each."""
 
-    effect: Mean
+    effect: Median
     """Their distance if the input is that of another episode."""
-    control: Mean
+    placebo: Median
     """Their distance if it is measured twice in the same states."""
     excess: Median
-    """Effect without control."""
+    """Effect minus placebo."""
     matters: bool
     """Whether the lower bound of the excess is more than `Importance.least`."""
 

@@ -58,11 +58,11 @@ def context_of(**weights):
 
 def test_images_matter_and_random_numbers_do_not():
     found = section(context_of(gray=300.0, altitude=1.0, placebo=3.0)).inputs
-    assert found["gray"].matters and found["gray"].control.mean == 0.0
-    assert not found["altitude"].matters and found["altitude"].effect.mean == 0.0
+    assert found["gray"].matters and found["gray"].placebo.median == 0.0
+    assert not found["altitude"].matters and found["altitude"].effect.upper == 0.0
     placebo = found["placebo"]
-    assert placebo.effect.mean > 0.1 and not placebo.matters
-    assert placebo.control.mean == pytest.approx(placebo.effect.mean, abs=0.05)
+    assert placebo.effect.lower > 0.1 and not placebo.matters
+    assert placebo.placebo.median == pytest.approx(placebo.effect.median, abs=0.05)
 
 
 def test_the_excess_is_a_median_of_episodes():
@@ -70,7 +70,7 @@ def test_the_excess_is_a_median_of_episodes():
     effect = np.where(np.arange(40) % 2, 0.5, 0.1)  # 0.3 in each episode
     found = compare(effect, np.full(40, 0.1), episode)
     assert (found.excess.median, found.excess.lower) == pytest.approx((0.2, 0.2))
-    assert found.matters and found.effect.mean == pytest.approx(0.3)
+    assert found.matters and found.effect.median == pytest.approx(0.3)
     assert not compare(effect, effect - 0.005, episode).matters  # too little
     assert not compare(effect[:8], np.zeros(8), episode[:8]).matters  # too few episodes
 

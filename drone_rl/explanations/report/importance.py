@@ -3,7 +3,7 @@
 from matplotlib.figure import Figure
 
 from drone_rl.explanations.report.part import Part
-from drone_rl.explanations.report.truth import interval_chart, score_row
+from drone_rl.explanations.report.truth import Row, interval_chart
 from drone_rl.explanations.results import Importance
 from drone_rl.utils.palette import FAINT, GOOD, MUTED, css
 
@@ -12,9 +12,12 @@ def effects_chart(importance: Importance) -> Figure:
     """Plot the effect of each input above that of its placebo."""
     rows = []
     for name, one in importance.inputs.items():
-        rows.append(score_row(name, css(GOOD if one.matters else FAINT), one.effect))
-        rows.append(score_row(f"placebo: {name} measured again", css(MUTED), one.control))
-    return interval_chart(rows, importance.least, "probability that the action changes (line: 95%)")
+        color = css(GOOD if one.matters else FAINT)
+        rows.append(Row(name, color, *one.effect.model_dump().values()))
+        placebo = f"placebo: {name} measured again"
+        rows.append(Row(placebo, css(MUTED), *one.placebo.model_dump().values()))
+    title = "change of the action probabilities\n(median of episodes; line: 99.8%)"
+    return interval_chart(rows, importance.least, title)
 
 
 PART = Part(

@@ -40,8 +40,8 @@ def truth_charts(truth: Truth) -> dict[str, Figure]:
     colors = {name: css(GOOD if of.trusted else FAINT) for name, of in truth.methods.items()}
     ordered = sorted(truth.placebos.items(), key=lambda item: -(item[1].mean or 0.0))
     methods = truth.methods.items()
-    scores = [score_row(METHOD_NAMES[n], colors[n], of.score) for n, of in methods]
-    scores += [score_row(f"placebo: {name}", css(MUTED), score) for name, score in ordered]
+    scores = [_score_row(METHOD_NAMES[n], colors[n], of.score) for n, of in methods]
+    scores += [_score_row(f"placebo: {name}", css(MUTED), score) for name, score in ordered]
     title = "agreement with the patches that affect\nthe policy (score; chance: 0; line: 95%)"
     charts = [interval_chart(scores, 0.0, title)]
     for title, (limit, result_of) in _TESTS.items():
@@ -54,8 +54,7 @@ def truth_charts(truth: Truth) -> dict[str, Figure]:
     return {chart.axes[0].get_title().replace("\n", " "): chart for chart in charts}
 
 
-def score_row(label: str, color: str, score: Mean) -> Row:
-    """Return a mean as a row of a chart."""
+def _score_row(label: str, color: str, score: Mean) -> Row:
     return Row(label, color, score.mean, score.lower95, score.upper95)
 
 
