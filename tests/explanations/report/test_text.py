@@ -86,7 +86,7 @@ def text(tmp_path, monkeypatch):
         ("response", "at 60.0% of the places on its left, 50.0%",
          {"response.rows.0.blind": None}, {}),
         ("summary", "depend on depth, of depth and goal", {"importance": None}, {}),
-        ("importance", "The actions depend on depth: they change by 0.200 (99.8% CI 0.100 to 0.300)",
+        ("importance", "The actions depend on depth: they change by 0.200 (99.8% CI 0.100",
          {"importance.inputs.depth.matters": False}, {}),
         ("importance", "hardly depend on goal", {"importance.inputs.goal.excess.upper": 0.02}, {}),
         ("importance", "not certain whether the actions depend on goal",
