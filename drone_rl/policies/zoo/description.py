@@ -52,7 +52,7 @@ from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.models import Model
 from drone_rl.utils.plugins import described, errors_of
-from drone_rl.utils.schema import Text
+from drone_rl.utils.schema import Text, shown
 from drone_rl.utils.seeding import Stream, as_global_stream, plain_generator
 from drone_rl.utils.settings import Settings
 
