@@ -126,9 +126,9 @@ def gridded(pictures: Sequence[Image.Image], columns: int, gap: int = 12) -> Ima
 def shown_picture(observation: NDArray, low: float, high: float, channels: str) -> NDArray:
     """Convert the newest frame of an observation, shape (C, H, W), to an RGB image, uint8.
 
-    `low` is shown as black, `high` as white. The channels are "gray", "rgb", "classes", each
-    in its color, or "chromaticity" of red and blue. Their green is 1 minus the mean of both: the image distinguishes colors and does
-    not show those of the scene. Shape: (H, W, 3).
+    `low` is shown as black, `high` as white. The channels are "gray", "rgb", "classes", each in its
+    color, or "chromaticity" of red and blue. Their green is 1 minus the mean of both: the image
+    distinguishes colors and does not show those of the scene. Shape: (H, W, 3).
     """
     newest = observation[-_CHANNELS.get(channels, 1) :].astype(np.float64)
     share = ((newest - low) / max(high - low, 1e-12)).clip(0, 1)
