@@ -120,10 +120,9 @@ class FusedEpisodes:
         reasons = [*_not_fused(env), *_not_fused_policy(env, actor)]
         worlds = env.worlds
         rules = fused_rules(worlds.task, worlds.dynamics, worlds.state)
-        if rules is None:
-            names = f"{type(worlds.task).__name__} with {type(worlds.dynamics).__name__}"
-            reasons.append(f"task {names} is not fused")
-        if reasons or rules is None:
+        if isinstance(rules, str):
+            return Reasons([rules, *reasons])
+        if reasons:
             return Reasons(reasons)
         lines, view = Transforms(env.observer).visible, env.observer.image.view
         hidden = view.height - (lines.stop - lines.start)

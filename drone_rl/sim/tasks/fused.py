@@ -23,12 +23,16 @@ from drone_rl.sim.tasks.rules_kernel import Episodes, place
 from drone_rl.sim.tasks.task import State, Task
 
 
-def fused_rules(task: Task[Any], dynamics: Dynamics, state: State) -> "FusedObjects | None":
-    """Return environments as many as states for the fused kernel, or None if it lacks the rules."""
-    if not isinstance(task, ObjectTask) or not follows_rules(task):
-        return None
+def fused_rules(task: Task[Any], dynamics: Dynamics, state: State) -> "FusedObjects | str":
+    """Return environments as many as states for the fused kernel, or why it lacks the rules."""
     is_known = type(dynamics) in (ComputerVision, Kinematic, Quadrotor)
-    return FusedObjects(task, dynamics, state) if is_known else None
+    if not isinstance(task, ObjectTask) or not follows_rules(task) or not is_known:
+        return f"task {type(task).__name__} with {type(dynamics).__name__} is not fused"
+    if isinstance(dynamics, Quadrotor) and any(
+        of.event and of.role == "obstacle" for of in task.each
+    ):
+        return "flight among obstacles that events move is not fused"
+    return FusedObjects(task, dynamics, state)
 
 
 class FusedObjects:
@@ -75,11 +79,11 @@ class FusedObjects:
         """Return the sum of each reward term in the first episodes. Shape: (count, R), float32.
 
         Raises:
-            InputError: A term is not finite.
+            InputError: A term or an event is not finite.
         """
-        sums = self._state.paid[:count]
-        self._rules.check(sums)
-        return sums.float()
+        state = self._state[:count]
+        self._rules.check(state)
+        return state.paid.float()
 
     def begin(self, state: Any) -> None:
         """Copy states at the start of episodes."""

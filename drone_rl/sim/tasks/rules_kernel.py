@@ -26,6 +26,7 @@ from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.tasks.geometry_kernel import NOTHING, Objects
 from drone_rl.sim.tasks.step_kernel import (
     Motion,
+    Mover,
     Step,
     World,
     choose_nearest,
@@ -76,7 +77,7 @@ def _rounded(numbers: wp.array[wp.float64], i: int) -> float:
 
 
 def bound(term: Term, first: int) -> Any:  # noqa: C901 (functions that Warp compiles)
-    """Return a term as a Warp function of a step and all parameters; its own begin at `first`."""
+    """Return a term as a Warp function of what it reads and all parameters, from `first` on."""
     place = place_of(term.function) if term.function else term.name
     with errors_of(f"the term {term.name}", place):
         function = wp.func(term.function)
@@ -86,31 +87,31 @@ def bound(term: Term, first: int) -> Any:  # noqa: C901 (functions that Warp com
     if count == 0:
 
         @wp.func
-        def call(step: Step, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
+        def call(step: Any, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
             return function(step)
 
     elif count == 1:
 
         @wp.func
-        def call(step: Step, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
+        def call(step: Any, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
             return function(step, read(p, first))
 
     elif count == 2:
 
         @wp.func
-        def call(step: Step, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
+        def call(step: Any, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
             return function(step, read(p, first), read(p, first + 1))
 
     elif count == 3:
 
         @wp.func
-        def call(step: Step, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
+        def call(step: Any, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
             return function(step, read(p, first), read(p, first + 1), read(p, first + 2))
 
     else:
 
         @wp.func
-        def call(step: Step, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
+        def call(step: Any, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
             return function(
                 step, read(p, first), read(p, first + 1), read(p, first + 2), read(p, first + 3)
             )
@@ -143,6 +144,24 @@ def _checked(before: Any, term: Any, number: int) -> Any:
     return find
 
 
+def _moving(before: Any, term: Any, number: int) -> Any:
+    """Return the velocity of the events before and a further one, which moves objects by number."""
+
+    @wp.func
+    def velocity(world: World, mover: Mover, event: int) -> wp.vec3:
+        found = before(world, mover, event)
+        if event == number:
+            found = found + term(mover, world.parameters)
+        return found
+
+    return velocity
+
+
+@wp.func
+def _no_velocity(world: World, mover: Mover, event: int) -> wp.vec3:
+    return wp.vec3()
+
+
 @wp.func
 def _no_reward(world: World, env: int, step: Step) -> wp.float64:
     return wp.float64(0.0)
@@ -158,6 +177,7 @@ def make_rules(
     rewards: tuple[Term, ...],
     ends: tuple[Term, ...],
     success: Term,
+    events: tuple[tuple[int, Term], ...] = (),
     *,
     touch: Any = touch_solid,
     choose: Any = choose_nearest,
@@ -169,11 +189,12 @@ def make_rules(
         rewards: Terms of the reward.
         ends: Reasons to end an episode; earlier ones precede later ones, and success.
         success: The meaning of success.
+        events: What moves objects, with the number that `World.events` has for it.
         touch: Rule of contact, see `touch_solid`.
         choose: Rule of what is ahead, see `choose_nearest`.
         success_first: Whether success precedes the other ends.
     """
-    return Rules(rewards, ends, success, touch, choose, success_first)
+    return Rules(rewards, ends, success, events, touch, choose, success_first)
 
 
 class Rules:
@@ -184,13 +205,14 @@ class Rules:
         rewards: tuple[Term, ...],
         ends: tuple[Term, ...],
         success: Term,
+        events: tuple[tuple[int, Term], ...],
         touch: Any,
         choose: Any,
         success_first: bool,
     ) -> None:
         """Fold the terms into one function."""
-        self.terms = (*rewards, *ends, success)
-        self.rewards = rewards
+        self.terms = (*rewards, *ends, success, *(term for _, term in events))
+        self.rewards, self.events = rewards, tuple(term for _, term in events)
         first, pay, find = 0, _no_reward, _no_end
         for number, term in enumerate(rewards):
             pay = _added(pay, bound(term, first), number)
@@ -198,6 +220,10 @@ class Rules:
         checks = []
         for number, term in (*enumerate(ends, SUCCESS + 1), (SUCCESS, success)):
             checks.append((bound(term, first), number))
+            first += len(term.parameters)
+        velocity = _no_velocity
+        for number, term in events:
+            velocity = _moving(velocity, bound(term, first), number)
             first += len(term.parameters)
         if success_first:
             checks.insert(0, checks.pop())
@@ -207,8 +233,22 @@ class Rules:
         lost_control = step_limit + 1
 
         @wp.func
+        def move_objects(world: World, env: int, drone: wp.vec3d):  # noqa: ANN202 (none)
+            objects = world.objects
+            for i in range(world.events.shape[0]):
+                mover = Mover()
+                mover.place = wp.vec3(objects.places[env, i])
+                mover.drone = wp.vec3(drone)
+                mover.time = (float(world.steps[env]) + 0.5) * world.seconds
+                mover.phase = float(world.phases[env, i])
+                moved = wp.vec3d(world.seconds * velocity(world, mover, world.events[i]))
+                objects.moved[env, i] = moved
+                objects.places[env, i] = objects.places[env, i] + moved
+
+        @wp.func
         def advance(world: World, env: int, motion: Motion) -> wp.float64:
             """Apply all rules; write the end reason and return the reward."""
+            move_objects(world, env, motion.before)
             axes = axes_of(motion.attitude)
             step = see(
                 world,
@@ -254,7 +294,9 @@ class Rules:
             env = wp.tid()
             of = constants.objects
             world = World(
-                Objects(of.shapes, of.roles, of.sizes, of.turns, places, present, touched),
+                Objects(
+                    of.shapes, of.roles, of.sizes, of.turns, places, present, touched, of.moved
+                ),
                 constants.low,
                 constants.high,
                 constants.radius,
@@ -272,6 +314,8 @@ class Rules:
                 paid,
                 steps,
                 end_reasons,
+                constants.events,
+                constants.phases,
             )
             motion = Motion()
             motion.before = before[env]
@@ -347,16 +391,24 @@ class Rules:
             function, file, line = places[-1]
             where = f"line {line} of {file}: {function}"
             return f"{where} can't be compiled by Warp ({reason}); correct it"
-        for number, term in enumerate(self.terms):  # what it returns is wrong
-            is_reward = number < len(self.rewards)
-            if not term.module.startswith("drone_rl.") and not _returns(term, is_reward):
-                what = "a number, as in -> float" if is_reward else "a truth value, as in -> bool"
+        for term in self.terms:  # what it returns is wrong
+            own = (self.rewards, self.events)
+            kind = next((i for i, terms in enumerate(own) if term in terms), len(own))
+            if not term.module.startswith("drone_rl.") and not _returns(term, kind):
+                what = _VALUES[kind]
                 return f"{place_of(term.function)}: no value to use ({reason}); return {what}"
         return f"the terms can't be compiled by Warp ({reason}); correct them"
 
 
-def _returns(term: Term, is_reward: bool) -> bool:
-    """Return whether Warp compiles a term alone: a number, or else a truth value."""
+_VALUES = (
+    "a number, as in -> float",
+    "a velocity, as in -> wp.vec3",
+    "a truth value, as in -> bool",
+)
+
+
+def _returns(term: Term, kind: int) -> bool:
+    """Return whether Warp compiles a term alone, with one of `_VALUES`."""
     call = bound(term, 0)
 
     @wp.kernel(module="unique", module_options=_OPTIONS)
@@ -364,12 +416,17 @@ def _returns(term: Term, is_reward: bool) -> bool:
         numbers[0] = wp.float64(call(Step(), numbers))
 
     @wp.kernel(module="unique", module_options=_OPTIONS)
+    def shift(numbers: wp.array[wp.float64]) -> None:
+        velocity = wp.vec3() + call(Mover(), numbers)
+        numbers[0] = wp.float64(velocity[0])
+
+    @wp.kernel(module="unique", module_options=_OPTIONS)
     def check(numbers: wp.array[wp.float64]) -> None:
         if bool(call(Step(), numbers)):
             numbers[0] = wp.float64(1.0)
 
     try:
-        wp.load_module((pay if is_reward else check).module, device="cpu")
+        wp.load_module((pay, shift, check)[kind].module, device="cpu")
     except Exception:  # any of Warp's
         return False
     return True
