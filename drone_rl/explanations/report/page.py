@@ -106,7 +106,7 @@ def render_page(explanations: Sequence[Explanation], folder: Path) -> str:
             html = render_section(name, explanations, folder)
             parts.append({"id": name, "title": part.title, "label": part.label, "html": html})
     environment = _environment()
-    several = len(explanations) > 1
+    several = len({str(e.provenance.get("policy", e.name)) for e in explanations}) > 1
     style, script = static_text(environment, STYLES), static_text(environment, SCRIPTS)
     return environment.get_template("report.html").render(
         title="Can these policies be trusted?" if several else "Can this policy be trusted?",
