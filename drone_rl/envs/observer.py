@@ -255,24 +255,24 @@ class ImageSource:
     ) -> None:
         """Take the input's name, its worlds, what it is, and the random streams of its faults."""
         self.worlds, self.seen, self.faults = worlds, seen, Pipeline()
-        self._modality, self._maximum = "rgb", 1.0
+        self.modality, self._maximum = "rgb", 1.0
         self._to_rgb = RgbPixels()
         transforms, view = seen, worlds.policy_view
         if isinstance(seen, ImageInput):
             camera, (height, width) = seen.settings, seen.size
-            self._modality, self._maximum = seen.modality, seen.maximum or 1.0
+            self.modality, self._maximum = seen.modality, seen.maximum or 1.0
             transforms = [transform.make() for transform in seen.transforms]
             view = worlds.view(CAMERAS[seen.camera.name], seen.modality, height, width)
             view = dataclasses.replace(view, horizontal_fov=camera.horizontal_fov)
         assert not isinstance(transforms, ImageInput)
         self.transforms: tuple[Transform, ...] = tuple(t for t in transforms if is_of_pixels(t))
         first, rest, self.view = next(iter(self.transforms), None), self.transforms, view
-        self._has_bytes = self._modality == "rgb" and type(first) not in (GrayPixels, RgbPixels)
-        if self._modality == "rgb" and type(first) is GrayPixels:
+        self._has_bytes = self.modality == "rgb" and type(first) not in (GrayPixels, RgbPixels)
+        if self.modality == "rgb" and type(first) is GrayPixels:
             self.view = dataclasses.replace(view, modalities=("gray",))
             frame = torch.zeros(1, view.height, view.width, 3, dtype=torch.uint8)
             rest = without_identities(self.transforms, frame)[1:]
-        elif self._modality == "rgb" and type(first) is RgbPixels:
+        elif self.modality == "rgb" and type(first) is RgbPixels:
             rest = self.transforms[1:]
         self.pipeline = Pipeline(rest, streams, worlds.num_envs, key=key_of(name))
         """Transforms after gray or rgb, if those are the first."""
@@ -284,25 +284,27 @@ class ImageSource:
     ) -> Tensor:
         """See `Observer.observe`. Shape: (k, *)."""
         images = self.worlds.render(state, self.view, appearance)
-        if self._modality == "rgb":
+        if self.modality == "rgb":
             if self.view.modalities == ("gray",):
                 images = images[:, None]
             elif self.faults.stages or not self._has_bytes:
                 images = self._to_rgb._apply_transform(images)
         else:
-            images = self._measured(images)
+            images = self.measured(images)
         images = self.faults(images, rows, starts)
         if self.faults.stages and self._has_bytes:
             images = (images * 255).round().to(torch.uint8).movedim(-3, -1)
         self.last = images
         return self.pipeline(images, rows, starts)
 
-    def _measured(self, images: Tensor) -> Tensor:
-        """Return rendered images of other modalities than colors as floats. Shape: (k, C, H, W)."""
-        if self._modality == "depth":  # 0 where nothing is hit
+    def measured(self, images: Tensor) -> Tensor:
+        """Return rendered images as transforms take them: colors, or else (k, C, H, W)."""
+        if self.modality == "rgb":
+            return images
+        if self.modality == "depth":  # 0 where nothing is hit
             far = torch.where(images == 0, self._maximum, images)
             return (far / self._maximum).clamp(max=1.0)[:, None]
-        if self._modality == "normals":
+        if self.modality == "normals":
             return ((images + 1.0) / 2.0).movedim(-1, -3).contiguous()
         kinds = [*self.worlds.scene.semantic_classes, SemanticClass.SKY]
         channels = torch.tensor([_CLASS_CHANNELS[kind] for kind in kinds], device=images.device)

@@ -12,7 +12,6 @@ from torch import Tensor
 from drone_rl.config import DynamicsSettings
 from drone_rl.envs import Observer, base_env
 from drone_rl.envs.rollout import ActorAgent, StepContext
-from drone_rl.explanations.hooks import memory_in
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.policies.actor import Exploring
 from drone_rl.policies.policy import Policy
@@ -45,8 +44,8 @@ class Seen(NamedTuple):
     """Of each part of its actions."""
     action: Tensor
     """The action that it takes. Shape: (1,), then that of an action."""
-    memory: Tensor | None
-    """What a recurrent policy remembers, see `drone_rl.explanations.hooks`."""
+    rest: Tensor | None
+    """What else the policy reads, see `drone_rl.explanations.hooks`."""
 
 
 class World:
@@ -171,9 +170,9 @@ class World:
                 self._observer.load_state_dict(seen)
             context = StepContext(self._observer, self.worlds.state, self._every, starts)
             shares = probabilities(act := self._agent.act(context), self.actions)
-            frame, observation = context.render(), context.observe()
-            memory = memory_in(act.entries)
-            self._seen = Seen(frame, observation, tuple(shares.tolist()), act.action, memory)
+            frame, observation = context.render(), context.observe(self.scenes.name)
+            rest = self.scenes.rest_of(act.entries)
+            self._seen = Seen(frame, observation, tuple(shares.tolist()), act.action, rest)
         return self._seen
 
     def step(self, action: Tensor) -> float:
