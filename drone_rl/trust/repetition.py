@@ -1,9 +1,10 @@
-"""Repeat a policy's episodes: called in other ways, and with the images of other episodes.
+"""Repeat a policy's episodes: called in other ways, and with the inputs of other episodes.
 
 A policy acts by its own observations and its memory of the episode. If the same episodes end
 otherwise when it is called with fewer environments at a time, or by another implementation, they
 depend on something else: the order of sums, the batch, other calls. If they succeed as often with
-the images of other episodes, it does not use its camera.
+the images of other episodes, it does not use its camera. Of several inputs, each is exchanged
+alone, too.
 """
 
 import zlib
@@ -21,14 +22,16 @@ from drone_rl.envs import base_env
 from drone_rl.envs.observer import with_rows
 from drone_rl.envs.rollout import Act, Agent, StepContext, as_agent
 from drone_rl.policies.policy import BasePolicy
-from drone_rl.trust.results import NEEDED_EPISODES, CameraUse, Repeated, Repetition
+from drone_rl.trust.results import NEEDED_EPISODES, CameraUse, InputUse, Repeated, Repetition
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.intervals import mean_bounds
+from drone_rl.utils.intervals import mean_bounds, proportion
 
 FEW = 8
 """Environments that a policy is called with at a time, in the second repetition."""
 EXCHANGED = 200
 """Episodes with the images of other episodes; the interval of no difference ends at 3 points."""
+DONORS = (1, 7, 31)
+"""Which further environments' inputs an action is compared with."""
 _REPEATED = zlib.crc32(b"repeated episodes")
 """Key of the random stream that selects them; see `DroneEnv.side_streams`."""
 
@@ -46,28 +49,51 @@ class InGroups:
         return Act(torch.cat(acts))
 
 
-class WithOtherImages:
+class WithOtherInputs:
     """An agent that observes the next environment instead of its own.
 
-    Where that one's episode has ended, it observes the last images again.
+    Where that one's episode has ended, it observes the last inputs again.
     """
 
-    def __init__(self, agent: Agent) -> None:
-        self._agent = agent
+    def __init__(self, agent: Agent, only: str | None = None) -> None:
+        """Take the agent, and the only input that is exchanged; None for all."""
+        self._agent, self._only = agent, only
         self._last: dict[str, Tensor] = {}
         self._count = 0
 
     def act(self, context: StepContext) -> Act:
         """See `Agent`."""
+        return self._agent.act(self.exchanged(context, 1))
+
+    def exchanged(self, context: StepContext, by: int) -> StepContext:
+        """Return the context with inputs of the environments `by` further, which it notes."""
         rows = context.rows
         if bool(context.starts.any()):
             self._count = len(rows)
         for name, values in context.inputs.items():
             self._last[name] = with_rows(self._last.get(name), rows, values)
-        other = (rows + 1) % self._count
-        inputs = {name: values[other] for name, values in self._last.items()}
-        every = torch.arange(len(rows), device=rows.device)
-        return self._agent.act(context.part(every, inputs))
+        other = (rows + by) % self._count
+        names = self._last if self._only is None else (self._only,)
+        inputs = {**context.inputs, **{name: self._last[name][other] for name in names}}
+        return context.part(torch.arange(len(rows), device=rows.device), inputs)
+
+
+class CountsChanges:
+    """An agent that counts how often the action changes with an input of other episodes."""
+
+    def __init__(self, agent: Agent, name: str) -> None:
+        """Take an agent without memory, and the name of the input."""
+        self._agent, self._others = agent, WithOtherInputs(agent, name)
+        self.changed = self.compared = 0
+
+    def act(self, context: StepContext) -> Act:
+        """See `Agent`."""
+        act = self._agent.act(context)
+        for by in DONORS:
+            other = self._agent.act(self._others.exchanged(context, by)).action
+            self.changed += int((other != act.action)[:, None].flatten(1).any(-1).sum())
+            self.compared += len(other)
+        return act
 
 
 def repeat(
@@ -117,7 +143,7 @@ def exchange_images(
     if not count:
         return CameraUse(own=own, exchanged=None, success=mean_bounds([], -1.0, 1.0), strata={})
     greedy = greedy.first(count)
-    exchanged = _again(WithOtherImages(as_agent(actor)), env, torch.arange(count))
+    exchanged = _again(WithOtherInputs(as_agent(actor)), env, torch.arange(count))
     strata = {}
     confidence = 1.0 - 0.05 / len(greedy.task.strata)
     for i, name in enumerate(greedy.task.strata):
@@ -126,6 +152,28 @@ def exchange_images(
     success = mean_bounds(greedy.success - exchanged.success, -1.0, 1.0)
     rates = [float(of.success.mean()) for of in (greedy, exchanged)]
     return CameraUse(own=rates[0], exchanged=rates[1], success=success, strata=strata)
+
+
+def exchange_inputs(
+    env: EnvBase, actor: TensorDictModuleBase | Agent, greedy: CompleteEpisodes
+) -> dict[str, InputUse]:
+    """Return what changes with each of several inputs of other episodes; see `exchange_images`."""
+    names, size = [*base_env(env).observer.sources], env.batch_size[0]
+    count = min(EXCHANGED, len(greedy))
+    count = 0 if size == 1 or len(names) == 1 else count - (count % size == 1)
+    uses, agent = {}, as_agent(actor)
+    for name in names if count else ():
+        which, own = torch.arange(count), greedy.first(count)
+        counts = CountsChanges(agent, name)
+        _again(counts, env, which)
+        exchanged = _again(WithOtherInputs(agent, name), env, which)
+        uses[name] = InputUse(
+            changed=proportion(counts.changed, counts.compared),
+            own=float(own.success.mean()),
+            exchanged=float(exchanged.success.mean()),
+            success=mean_bounds(own.success - exchanged.success, -1.0, 1.0),
+        )
+    return uses
 
 
 def require_repeatable(

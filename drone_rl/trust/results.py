@@ -153,6 +153,32 @@ class CameraUse(Stored):
         return any(map(_is_outside, self.strata.values())) or None
 
 
+class InputUse(Stored):
+    """What changes if a policy gets one of its inputs from other episodes."""
+
+    changed: Share
+    """Steps in which this changes the most probable action, of the policy's own episodes."""
+    own: float
+    """Success rate with its own input."""
+    exchanged: float
+    """Success rate with that of other episodes, from the same initial states."""
+    success: Mean
+    """Difference of the success rates, paired."""
+
+    @pydantic.computed_field
+    @property
+    def is_ignored(self) -> bool:
+        """Whether no action changes."""
+        return self.changed.trials > 0 and not self.changed.successes
+
+    @pydantic.computed_field
+    @property
+    def is_dispensable(self) -> bool:
+        """Whether a policy that does its task succeeds as often with that of other episodes."""
+        within = max(-self.success.lower95, self.success.upper95) <= SAME
+        return self.own >= SUCCEEDS and within
+
+
 def _is_outside(difference: Mean) -> bool:
     return difference.lower95 > SAME or difference.upper95 < -SAME
 
@@ -214,6 +240,8 @@ class Verdict(Seeded):
     """None for baselines, which see no images."""
     camera: CameraUse | None = None
     """Likewise."""
+    inputs: dict[str, InputUse] = {}
+    """By name, of a policy with several inputs."""
     proof: Proof | None = None
     """None if the policy has no certificate."""
     greedy: Figures

@@ -23,8 +23,15 @@ from drone_rl.sim.actions import Actions
 from drone_rl.sim.tasks import Task
 from drone_rl.trust.baselines import reference, run_baselines
 from drone_rl.trust.metrics import failure_table, summarise
-from drone_rl.trust.repetition import exchange_images, repeat
-from drone_rl.trust.results import NEEDED_EPISODES, CameraUse, Proof, Repetition, Verdict
+from drone_rl.trust.repetition import exchange_images, exchange_inputs, repeat
+from drone_rl.trust.results import (
+    NEEDED_EPISODES,
+    CameraUse,
+    InputUse,
+    Proof,
+    Repetition,
+    Verdict,
+)
 from drone_rl.trust.rule import USABLE, Quantity, Rule, VerdictKind, decide, kinds_within
 from drone_rl.utils.exit_codes import NOT_CERTAIN
 from drone_rl.utils.intervals import mean_bounds, proportion, rate_of
@@ -97,6 +104,7 @@ def judge_policy(
         seed=seed,
         repetition=repeat(env, actor, greedy) if sees else None,
         camera=exchange_images(env, actor, greedy) if sees else None,
+        inputs=exchange_inputs(env, actor, greedy) if sees else None,
     )
 
 
@@ -145,6 +153,7 @@ def apply_rule(
     seed: RootSeed | None = None,
     repetition: Repetition | None = None,
     camera: CameraUse | None = None,
+    inputs: Mapping[str, InputUse] | None = None,
 ) -> Verdict:
     """Apply the rule to episodes.
 
@@ -159,6 +168,7 @@ def apply_rule(
             could have been fitted to these environments.
         repetition: The same episodes again; None for baselines, which see no images.
         camera: What changes with the images of other episodes; None for baselines.
+        inputs: What changes with each of several inputs of other episodes.
 
     Raises:
         ValueError: The initial states differ.
@@ -188,6 +198,7 @@ def apply_rule(
         num_cubes=greedy.goals.reached.shape[-1],
         repetition=repetition,
         camera=camera,
+        inputs=dict(inputs or {}),
         proof=_unless_contradicted(claim, greedy),
         greedy=summarise(greedy),
         sampled=None if sampled is None else summarise(sampled),
