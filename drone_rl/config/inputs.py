@@ -14,6 +14,7 @@ from annotated_types import MaxLen, MinLen
 from drone_rl.config.camera import CameraSettings
 from drone_rl.config.parts import Part, Parts
 from drone_rl.config.transforms import (
+    DEFAULT_TRANSFORMS,
     MOST_TRANSFORMS,
     Bias,
     Fault,
@@ -344,6 +345,7 @@ class LastAction(Vector, target="last_action"):
 
 def _named(inputs: Any) -> Any:
     """Return inputs by name, given a list of variants: an input is called as its variant."""
+    inputs = [inputs] if isinstance(inputs, str) else inputs
     if not isinstance(inputs, list | tuple):
         return inputs
     names = [getattr(one, "name", one) for one in inputs]
@@ -378,15 +380,24 @@ Inputs = Annotated[
     MaxLen(MOST_INPUTS),
     pydantic.AfterValidator(_check_names),
 ]
+_CAMERA = CameraSettings()
 DEFAULT_INPUTS: dict[str, Input] = {PIXELS: CameraPixels()}
 
 
 def describe_inputs(
-    inputs: Mapping[str, Input], camera: CameraSettings, transforms: Sequence[Transform]
-) -> dict[str, Any]:
+    inputs: Mapping[str, Input],
+    camera: CameraSettings = _CAMERA,
+    transforms: Sequence[Transform] = DEFAULT_TRANSFORMS,
+) -> dict[str, ImageInput | VectorInput]:
     """Return the description of each input; an `InputError` names one that is invalid."""
     made = {}
     for name, settings in inputs.items():
         with prefixed_errors(f"inputs.{name}"):
             made[name] = settings.described(camera, transforms)
     return made
+
+
+def first_camera(inputs: Mapping[str, ImageInput | VectorInput]) -> CameraSettings:
+    """Return the camera of the first image; the default one without images."""
+    images = (seen.settings for seen in inputs.values() if isinstance(seen, ImageInput))
+    return next(images, _CAMERA)

@@ -34,6 +34,7 @@ from drone_rl.config.inputs import (
     ImageInput,
     InputDescription,
     describe_inputs,
+    first_camera,
     require_name,
 )
 from drone_rl.config.networks import Lstm, Network
@@ -198,7 +199,7 @@ class PolicyDescription(Model):
     @property
     def camera(self) -> CameraSettings:
         """The camera of the first image; the default one without images."""
-        return next((image.settings for image in self.images.values()), CameraSettings())
+        return first_camera(self.inputs)
 
     @property
     def transforms(self) -> tuple[Transform, ...]:
