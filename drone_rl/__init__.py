@@ -7,7 +7,7 @@ import functools
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from drone_rl.utils.gymnasium_names import register
+from drone_rl.utils.gymnasium_names import register_environment
 
 if TYPE_CHECKING:
     from drone_rl.config import ActionSettings as ActionSettings
@@ -19,12 +19,10 @@ if TYPE_CHECKING:
     from drone_rl.config.commands import ChanceSettings as ChanceSettings
     from drone_rl.config.commands import CheckSettings as CheckSettings
     from drone_rl.config.commands import EvaluateSettings as EvaluateSettings
-    from drone_rl.config.commands import FlySettings as FlySettings
     from drone_rl.config.commands import JudgeSettings as JudgeSettings
     from drone_rl.config.commands import PlacesSettings as PlacesSettings
     from drone_rl.config.commands import ProvableSettings as ProvableSettings
     from drone_rl.config.commands import ProveSettings as ProveSettings
-    from drone_rl.config.commands import ServeSettings as ServeSettings
     from drone_rl.config.commands import ShiftSettings as ShiftSettings
     from drone_rl.config.registry import register_collector as register_collector
     from drone_rl.config.registry import register_learner as register_learner
@@ -64,6 +62,8 @@ if TYPE_CHECKING:
     from drone_rl.flight.fly_page.server import fly as fly
     from drone_rl.flight.image_types import ImageRequest as ImageRequest
     from drone_rl.flight.image_types import ImageType as ImageType
+    from drone_rl.flight.settings import FlySettings as FlySettings
+    from drone_rl.flight.settings import ServeSettings as ServeSettings
     from drone_rl.policies.environment import make_env as make_env
     from drone_rl.policies.external_policy import ExternalPolicy as ExternalPolicy
     from drone_rl.policies.external_policy import policy_from as policy_from
@@ -114,7 +114,8 @@ _HOMES = {name: module for _, module, _, name, *_ in _FOUND}
 
 __all__ = [*_HOMES]  # pyright: ignore[reportUnsupportedDunderAll] (aliases above are public)
 
-register()
+for _task in ("collect_cubes", "pillars"):  # those of `drone_rl.sim.tasks`, imported later
+    register_environment(_task)
 
 
 def __getattr__(name: str) -> Any:

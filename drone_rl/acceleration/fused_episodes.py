@@ -10,6 +10,7 @@ from typing import Any, Self
 import torch
 import warp as wp
 from torch import Tensor
+from torchrl.envs import CatFrames, Transform
 from torchrl.envs.utils import ExplorationType
 
 from drone_rl.acceleration import rollout_kernel
@@ -65,23 +66,24 @@ class FusedEpisodes:
         camera.poses = rules.poses
         camera.mean, camera.deviation = _mean_and_deviation(env.observer)
         self._camera = camera
-        self._visible = _visible_lines(env.observer)
+        self._visible, self._num_frames = _visible_lines(env.observer), _num_frames(env.observer)
         size = network.offsets.outputs[-1]
         shape = (self._workers.size, int(rollout_kernel.TOGETHER) * size)
         self._workspaces = wp.empty(shape, dtype=float, device="cpu")
-        pixels = view.height * view.width
-        self._length = max(1, min(_MAX_STEPS, _MAX_PIXELS // (count * pixels)))
+        size_of_frames = self._num_frames * view.height * view.width
+        self._length = max(1, min(_MAX_STEPS, _MAX_PIXELS // (count * size_of_frames)))
         self._num_rows = rows = count * self._length
         num_actions = worlds.dynamics.actions.num_outputs
         self._buffer = RolloutBuffer(
             {
-                "pixels": torch.empty(rows, 1, view.height, view.width),
+                "pixels": torch.empty(rows, self._num_frames, view.height, view.width),
                 "logits": torch.empty(rows, num_actions),
                 "action": torch.empty(rows, dtype=torch.int32),
                 "reward": torch.empty(rows),
                 "end_reason": torch.empty(rows, dtype=torch.int32),
             }
         )
+        self._last_observations = torch.empty(count if self._num_frames > 1 else 0, size_of_frames)
         launches = _MAX_ACTIVATIONS // (rows * size)
         self.activations = ActivationRecorder(launches * rows, size)
         """Of the last batch, for a `FusedNetwork` that learns from it."""
@@ -109,8 +111,9 @@ class FusedEpisodes:
             reasons.append(f"task {names} is not fused")
         if reasons or rules is None:
             return Reasons(reasons)
-        first_pixel = _visible_lines(env.observer).start * env.observer.image.view.width
-        network = PackedNetwork(actor.network, first_pixel)
+        lines, view = _visible_lines(env.observer), env.observer.image.view
+        hidden = view.height - (lines.stop - lines.start)
+        network = PackedNetwork(actor.network, lines.start * view.width, hidden * view.width)
         return cls(env, actor, keeps_inputs, network, rules, num_threads)
 
     def run(self, started: State) -> Entries | None:
@@ -172,12 +175,16 @@ class FusedEpisodes:
             source: Any = self._actor.generator
             draws.uniform_(generator=source)
         opened, frames = self._buffer.open(part, kept), Images()
-        gray: Any = wp.from_torch(opened["pixels"].flatten(1))
+        pixels = opened["pixels"]
+        gray: Any = wp.from_torch(pixels.flatten(2).flatten(0, 1))
         frames.gray = gray
         rollout: Any = rollout_kernel.Rollout()
         rollout.camera, rollout.layers = self._camera, self._network.arrays
         rollout.workspaces, rollout.draws = self._workspaces, wp.from_torch(draws)
-        rollout.frames, rollout.logits = frames, wp.from_torch(opened["logits"])
+        rollout.frames, rollout.num_frames = frames, self._num_frames
+        rollout.observations = wp.from_torch(pixels.flatten(1))
+        rollout.last_observations = wp.from_torch(self._last_observations)
+        rollout.logits = wp.from_torch(opened["logits"])
         rollout.actions = wp.from_torch(opened["action"])
         rollout.rewards = wp.from_torch(opened["reward"])
         rollout.end_reasons = wp.from_torch(opened["end_reason"])
@@ -189,6 +196,9 @@ class FusedEpisodes:
             wp.launch(self._kernel, 1, inputs=inputs, device="cpu")
 
         self._workers.map_spans(0, num_envs, run_span)
+        if len(self._last_observations):
+            last_rows = pixels[self._length - 1 :: self._length][:num_envs]
+            self._last_observations[:num_envs] = last_rows.flatten(1)
         return opened["logits"]
 
 
@@ -208,6 +218,18 @@ def _visible_lines(observer: Observer) -> slice:
     return slice(0, observer.image.view.height)
 
 
+def _num_frames(observer: Observer) -> int:
+    """Return the number of frames of an observation."""
+    return observer.image.pipeline.earlier + 1
+
+
+def _is_fusable(transform: Transform) -> bool:
+    """Return whether the kernel has a transform."""
+    if type(transform) is CatFrames:
+        return (transform.dim, transform.padding) == (-3, "same")
+    return type(transform) in (CropRows, StandardizePixels)
+
+
 def _not_fused(env: DroneEnv) -> list[str]:
     """Return reasons against fusing the renderer, the appearance or the transforms."""
     worlds, reasons = env.worlds, []
@@ -220,12 +242,12 @@ def _not_fused(env: DroneEnv) -> list[str]:
         return [*reasons, f"inputs {', '.join(env.observer.sources)} are not fused"]
     if env.observer.image.view.modalities != ("gray",):
         reasons.append("frames that are not gray are not fused")
-    fusable: list[type] = [CropRows, StandardizePixels]
+    fused = set[type]()
     for transform in env.observer.image.pipeline.transforms:
-        if type(transform) in fusable:
-            fusable.remove(type(transform))
-        else:
-            reasons.append(f"transform {type(transform).__name__} is not fused")
+        kind = type(transform)
+        if kind in fused or not _is_fusable(transform):
+            reasons.append(f"transform {kind.__name__} is not fused")
+        fused.add(kind)
     if worlds.appearance is not None:
         reasons.append("visual randomization is not fused")
     return reasons
@@ -241,7 +263,7 @@ def _not_fused_policy(env: DroneEnv, actor: Any) -> list[str]:
     if not env.observer.sees_pixels:
         return []  # see `_not_fused`
     rows, num_actions = _visible_lines(env.observer), env.worlds.dynamics.actions.num_outputs
-    shape = (1, rows.stop - rows.start, env.observer.image.view.width)
+    shape = (_num_frames(env.observer), rows.stop - rows.start, env.observer.image.view.width)
     if (network.in_shape, network.num_actions) != (shape, num_actions):
         return [
             f"a network from {network.in_shape} to {network.num_actions} outputs is not fused "

@@ -29,14 +29,15 @@ typedef numbers one[1];
 constexpr int MANY = sizeof(many) / sizeof(one), NEAR = 64;
 const int delta_stride = g.output_stride, gradients_offset = g.weights_offset;
 const float* delta = deltas.data + g.output_offset;
-auto tile = [&](auto* shape, int row, int i, int outs) __attribute__((always_inline)) {
+auto tile = [&](auto* shape, int plane, int row, int i, int outs) __attribute__((always_inline)) {
     constexpr int INPUTS = sizeof(*shape) / sizeof(numbers);
     float* sums_at = gradients.data + gradients_offset + outs / 16 * panel;
-    sums_at += (1 + row * length + i) * 16;
+    sums_at += (1 + (plane * kernel_rows + row) * length + i) * 16;
     numbers sums[INPUTS];
     #pragma unroll
     for (int k = 0; k < INPUTS; ++k) sums[k] = *(const anywhere*)(sums_at + k * 16);
     const float* first = input + row * kernel_row_stride + i;
+    first += plane * (kernel_rows * kernel_row_stride + g.plane_skip);
     const float* by = delta + outs;
     for (int patch = 0; patch < num_patches; patch += columns) {
         const float* from = first;
@@ -60,13 +61,15 @@ for (int outs = 0; outs < num_outs; outs += 16) {
         sum += *(const anywhere*)by;
     *sum_at = sum;
 }
-for (int row = 0; row < kernel_rows; ++row) {
-    for (int from = 0; from < length; from += NEAR) {
-        int to = from + NEAR < length ? from + NEAR : length;
-        for (int outs = 0; outs < num_outs; outs += 16) {
-            int i = from;
-            for (; i + MANY <= to; i += MANY) tile((many*)nullptr, row, i, outs);
-            for (; i < to; ++i) tile((one*)nullptr, row, i, outs);
+for (int plane = 0; plane < planes; ++plane) {
+    for (int row = 0; row < kernel_rows; ++row) {
+        for (int from = 0; from < length; from += NEAR) {
+            int to = from + NEAR < length ? from + NEAR : length;
+            for (int outs = 0; outs < num_outs; outs += 16) {
+                int i = from;
+                for (; i + MANY <= to; i += MANY) tile((many*)nullptr, plane, row, i, outs);
+                for (; i < to; ++i) tile((one*)nullptr, plane, row, i, outs);
+            }
         }
     }
 }
@@ -90,10 +93,12 @@ const float* from = patches.data;
 const int columns = g.patches_per_row;
 for (int number = 0; number < g.num_patches; ++number) {
     float* patch = to + number / columns * g.row_stride + number % columns * g.column_stride;
-    for (int row = 0; row < g.kernel_rows; ++row) {
-        for (int i = 0; i < g.kernel_row_length; ++i) patch[i] += from[i];
-        patch += g.kernel_row_stride;
-        from += g.kernel_row_length;
+    for (int plane = 0; plane < g.num_planes; ++plane, patch += g.plane_skip) {
+        for (int row = 0; row < g.kernel_rows; ++row) {
+            for (int i = 0; i < g.kernel_row_length; ++i) patch[i] += from[i];
+            patch += g.kernel_row_stride;
+            from += g.kernel_row_length;
+        }
     }
 }
 """)
@@ -175,7 +180,7 @@ class FrameBatch:
     """Frames with outputs and gradients."""
 
     frames: wp.array2d[float]
-    """Gray. Shape: (num_frames, pixels)."""
+    """Channels first. Shape: (num_frames, channels * pixels)."""
     outputs: wp.array[float]
     """Outputs of all layers, row after row, as `forward` writes them."""
     rows: wp.array[int]

@@ -21,13 +21,15 @@ class PackedLayer(NamedTuple):
 
     layer: Weighted
     channels: int
-    """Of its input; channels beyond them are padding."""
+    """Of its input, in each plane; channels beyond them are padding."""
     shape: tuple[int, int, int]
-    """Height, width and channels of its input."""
+    """Height, width and channels of its input, in each plane."""
     kernel: tuple[int, int]
     stride: int
     pool_size: int = 0
     """Side of the squares of outputs whose maximum is kept; 0 without pooling."""
+    planes: int = 1
+    """Parts of its input that follow each other: the channels of frames."""
 
     @property
     def is_convolution(self) -> bool:
@@ -48,7 +50,7 @@ class PackedLayer(NamedTuple):
     @property
     def num_inputs(self) -> int:
         """Numbers in a patch."""
-        return self.kernel[0] * self.kernel[1] * self.shape[2]
+        return self.planes * self.kernel[0] * self.kernel[1] * self.shape[2]
 
     @property
     def has_transpose(self) -> bool:
@@ -77,18 +79,21 @@ class PackedLayer(NamedTuple):
     @property
     def geometry(self) -> dict[str, int]:
         """Fields of `LayerGeometry` without offsets and `is_rectified`."""
-        _, width, channels = self.shape
+        height, width, channels = self.shape
         high, wide = self.kernel
         rows, columns = self.output_shape
         is_whole, line = self.kernel == self.shape[:2], width * channels
+        inputs = self.num_inputs // self.planes
         return {
             "num_patches": rows * columns,
             "patches_per_row": columns,
-            "row_stride": self.num_inputs if is_whole else self.stride * line,
+            "row_stride": inputs if is_whole else self.stride * line,
             "column_stride": self.stride * channels,
             "kernel_rows": 1 if is_whole else high,
-            "kernel_row_length": self.num_inputs if is_whole else wide * channels,
+            "kernel_row_length": inputs if is_whole else wide * channels,
             "kernel_row_stride": 0 if is_whole else line,
+            "num_planes": self.planes,
+            "plane_skip": height * line - (0 if is_whole else high * line),
             "num_outs": self.num_outs,
             "output_stride": self.num_outs,
             "pool_size": self.pool_size,
@@ -103,6 +108,7 @@ class PackedLayer(NamedTuple):
             "row_stride": self.num_outs,
             "kernel_rows": 1,
             "kernel_row_length": self.num_outs,
+            "num_planes": 1,
             "num_outs": self.num_inputs,
             "output_stride": self.num_inputs,
         }
@@ -119,13 +125,13 @@ class PackedLayer(NamedTuple):
         inputs. Shape: (1 + num_inputs, num_outs).
         """
         weight, bias = self.parameters
-        outs, inner = len(weight), (self.channels, *self.kernel)
+        outs, inner = len(weight), (self.planes, self.channels, *self.kernel)
         last = first + weight.numel()
         order = torch.zeros(1 + self.num_inputs, self.num_outs, dtype=torch.int32)
         order[0, :outs] = torch.arange(last, last + len(bias))
-        by_pixel = order[1:].view(*self.kernel, self.shape[2], self.num_outs)
+        by_pixel = order[1:].view(self.planes, *self.kernel, self.shape[2], self.num_outs)
         numbers = torch.arange(first, last).view(outs, *inner)
-        by_pixel[:, :, : self.channels, :outs] = numbers.permute(2, 3, 1, 0)
+        by_pixel[..., : self.channels, :outs] = numbers.permute(1, 3, 4, 2, 0)
         return order
 
 
@@ -173,15 +179,13 @@ _LETTERS = {nn.Conv2d: "c", nn.ReLU: "r", nn.MaxPool2d: "p", nn.Flatten: "f", nn
 def unsupported(network: nn.Module) -> list[str]:
     """Return why kernels do not support a network; empty if they do.
 
-    They support convolutions of gray frames, each with ReLU and possibly pooling, then linear
-    layers with ReLU, in float32 on a CPU.
+    They support convolutions of frames, each with ReLU and possibly pooling, then linear layers
+    with ReLU, in float32 on a CPU.
     """
     layers = as_layers(network)
     if isinstance(layers, Unsupported):
         return [layers.reason]
     (branch,) = layers.branches
-    if branch.in_shape[0] != 1:
-        return [f"a network of {branch.in_shape[0]} channels is not fused"]
     kinds = "".join(_LETTERS[type(layer)] for layer in layers.in_turn)
     strides = [layer.stride for layer in branch.layers if isinstance(layer, nn.Conv2d)]
     if not re.fullmatch("(crp?)+f(lr)*l", kinds) or any(high != wide for high, wide in strides):
@@ -196,8 +200,8 @@ def packed_layers(network: nn.Module) -> list[PackedLayer]:
     """Return the layers of a network that is supported."""
     layers = as_layers(network)
     assert not isinstance(layers, Unsupported)
-    channels, *size = layers.branches[0].in_shape
-    padded, packed = channels, list[PackedLayer]()
+    planes, *size = layers.branches[0].in_shape
+    channels, padded, packed = 1, 1, list[PackedLayer]()
     for layer in layers.in_turn:
         if isinstance(layer, nn.MaxPool2d):
             packed[-1] = packed[-1]._replace(pool_size=layer.kernel_size)
@@ -207,18 +211,20 @@ def packed_layers(network: nn.Module) -> list[PackedLayer]:
         kernel, stride = (high, wide), 1
         if isinstance(layer, nn.Conv2d):
             kernel, stride = (layer.kernel_size[0], layer.kernel_size[1]), layer.stride[0]
-        packed.append(PackedLayer(layer, channels, (high, wide, padded), kernel, stride))
-        channels, padded = len(layer.weight), packed[-1].num_outs
+        shape = (high, wide, padded)
+        packed.append(PackedLayer(layer, channels, shape, kernel, stride, planes=planes))
+        channels, padded, planes = len(layer.weight), packed[-1].num_outs, 1
     return packed
 
 
 class PackedNetwork:
     """A network that kernels support, with its weights laid out for them."""
 
-    def __init__(self, network: nn.Module, first_pixel: int = 0) -> None:
+    def __init__(self, network: nn.Module, first_pixel: int = 0, hidden_pixels: int = 0) -> None:
         """Lay out a network, see `unsupported`; call `pack` for its weights.
 
-        `first_pixel` is the index of the first pixel of a frame that the network sees.
+        `first_pixel` is the index of the first pixel of a frame that the network sees,
+        `hidden_pixels` the number of those in each channel that it does not see.
         """
         layers = self.layers = packed_layers(network)
         first, packed, transposed = 1, list[Tensor](), list[Tensor]()
@@ -238,14 +244,12 @@ class PackedNetwork:
         self.offsets = OutputOffsets.of(layers)
         self.arrays: Any = Layers()
         """For kernels."""
+        geometries = [layer.geometry for layer in layers]
+        geometries[0]["input_offset"] = first_pixel
+        geometries[0]["plane_skip"] += hidden_pixels
         self.arrays.geometries = _as_geometries(
-            {
-                **layer.geometry,
-                "input_offset": first_pixel,
-                "weights_offset": at,
-                "is_rectified": int(layer is not layers[-1]),
-            }
-            for layer, at in zip(layers, _starts(packed), strict=True)
+            {**geometry, "weights_offset": at, "is_rectified": int(layer is not layers[-1])}
+            for geometry, layer, at in zip(geometries, layers, _starts(packed), strict=True)
         )
         self.arrays.weights = wp.from_torch(self.weights)
         self.arrays.output_offsets = _as_indices(self.offsets.outputs)

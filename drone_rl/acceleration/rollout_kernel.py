@@ -53,7 +53,12 @@ class Rollout:
     draws: wp.array2d[float]
     """Uniform samples for actions; below 0 for the most probable one. Shape: (num_envs, steps)."""
     frames: Images
-    """Observations."""
+    """Frames, `num_frames` a row: those of an observation, oldest first."""
+    num_frames: int
+    observations: wp.array2d[float]
+    """The same memory, a row an observation."""
+    last_observations: wp.array2d[float]
+    """Of each environment, before the first step of the launch."""
     logits: wp.array2d[float]
     actions: wp.array[int]
     rewards: wp.array[float]
@@ -95,12 +100,27 @@ def choose(logits: wp.array[float], at: int, count: int, draw: float) -> int:
     return chosen
 
 
+@wp.func
+def stack(rollout: Rollout, env: int, step: int, row: int, is_start: bool) -> None:
+    """Write the earlier frames of an observation; at an episode's start all are the newest."""
+    seen = rollout.observations[row]
+    size = seen.shape[0] // rollout.num_frames
+    earlier = seen.shape[0] - size
+    if is_start:
+        for frame in range(rollout.num_frames - 1):
+            copy(seen, earlier, seen, frame * size, size)
+    elif step == 0:
+        copy(rollout.last_observations[env], size, seen, 0, earlier)
+    else:
+        copy(rollout.observations[row - 1], size, seen, 0, earlier)
+
+
 @functools.cache
 def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (functions that Warp compiles)
     """Return the kernel for the rules of a task; see `drone_rl.sim.tasks.fused.fused_rules`.
 
     Args:
-        states: Warp structure of the environments, with "end_reasons".
+        states: Warp structure of the environments, with "steps" and "end_reasons".
         place: Writes the poses that are rendered: (states, env, poses).
         move: Steps an environment: (states, env, action). Returns the reward.
     """
@@ -111,6 +131,7 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
     ) -> int:
         """Render running environments, compute the convolutions; return how many are running."""
         camera = rollout.camera
+        newest = rollout.num_frames - 1
         running = int(0)
         for env in range(first, last):
             if envs.end_reasons[env] == 0:
@@ -126,11 +147,14 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
                     camera.scratch,
                     worker,
                     rollout.frames,
-                    row,
+                    row * rollout.num_frames + newest,
                 )
-                frame = rollout.frames.gray[row]
+                frame = rollout.frames.gray[row * rollout.num_frames + newest]
                 standardise(frame, frame.shape[0], camera.mean, camera.deviation)
-                run_convolutions(rollout.layers, frame, rollout.workspaces[worker], running)
+                if newest > 0:
+                    stack(rollout, env, step, row, envs.steps[env] == 0)
+                seen = rollout.observations[row]
+                run_convolutions(rollout.layers, seen, rollout.workspaces[worker], running)
                 running += 1
         return running
 

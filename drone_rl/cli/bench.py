@@ -3,6 +3,7 @@
 import importlib
 import json
 import logging
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
@@ -15,20 +16,20 @@ _log = logging.getLogger(__name__)
 
 
 class BenchCommand(CommandSettings, BenchSettings):
-    """Measure the figures that the documentation quotes.
+    """Measure the figures that the documentation quotes."""
 
-    Benchmarks by group:
-      main: render, collector, dm_control, scaling, memory, solve, seeds, large
-      adversarial: coverage, gamed, adversaries, maps, explain, verdicts, fragile_honest, shifts,
-        domain_axes, robust, render_truth
-      parallel: sweeps, kills
-      verification: prove, exact_coverage, provable
-      long: imitation, original, chapter
-      libraries: pillars, onnx, peers, gymnasium
-      system: revisions, tasks, startup
-      flight: airsim, fly_page, flight_speed, flight_parity, flight_paths, flight_moves,
-        flight_velocity, flight_pillars
-    """
+    @classmethod
+    def description(cls) -> str:
+        """Return the benchmarks by group, too; see `CommandSettings`."""
+        registry = _benchmarks()
+        groups = (
+            f"{group}: {', '.join(registry.find_benchmarks([group]))}" for group in registry.GROUPS
+        )
+        lines = (
+            textwrap.fill(group, 100, initial_indent="  ", subsequent_indent="    ")
+            for group in groups
+        )
+        return "\n".join([super().description(), "", "Benchmarks by group:", *lines])
 
     @classmethod
     def prepare(cls, overrides: Sequence[str]) -> list[str]:

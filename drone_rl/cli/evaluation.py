@@ -119,7 +119,7 @@ class VerdictCommand(AppearanceCommandSettings, JudgeSettings):
     or repeated ones end otherwise), 18 good but trivial (a baseline that ignores observations
     succeeds, too, or the policy does not use its camera), 16 not proved
     (require=proved), 17 outside the required operating domain (require_domain=FILE).
-    policy=random, oracle, forward, left or right judges a baseline.
+    policy=random, oracle, forward, left or right judges a baseline, task=NAME in another task.
     """
 
     certificate: str | None = None

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import drone_rl
 from drone_rl.cli.evaluation import AppearanceCommandSettings
-from drone_rl.config.commands import FlySettings
+from drone_rl.flight.settings import FlySettings
 
 _log = logging.getLogger(__name__)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import drone_rl
 from drone_rl.cli.settings import CommandSettings
-from drone_rl.config.commands import ServeSettings
+from drone_rl.flight.settings import ServeSettings
 
 
 class ServeCommand(CommandSettings, ServeSettings):

@@ -1,5 +1,6 @@
 """Base classes of the commands and their settings."""
 
+import inspect
 import logging
 from collections.abc import Sequence
 from pathlib import Path
@@ -26,6 +27,11 @@ class CommandSettings(Settings):
     def prepare(cls, overrides: Sequence[str]) -> list[str]:
         """Return the command line that Hydra composes."""
         return [*overrides]
+
+    @classmethod
+    def description(cls) -> str:
+        """Return what `--help` says about the command."""
+        return inspect.getdoc(cls) or ""
 
     def run(self, folder: Path) -> tuple[int, object]:
         """Run the command; return the exit status and the value that a sweep maximises."""

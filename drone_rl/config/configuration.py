@@ -26,13 +26,14 @@ class Changes(Annotation):
     """
 
     of: type[Settings] | None = None
-    """The class; None for the settings of all tasks."""
+    """The class; None for the settings of all tasks, and the name of one."""
 
     @property
     def names(self) -> tuple[str, ...]:
         """The names that may be changed."""
         classes = TASKS.values() if self.of is None else (self.of,)
-        return tuple(dict.fromkeys(name for cls in classes for name in cls.model_fields))
+        fields = (name for cls in classes for name in cls.model_fields)
+        return tuple(dict.fromkeys((*fields, "name") if self.of is None else fields))
 
     @property
     def hint(self) -> Any:

@@ -139,7 +139,7 @@ COMPUTER_VISION = DynamicsSettings()
 """Computer-vision mode, the default of files without dynamics."""
 
 
-ACTION_KINDS = ("moves", "moves_3d", "velocity")
+ACTION_KINDS = ("moves", "moves_3d", "moves_turning", "moves_full", "velocity")
 Speed = Annotated[float, Real(0.0, 50.0, is_above=True, unit="m/s")]
 
 
@@ -158,36 +158,73 @@ class ActionSettings(Settings):
     """Settings of the actions, one at each control step."""
 
     kind: Annotated[str, OneOf(ACTION_KINDS)] = "moves"
-    """moves, three discrete moves of equal length; moves_3d, also up and down, in computer-vision
-    mode; or velocity: forward speed, lateral speed and yaw rate, all continuous."""
+    """Discrete moves of equal length along the drone's heading: moves (forward, left, right),
+    moves_3d (also up and down), moves_turning (forward and turns to both sides) or moves_full (all
+    of them, and back); or velocity: forward speed, lateral speed, yaw rate and, with `climb_speed`,
+    climb rate, all continuous."""
     move_speed: Speed = 4.0
     """Speed of the position setpoint during a move, in m/s; in computer-vision mode a move is the
     task's step."""
     move_lead: Annotated[float, Real(0.01, 100.0, unit="m")] = 0.5
-    """Largest distance along x and along y from the drone to the position setpoint at the start of
-    a move, in metres."""
+    """Largest distance along x and along y, and along z if there are moves up, from the drone to
+    the position setpoint at the start of a move, in metres."""
+    turn_step: Annotated[float, Real(0.1, 180.0, unit="degrees")] = 15.0
+    """Angle of a discrete turn in computer-vision mode, in degrees; a drone with dynamics turns at
+    `yaw_rate`."""
     forward_speed: Speed = 4.0
-    """Largest forward speed command, in m/s; there is no backward command."""
+    """Largest forward speed command, in m/s."""
     sideways_speed: Speed = 3.0
     """Largest lateral speed command, in m/s."""
     yaw_rate: Annotated[float, Real(0.0, 720.0, unit="degrees/s")] = 45.0
-    """Largest yaw rate command, in degrees/s; 0 for none."""
+    """Largest yaw rate command, in degrees/s; 0 for none. Also the yaw rate of discrete turns."""
+    climb_speed: Annotated[float, Real(0.0, 50.0, unit="m/s")] = 0.0
+    """Largest climb and sink rate command, in m/s; 0 for none, which keeps the height."""
+    backward_speed: Annotated[float, Real(0.0, 50.0, unit="m/s")] = 0.0
+    """Largest backward speed command, in m/s; 0 for none."""
 
     @property
     def axes(self) -> tuple[Axis, ...]:
         """The axes; discrete actions move along one of them at a time."""
         if self.kind == "velocity":
+            most = {"left": self.sideways_speed, "turn left": self.yaw_rate}
+            if self.climb_speed:
+                most["up"] = self.climb_speed
+            back = 0.0 - self.backward_speed
             return (
-                Axis(name="forward", unit="m/s", low=0.0, high=self.forward_speed),
-                Axis(name="left", unit="m/s", low=-self.sideways_speed, high=self.sideways_speed),
-                Axis(name="turn left", unit="degrees/s", low=-self.yaw_rate, high=self.yaw_rate),
+                Axis(name="forward", unit="m/s", low=back, high=self.forward_speed),
+                *(
+                    Axis(name=n, unit="degrees/s" if "turn" in n else "m/s", low=-high, high=high)
+                    for n, high in most.items()
+                ),
             )
-        moves = (
-            Axis(name="forward", unit="moves", low=0.0, high=1.0, step=1.0),
-            Axis(name="left", unit="moves", low=-1.0, high=1.0, step=1.0),
-            Axis(name="up", unit="moves", low=-1.0, high=1.0, step=1.0),
+        names = {
+            "moves": ("forward", "left"),
+            "moves_3d": ("forward", "left", "up"),
+            "moves_turning": ("forward", "turn left"),
+            "moves_full": ("forward", "left", "up", "turn left"),
+        }[self.kind]
+        return tuple(
+            Axis(
+                name=name,
+                unit="turns" if name == "turn left" else "moves",
+                low=0.0 if name == "forward" and self.kind != "moves_full" else -1.0,
+                high=1.0,
+                step=1.0,
+            )
+            for name in names
         )
-        return moves if self.kind == "moves_3d" else moves[:2]
+
+    @property
+    def has_turns(self) -> bool:
+        """Whether there are discrete turns."""
+        return self.kind in ("moves_turning", "moves_full")
+
+    def check(self) -> None:
+        """Refuse turns that a drone with dynamics would not make."""
+        if self.has_turns and not self.yaw_rate:
+            self.refuse(
+                "yaw_rate", f"is none for the turns of actions={self.kind}; give more than 0"
+            )
 
 
 MOVES_SETTINGS = ActionSettings()

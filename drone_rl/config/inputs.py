@@ -165,7 +165,16 @@ class VectorInput(Model):
         return self.replace(noise=0.0, bias=0.0, delay=0, loss=0.0)
 
 
-InputDescription = Annotated[ImageInput | VectorInput, pydantic.Field(discriminator="kind")]
+def _kind(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return value.get("kind", "image")
+    return getattr(value, "kind", None)
+
+
+InputDescription = Annotated[
+    Annotated[ImageInput, pydantic.Tag("image")] | Annotated[VectorInput, pydantic.Tag("vector")],
+    pydantic.Discriminator(_kind),
+]
 
 
 class Input(Part):
@@ -268,6 +277,7 @@ class NormalsImage(Image, target="normals"):
     """Unit normals of surfaces in the world's frame, 0 for the sky."""
 
     modality: ClassVar[Modality] = "normals"
+    last: ClassVar[tuple[Transform, ...]] = (Standardize(mean=0.5, std=0.5),)
 
 
 class Vector(Input):

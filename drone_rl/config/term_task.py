@@ -1,5 +1,6 @@
 """Settings of a task of terms: objects, starts, bounds, rewards, ends and success."""
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Self
 
@@ -35,13 +36,15 @@ class ObjectSettings(Settings):
     """Objects of one kind. Lengths in metres, world frame: x forward, y left, z up."""
 
     shape: Annotated[str, OneOf(SHAPES)] = "box"
-    """ball, cylinder (upright) or box (parallel to the axes)."""
+    """ball, cylinder (upright) or box."""
     role: Annotated[str, OneOf(ROLES)] = "obstacle"
     """goal, which vanishes when the drone touches it; obstacle, which is solid; decoration."""
     count: Annotated[int, Whole(1, 200, "objects")] = 1
     """How many there are."""
     size: Annotated[tuple[float, float, float], Several(Size, 3, 3)] = (1.0, 1.0, 1.0)
     """Edges along x, y and z; of a ball the diameter thrice, of a cylinder the diameter twice."""
+    heading: Annotated[float, Real(-360.0, 360.0, unit="deg")] = 0.0
+    """By which a box is turned to the left, so that its own x points there."""
     color: Color = (0.25, 0.16, 0.12)
     """Red, green, blue in [0, 1]."""
     x: Coordinate = (5.0, 20.0)
@@ -59,6 +62,14 @@ class ObjectSettings(Settings):
         x, y, z = self.size
         return 0.5 * x, 0.5 * y, 0.5 * z
 
+    @property
+    def reach(self) -> tuple[float, float, float]:
+        """Half of the edges of the box around it that is parallel to the world's axes."""
+        x, y, z = self.half_size
+        angle = math.radians(self.heading)
+        cos, sin = abs(math.cos(angle)), abs(math.sin(angle))
+        return cos * x + sin * y, sin * x + cos * y, z
+
     def range_of(self, axis: str) -> tuple[float, float]:
         """Return the lowest and highest value of a coordinate of the centre."""
         value = getattr(self, axis)
@@ -71,6 +82,8 @@ class ObjectSettings(Settings):
         if (x != y and self.shape != "box") or (x != z and self.shape == "ball"):
             equal = "three equal sizes" if self.shape == "ball" else "equal sizes along x and y"
             raise InputError(f"size={list(self.size)} is no {self.shape}; give {equal}, or a box")
+        if self.heading and self.shape != "box":
+            raise InputError(f"heading={self.heading:g} turns a {self.shape}; turn only boxes")
 
 
 class StartSettings(Settings):
@@ -175,7 +188,7 @@ class TermTaskSettings(BaseTaskSettings):
     def object_region(self) -> ObjectRegion:
         """Where the objects are; see `BaseTaskSettings`."""
         every = self.objects.values()
-        size = max(max(of.size[:2]) for of in every)
+        size = 2 * max(max(of.reach[:2]) for of in every)
         color = next(of.color for of in every if of.role == "goal")
         bound = max(abs(y) for of in (self.start, *every) for y in of.range_of("y"))
         first = min(of.range_of("x")[0] for of in every)

@@ -244,7 +244,7 @@ def frames_of(seen: ImageInput, readings: Tensor) -> Tensor:
     if seen.modality == "segmentation":
         return torch.stack([readings == i for i in range(len(CLASSES))], 1).float()
     if seen.modality == "normals":
-        return readings.movedim(-1, -3).contiguous()
+        return ((readings + 1.0) / 2.0).movedim(-1, -3).contiguous()
     return readings
 
 

@@ -126,15 +126,15 @@ class Scenes:
         return maps
 
     def needed(self, offset: Tensor) -> Tensor:
-        """Return the action that a target calls for at an offset (N, 3) from the drone, in metres.
+        """Return the action that a target calls for at an offset (N, 3), see `SceneEdits`.
 
         The task knows it for the actions of its default dynamics; for other actions it is the one
-        with the same name. It is always -1 if any of those names is missing.
+        that is `like` it. It is always -1 if any of these is missing.
         """
-        names, defaults = self.actions.names, self.task.make_dynamics().actions.names
-        if not set(defaults) <= set(names):
+        parts = [self.actions.like(name) for name in self.task.make_dynamics().actions.names]
+        if None in parts:
             return torch.full(offset.shape[:1], -1)
-        same = torch.tensor([*(names.index(name) for name in defaults), -1], device=offset.device)
+        same = torch.tensor([*parts, -1], device=offset.device)
         return same[self.task.edits.needed(offset)]  # -1 reads the last entry
 
     def regions(self, state: State) -> Tensor:

@@ -93,12 +93,12 @@ def make_baseline(
     if name == "oracle":
         _check_oracle(task, actions)
         return OracleAgent()
-    if name not in actions.names:
+    if (part := actions.like(name)) is None:
         raise InputError(
             f"baseline={name} of task={task.name} is no action of these drones, which have "
             f"{', '.join(actions.names)}; name some of these in Task.blind_baselines"
         )
-    return ConstantAgent(actions.always(name))
+    return ConstantAgent(actions.always(actions.names[part]))
 
 
 def baseline_names(task: Task[Any], actions: Actions) -> tuple[str, ...]:

@@ -8,15 +8,16 @@ import abc
 import dataclasses
 import enum
 import functools
+import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.sim.vocabulary import SHOWN_MOVES, ShownActions
+from drone_rl.sim.vocabulary import ShownActions
 from drone_rl.utils import palette
 from drone_rl.utils.palette import Rgb
 
@@ -63,8 +64,18 @@ class Actions(abc.ABC):
 
     @property
     def lefts(self) -> tuple[int, ...]:
-        """All parts that lead to the left; their mirror images lead to the right."""
-        return (self.left,)
+        """All parts that go or turn left; their mirror images lead to the right."""
+        speeds = (_speeds_by_name(name) for name in self.names)
+        leading = (i for i, (_, left, _, turn) in enumerate(speeds) if left + turn > 0)
+        return tuple(sorted({self.left, *leading}))
+
+    def like(self, name: str) -> int | None:
+        """Return the part of a name, None if there is none.
+
+        Without sideways parts, "left" and "right" are those that turn.
+        """
+        sides = {"left": self.left, "right": self.right}
+        return self.names.index(name) if name in self.names else sides.get(name)
 
     def chosen(self, probs: Tensor) -> Tensor:
         """Return the most probable part. Shape: (*)."""
@@ -157,7 +168,7 @@ class Actions(abc.ABC):
     def speeds_of(self, action: Tensor) -> Tensor:
         """Return the commanded speeds: forward, left, up and turning left, 1 is the greatest.
 
-        By default those of the action's part by name, see `SPEEDS`; zero for other names.
+        By default those of the action's part by name, see `PARTS`; zero for other names.
         Shapes: (*), then the entry's, to (*, 4), float32.
         """
         return _speeds(self.names, action.device)[self.part(action)]
@@ -181,8 +192,11 @@ class Actions(abc.ABC):
 
 @functools.lru_cache(maxsize=64)
 def _speeds(names: tuple[str, ...], device: torch.device) -> Tensor:
-    table = [SPEEDS.get(name, (0.0, 0.0, 0.0, 0.0)) for name in names]
-    return torch.tensor(table, device=device)
+    return torch.tensor([_speeds_by_name(name) for name in names], device=device)
+
+
+def _speeds_by_name(name: str) -> tuple[float, float, float, float]:
+    return PARTS[name].speeds if name in PARTS else (0.0, 0.0, 0.0, 0.0)
 
 
 def _take(values: Sequence[int], part: Tensor) -> Tensor:
@@ -245,14 +259,45 @@ def listed(names: tuple[str, ...]) -> str:
     return ", ".join(f"{number} {name}" for number, name in enumerate(names))
 
 
-SPEEDS = {
-    "forward": (1.0, 0.0, 0.0, 0.0),
-    "left": (0.0, 1.0, 0.0, 0.0),
-    "right": (0.0, -1.0, 0.0, 0.0),
-    "up": (0.0, 0.0, 1.0, 0.0),
-    "down": (0.0, 0.0, -1.0, 0.0),
+class Part(NamedTuple):
+    """A part of actions that goes or turns one way, in the drone's frame."""
+
+    speeds: tuple[float, float, float, float]
+    """Forward, left, up and turning left; 1 is the greatest."""
+    arrow: tuple[float, float]
+    color: Rgb
+
+
+_SLANTED = math.sqrt(0.5)
+"""Components of a diagonal arrow."""
+PARTS = {
+    "turn left": Part((0.0, 0.0, 0.0, 1.0), (-_SLANTED, _SLANTED), palette.TURN_LEFT),
+    "left": Part((0.0, 1.0, 0.0, 0.0), (-1.0, 0.0), palette.LEFT),
+    "up": Part((0.0, 0.0, 1.0, 0.0), (0.6, 0.8), palette.UP),
+    "forward": Part((1.0, 0.0, 0.0, 0.0), (0.0, 1.0), palette.FORWARD),
+    "back": Part((-1.0, 0.0, 0.0, 0.0), (0.0, -1.0), palette.BACK),
+    "down": Part((0.0, 0.0, -1.0, 0.0), (0.6, -0.8), palette.DOWN),
+    "right": Part((0.0, -1.0, 0.0, 0.0), (1.0, 0.0), palette.RIGHT),
+    "turn right": Part((0.0, 0.0, 0.0, -1.0), (_SLANTED, _SLANTED), palette.TURN_RIGHT),
 }
-"""Speeds of parts by name, see `Actions.speeds_of`."""
+"""By name, from left to right."""
+
+
+def fields_of(names: tuple[str, ...]) -> dict[str, Any]:
+    """Return the fields of `Actions` with some of `PARTS`, which follow from their speeds."""
+    parts = [PARTS[name] for name in names]
+    number = {part.speeds: i for i, part in enumerate(parts)}
+    mirrored = ((ahead, -left, up, -turn) for ahead, left, up, turn in number)
+    opposite = ((-ahead, -left, -up, -turn) for ahead, left, up, turn in number)
+    return {
+        "names": names,
+        "mirrored": tuple(number[speeds] for speeds in mirrored),
+        "opposite": tuple(number.get(speeds, i) for i, speeds in enumerate(opposite)),
+        "left": names.index("left" if "left" in names else "turn left"),
+        "order": tuple(names.index(name) for name in PARTS if name in names),
+        "arrows": tuple(part.arrow for part in parts),
+        "colors": tuple(part.color for part in parts),
+    }
 
 
 class Move(enum.IntEnum):
@@ -263,29 +308,17 @@ class Move(enum.IntEnum):
     RIGHT = 2
 
 
-MOVES = DiscreteActions(
-    names=SHOWN_MOVES.names,
-    mirrored=(Move.FORWARD, Move.RIGHT, Move.LEFT),
-    opposite=(Move.FORWARD, Move.RIGHT, Move.LEFT),
-    left=Move.LEFT,
-    order=SHOWN_MOVES.order,
-    arrows=SHOWN_MOVES.arrows,
-    colors=SHOWN_MOVES.colors,
-)
+MOVES = DiscreteActions(**fields_of(("forward", "left", "right")))
 """The moves as a set of actions; nothing undoes a move forward."""
-DIRECTIONS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0))
-"""Unit vector of each of `MOVES`, world frame."""
 UP, DOWN = 3, 4
 """Further moves of `MOVES_3D`."""
-MOVES_3D = DiscreteActions(
-    names=(*MOVES.names, "up", "down"),
-    mirrored=(*MOVES.mirrored, UP, DOWN),
-    opposite=(*MOVES.opposite, DOWN, UP),
-    left=Move.LEFT,
-    order=(Move.LEFT, UP, Move.FORWARD, DOWN, Move.RIGHT),
-    arrows=(*MOVES.arrows, (0.6, 0.8), (0.6, -0.8)),
-    colors=(*MOVES.colors, palette.UP, palette.DOWN),
-)
+MOVES_3D = DiscreteActions(**fields_of((*MOVES.names, "up", "down")))
 """The chapter's moves, up and down."""
-DIRECTIONS_3D = (*DIRECTIONS, (0.0, 0.0, 1.0), (0.0, 0.0, -1.0))
-"""Unit vector of each of `MOVES_3D`, world frame."""
+_TURNS = ("turn left", "turn right")
+MOVE_SETS = {
+    "moves": MOVES,
+    "moves_3d": MOVES_3D,
+    "moves_turning": DiscreteActions(**fields_of(("forward", *_TURNS))),
+    "moves_full": DiscreteActions(**fields_of((*MOVES_3D.names, "back", *_TURNS))),
+}
+"""Sets of moves by `ActionSettings.kind`."""

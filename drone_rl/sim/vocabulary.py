@@ -130,8 +130,9 @@ class ShownActions(Model):
     colors: Annotated[
         tuple[palette.Rgb, ...], Several(Several(Whole(0, 255), 3, 3), 1, MOST_ACTIONS)
     ]
-    speeds: Annotated[tuple[float, float, float], Several(Real(0.0, 1e6), 3, 3)] | None = None
-    """Greatest speeds of continuous actions: forward and sideways, m/s; yaw rate, degrees/s."""
+    speeds: Annotated[tuple[float, ...], Several(Real(0.0, 1e6), 3, 5)] | None = None
+    """Greatest speeds of continuous actions: forward and sideways, m/s; yaw rate, degrees/s; then,
+    m/s, climb and backward, in former files neither."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -89,7 +89,8 @@ class FlightConditions(Model):
         parts = self.model_dump()
         parts["dynamics"] = {name: parts["dynamics"][name] for name in names}
         if names == ("mode",):
-            parts["actions"] = {"kind": self.actions.kind}
+            names = ("kind", "turn_step") if self.actions.has_turns else ("kind",)
+            parts["actions"] = {name: parts["actions"][name] for name in names}
         return {f"{part}.{k}": v for part, values in parts.items() for k, v in values.items()}
 
     @functools.cached_property

@@ -14,7 +14,7 @@ from drone_rl.sim.tasks import Task, as_task
 from drone_rl.trust.rule import BLIND_BASELINES, USABLE
 
 BASELINES = (*BLIND_BASELINES, "oracle")
-"""Baselines of cube collection."""
+"""Baselines by name; some tasks have no oracle."""
 _RANDOM_ACTIONS = 5
 """Key of the random actions' stream, derived from that of the first environment."""
 

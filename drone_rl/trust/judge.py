@@ -7,9 +7,9 @@ from typing import Any, Literal, cast, overload
 
 from torchrl.envs import EnvBase
 
-from drone_rl.config import AppearanceSettings, DynamicsSettings, TaskSettings
+from drone_rl.config import AppearanceSettings, BaseTaskSettings, DynamicsSettings
 from drone_rl.config.commands import HeldOutSettings, JudgeSettings
-from drone_rl.config.configuration import Changes, S, as_changes, from_arguments
+from drone_rl.config.configuration import Changes, as_changes, from_arguments
 from drone_rl.envs import DroneEnv
 from drone_rl.envs.rollout import Agent
 from drone_rl.policies.baselines import make_baseline
@@ -17,6 +17,7 @@ from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.zoo import fingerprint
+from drone_rl.sim.tasks import Task, as_task
 from drone_rl.trust.baselines import BASELINES
 from drone_rl.trust.coverage import check_required, find_domain
 from drone_rl.trust.evaluate import held_out_environments
@@ -147,7 +148,7 @@ def judge_one(
     policy: Given,
     settings: JudgeSettings | None = None,
     *,
-    task: Mapping[str, Any] | None = None,
+    task: Mapping[str, Any] | BaseTaskSettings | Task[Any] | str | None = None,
     dynamics: Mapping[str, Any] | None = None,
     appearance: AppearanceSettings | str | None = None,
     certificate: str | Path | None = None,
@@ -166,7 +167,8 @@ def judge_one(
         policy: The policy, what `load_policy` takes, a callable, see `policy_from`, a model of
             Stable-Baselines3, or a baseline: "random", "forward", "left", "right" or "oracle".
         settings: Number of episodes, seed, device and so on.
-        task: Settings to change of the policy's task or, for a baseline, of the default one.
+        task: Settings to change of the policy's task. For a baseline, its task: a name, settings,
+            or settings to change of the default one or of that with the name in "name".
         dynamics: Settings to change of the dynamics, likewise.
         appearance: Appearance of the scenes, or the name of one such as "fog"; by default that of
             the policy's training.
@@ -207,9 +209,10 @@ def judge_one(
                     f"{setting}={path}, but policy={name} has no network; give {setting}= with the "
                     "policy that it is of"
                 )
-        drone = _changed(DynamicsSettings, dynamics, "dynamics")
+        changes = Changes(DynamicsSettings).read(as_changes(dynamics, "dynamics"), "dynamics")
+        drone = DynamicsSettings.read(changes, "dynamics")
         drone.check_air()
-        worlds = _baseline(name, _changed(TaskSettings, task, "task"), drone, settings, seed)
+        worlds = _baseline(name, _task_of(task), drone, settings, seed)
     else:
         measured = find_domain(loaded, shifts, outputs)
         if require_domain is not None:
@@ -268,15 +271,17 @@ def _loaded(policy: Any, outputs: str | Path, changed: Mapping[str, Any]) -> Bas
     return None
 
 
-def _changed(of: type[S], changes: Any, where: str) -> S:
-    """Return the default settings of a class with changes."""
-    return of.read(Changes(of).read(as_changes(changes, where), where), where)
+def _task_of(given: Any) -> Task[Any]:
+    """Return a task, by its name or settings, or with changes of the default one's."""
+    if given is None or isinstance(given, str | BaseTaskSettings | Task):
+        return as_task(given)
+    return as_task(BaseTaskSettings.read(Changes().read(as_changes(given, "task"), "task"), "task"))
 
 
 @contextmanager
 def _baseline(
     name: str,
-    task: TaskSettings,
+    task: Task[Any],
     dynamics: DynamicsSettings,
     settings: HeldOutSettings,
     seed: RootSeed,

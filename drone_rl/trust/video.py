@@ -266,17 +266,22 @@ def probabilities(act: Act, actions: Actions) -> Tensor:
 
 
 def _draw_bars(draw: ImageDraw.ImageDraw, font: Font, act: Act, actions: Actions) -> None:
-    """Draw a bar for each action; its length is the probability. The chosen action's is white."""
+    """Draw a bar for each action; its length is the probability. The chosen action's is white.
+
+    More than five are in two rows.
+    """
     chosen, names = int(actions.part(act.action[0])), actions.names
     probs = probabilities(act, actions)
-    room = 960 // len(names)
+    rows = 1 if len(names) <= 5 else 2
+    columns, tall = -(-len(names) // rows), 20 // rows + 5 * (rows - 1)
+    room, font = 960 // columns, font if rows == 1 else ImageFont.load_default(12)
     for i, action in enumerate(actions.order):
-        x, y = 300 + room * i, _BOTTOM
+        x, y = 300 + room * (i % columns), _BOTTOM + tall * (i // columns)
         share = float(probs[action])
         draw.text((x, y), f"{names[action]} {share:.2f}", _TEXT, font)
         color = _CHOSEN if action == chosen else _BAR
         most = room - 140
-        draw.rectangle((x + 120, y + 2, x + 120 + max(1, int(most * share)), y + 18), color)
+        draw.rectangle((x + 120, y + 2, x + 120 + max(1, int(most * share)), y + tall - 2), color)
 
 
 def render_chase(worlds: Worlds, look: Appearance | None, height: int, width: int) -> Tensor:

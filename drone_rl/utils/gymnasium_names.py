@@ -1,23 +1,21 @@
-"""Names of the environments in Gymnasium's registry."""
-
-ENVIRONMENTS = {
-    "drone_rl/CollectCubes-v0": "collect_cubes",
-    "drone_rl/Pillars-v0": "pillars",
-}
-"""Task of each Gymnasium environment; `gymnasium.make` takes its settings as options."""
+"""Names of the tasks' environments in Gymnasium's registry."""
 
 
-def register() -> None:
-    """Register the environments if Gymnasium is installed; they are imported when one is made."""
+def environment_id(task: str) -> str:
+    """Return the name of a task's environment: "drone_rl/ReachBall-v0" of reach_ball."""
+    return f"drone_rl/{task.title().replace('_', '')}-v0"
+
+
+def register_environment(task: str) -> None:
+    """Register the environment of a task if Gymnasium is installed; it is imported when made."""
     try:
         import gymnasium  # an optional extra
     except ImportError:
         return
-    for name, task in ENVIRONMENTS.items():
-        if name not in gymnasium.registry:
-            gymnasium.register(
-                name,
-                entry_point="drone_rl:DroneWorld",
-                vector_entry_point="drone_rl:DroneWorlds",
-                kwargs={"task": task},
-            )
+    if environment_id(task) not in gymnasium.registry:
+        gymnasium.register(
+            environment_id(task),
+            entry_point="drone_rl:DroneWorld",
+            vector_entry_point="drone_rl:DroneWorlds",
+            kwargs={"task": task},
+        )

@@ -13,7 +13,8 @@ TURN_LEFT: Rgb = (242, 207, 128)
 TURN_RIGHT: Rgb = (128, 184, 216)
 UP: Rgb = (0, 120, 90)
 DOWN: Rgb = (120, 94, 60)
-"""Actions; a turn is a lighter shade of its side."""
+BACK: Rgb = (230, 188, 211)
+"""Actions; a turn is a lighter shade of its side, back one of forward."""
 GOOD: Rgb = (0, 158, 115)
 """Good, reached, passed."""
 ONE_SIDED: Rgb = (86, 180, 233)

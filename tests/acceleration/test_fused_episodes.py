@@ -1,9 +1,11 @@
 """Episodes of the fused kernel equal their replay step by step."""
 
 import threading
+from functools import partial
 
 import pytest
 import torch
+from torchrl.envs import CatFrames
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl.acceleration import FusedEpisodes, fused_episodes
@@ -11,6 +13,7 @@ from drone_rl.acceleration.fused_episodes import RolloutBuffer
 from drone_rl.acceleration.fused_network import FusedNetwork
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.config import (
+    ActionSettings,
     AppearanceSettings,
     CameraSettings,
     DynamicsSettings,
@@ -45,14 +48,16 @@ def make(
     num_envs=5,
     network=None,
     dynamics=None,
+    actions=None,
     **how,
 ):
     made = [transform() for transform in transforms]
-    env = DroneEnv(num_envs, task, dynamics=dynamics, transforms=made)
+    env = DroneEnv(num_envs, task, dynamics=dynamics, actions=actions, transforms=made)
     generator = torch.Generator().manual_seed(0)
     if network is None:
         shape = tuple(env.observation_spec["pixels"].shape[1:])
-        network = SmallCNN(shape, 3, channels=(4,), hidden=(8,), generator=generator)
+        count = env.worlds.dynamics.actions.num_outputs
+        network = SmallCNN(shape, count, channels=(4,), hidden=(8,), generator=generator)
         with torch.no_grad():
             network.layers.logits.weight.mul_(100)
     actor = make_actor(network, env.action_spec, generator)
@@ -145,6 +150,39 @@ def test_cropped_frames_and_a_network_with_pooling_are_fused(is_cropped_first):
             assert torch.equal(one[key], other[key]), key
     assert torch.allclose(one["logits"], other["logits"], atol=1e-4)
     assert one["pixels"].shape[1:] == (1, 20, 64)
+
+
+@pytest.mark.parametrize("kind", ["moves_3d", "moves_turning", "moves_full"])
+@pytest.mark.parametrize("dynamics", [None, FLYING])
+def test_other_moves_and_turns_are_fused(kind, dynamics):
+    task = SHORT.replace(step_limit=25)
+    actions = ActionSettings(kind=kind, turn_step=25.0)
+    how = {"dynamics": dynamics, "actions": actions, "info": ("drone", "attitude")}
+    made = [make(task, compiled=compiled, **how) for compiled in (True, False)]
+    assert isinstance(made[0].fused, FusedEpisodes)
+    with set_exploration_type(DETERMINISTIC):
+        for _ in range(2):
+            one, other = (collector.collect() for collector in made)
+            for key in other.keys(True, True):
+                if key != "logits":
+                    assert torch.equal(one[key], other[key]), key
+            assert len(one["action"].unique()) > 1
+
+
+@pytest.mark.parametrize("longest_launch", [64, 2])
+@pytest.mark.parametrize("more", [(), (lambda: CropRows(3, 23),)])
+def test_stacks_of_frames_are_fused(monkeypatch, more, longest_launch):
+    """Also where an observation has frames of two launches."""
+    monkeypatch.setattr(fused_episodes, "_MAX_STEPS", longest_launch)
+    stack = partial(CatFrames, 3, dim=-3, in_keys=["pixels"])
+    transforms = [GrayPixels, stack, StandardizePixels, *more]
+    made = [make(transforms=transforms, compiled=compiled) for compiled in (True, False)]
+    assert isinstance(made[0].fused, FusedEpisodes)
+    with set_exploration_type(DETERMINISTIC):
+        for _ in range(2):
+            one, other = (collector.collect() for collector in made)
+            assert torch.equal(one["pixels"], other["pixels"]) and one["pixels"].shape[1] == 3
+            assert torch.equal(one["action"], other["action"])
 
 
 @pytest.mark.parametrize("how", [{"num_threads": 2}, {"num_threads": 3}])

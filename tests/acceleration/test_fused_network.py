@@ -36,6 +36,8 @@ def assert_equal_torch(network, fused, count, shape):
         ((1, 26, 41), {"patch": 5, "channels": (3, 17, 40), "hidden": (33, 20)}),
         ((1, 4, 4), {"channels": (5,), "hidden": (7,)}),  # output of 1x1
         ((1, 12, 40), {"channels": (6, 9), "hidden": (16,)}),  # output with one row
+        ((3, 13, 22), {"channels": (5, 6)}),  # frames of three channels
+        ((2, 8, 8), {"patch": 8, "channels": (4,)}),  # a patch is a whole frame
     ],
 )
 def test_gradients_equal_torch(shape, options, num_threads):
@@ -70,7 +72,11 @@ def test_gradients_of_a_network_with_pooling_equal_torch(shape, options, num_thr
 @pytest.mark.filterwarnings("error")  # reading grad of a non-leaf image would warn
 @pytest.mark.parametrize(
     ("shape", "options"),
-    [((1, 25, 64), {"hidden": (128,)}), ((1, 25, 64), {"channels": (5, 6, 7), "hidden": (9,)})],
+    [
+        ((1, 25, 64), {"hidden": (128,)}),
+        ((1, 25, 64), {"channels": (5, 6, 7), "hidden": (9,)}),
+        ((3, 13, 22), {"channels": (5,)}),
+    ],
 )
 def test_gradients_of_images_equal_torch(shape, options):
     network = make_network(shape, **options)
@@ -147,7 +153,6 @@ def test_network_for_images_keeps_its_initial_weights():
 def test_unsupported_networks_return_a_reason():
     for network, reason in (
         (MLP((1, 25, 64), 3), "network MLP is not fused"),
-        (SmallCNN((2, 25, 64), 3), "a network of 2 channels is not fused"),
         (SmallCNN((1, 25, 64), 3, hidden=(600,)), "1082515 weights are more than 1048576"),
     ):
         found = FusedNetwork.try_create(network, 1)

@@ -80,11 +80,12 @@ def test_logits_equal_those_of_a_network_with_pooling(shape, options):
         assert torch.allclose(infer(packed, images, 3), network(images), rtol=1e-4, atol=1e-4)
 
 
-def test_first_pixel_skips_rows_of_a_larger_frame():
-    network = SmallCNN((1, 12, 20), 3, generator=torch.Generator().manual_seed(0))
-    packed = PackedNetwork(network, first_pixel=3 * 20)
+@pytest.mark.parametrize("channels", [1, 2])
+def test_rows_of_larger_frames_are_skipped(channels):
+    network = SmallCNN((channels, 12, 20), 3, generator=torch.Generator().manual_seed(0))
+    packed = PackedNetwork(network, first_pixel=3 * 20, hidden_pixels=5 * 20)
     packed.pack()
-    images = torch.randn(2, 1, 17, 20)
+    images = torch.randn(2, channels, 17, 20)
     assert torch.allclose(infer(packed, images, 3), network(images[:, :, 3:15]), atol=1e-5)
 
 
@@ -113,7 +114,6 @@ def test_only_supported_layers_are_packed(layers, is_supported):
 
 def test_other_networks_are_not_packed():
     assert unsupported(MLP((1, 25, 64), 3))
-    assert unsupported(OriginalCNN((3, 25, 64), 3))
     assert unsupported(SmallCNN((1, 25, 64), 3).double())
     assert unsupported(Mirrored((1, 25, 64), 3)) == ["network Mirrored overrides forward"]
 

@@ -34,7 +34,7 @@ def test_output_shapes(name, values, picture, after):
 
 def test_faults_are_those_by_chance_or_with_memory():
     faults = {v.name for v in Transform.registry.values() if issubclass(v, Fault)}
-    assert faults == {"noise", "dead_rows", "frozen_frames", "late_frames", "shift"}
+    assert faults == {"noise", "bias", "dead_rows", "frozen_frames", "late_frames", "shift"}
     assert all(issubclass(variant.factory, CameraFault) for variant in Fault.__subclasses__())
 
 

@@ -2,7 +2,7 @@
 
 import torch
 
-from drone_rl.config import CameraSettings
+from drone_rl.config import ActionSettings, CameraSettings
 from drone_rl.envs import (
     ChromaticityPixels,
     CropRows,
@@ -68,9 +68,14 @@ def test_channels_by_transform(scenes):
 def test_the_needed_action_is_known_for_the_default_actions(scenes):
     left = torch.tensor([[9.0, 4.0, 0.0]])
     assert scenes.needed(left).tolist() == [1]
-    env = DroneEnv(1, dynamics=Turning(), transforms=[GrayPixels()])
-    assert Scenes(env).needed(left).tolist() == [-1]
-    env.close()
+    for how, needed in (
+        ({"dynamics": Turning()}, -1),
+        ({"actions": ActionSettings(kind="moves_turning")}, 1),  # it turns left
+        ({"actions": ActionSettings(kind="moves_full")}, 1),
+    ):
+        env = DroneEnv(1, transforms=[GrayPixels()], **how)
+        assert Scenes(env).needed(left).tolist() == [needed]
+        env.close()
 
 
 def test_alternatives_of_a_scene(scenes, world):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.sim.actions import MOVES, DiscreteActions
+from drone_rl.sim.actions import MOVE_SETS, MOVES, MOVES_3D, DiscreteActions
 from tests.five_actions import FIVE
 
 
@@ -64,12 +64,34 @@ def test_opposition_is_the_smaller_change_of_left_and_right(probs, other, expect
     assert FIVE.opposition(np.array(probs), np.array(other)) == pytest.approx(expected)
 
 
-def test_moves_in_three_dimensions_extend_the_chapters():
-    from drone_rl.sim.actions import DIRECTIONS_3D, MOVES, MOVES_3D
+FULL = MOVE_SETS["moves_full"]
 
-    assert MOVES_3D.names == (*MOVES.names, "up", "down")
-    assert [MOVES_3D.names[i] for i in MOVES_3D.opposite[3:]] == ["down", "up"]
-    assert [sum(d) for d in DIRECTIONS_3D] == [1, 1, -1, 1, -1]
+
+def test_sets_of_moves_extend_the_chapters():
+    assert MOVES_3D.names == (*MOVES.names, "up", "down") == FULL.names[:5]
+    assert MOVE_SETS["moves_turning"].names == ("forward", "turn left", "turn right")
+    assert FULL.names[5:] == ("back", "turn left", "turn right")
+    assert [MOVES_3D.names[i] for i in MOVES_3D.order] == ["left", "up", "forward", "down", "right"]
+    assert [MOVES.names[i] for i in MOVES.opposite] == ["forward", "right", "left"]
+    assert all(len(actions.shown.names) == len(actions) for actions in MOVE_SETS.values())
+
+
+def test_full_moves_have_mirror_images_and_opposites():
+    names = FULL.names
+    assert [names[i] for i in FULL.mirrored] == [
+        *("forward", "right", "left", "up", "down", "back", "turn right", "turn left")
+    ]
+    assert [names[i] for i in FULL.opposite] == [
+        *("back", "right", "left", "down", "up", "forward", "turn right", "turn left")
+    ]
+    assert [names[i] for i in FULL.lefts] == ["left", "turn left"] and FULL.left == 1
+    turning = MOVE_SETS["moves_turning"]
+    assert (turning.left, turning.right, turning.lefts) == (1, 2, (1,))
+    assert FULL.speeds_of(torch.tensor([5, 6, 4])).tolist() == [
+        [-1, 0, 0, 0],
+        [0, 0, 0, 1],
+        [0, 0, -1, 0],
+    ]
 
 
 FOUR = DiscreteActions(

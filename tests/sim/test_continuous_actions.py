@@ -30,6 +30,9 @@ def outputs(forward=0.0, left=0.0, yaw=0.0):
     return torch.tensor([*means, 0.0, 0.0, 0.0], dtype=torch.float64)
 
 
+FREE = ContinuousActions.of(SETTINGS.replace(climb_speed=2.0, backward_speed=1.0))
+
+
 def phi(x):
     return 0.5 * math.erfc(-x / math.sqrt(2))
 
@@ -114,3 +117,47 @@ def test_greedy_action_is_the_mean():
 def test_lateral_motion_without_progress_is_swaying():
     action = torch.tensor([[-1.0, 0.5, 0], [-0.3, 0.5, 0], [-0.4, 0, -0.5], [-1, 0.2, 0.2]])
     assert ALL.is_reversible(ALL.kept(action)).tolist() == [True, False, True, False]
+
+
+def test_climb_and_backward_have_parts_and_numbers():
+    """Forward goes from -1 to 4 m/s, so -0.6 stands still."""
+    assert FREE.names == (*ALL.names, "up", "down", "back")
+    assert FREE.entry.shape == (4,) and FREE.num_outputs == 8 and ALL.num_outputs == 6
+    action = torch.tensor([[-1.0, 0, 0, 0], [-0.6, 0, 0, 1], [1, 1, 0, -0.5], [0, 0, 0, 9]])
+    expected = [[-1, 0, 0, 0], [0, 0, 0, 2], [4, 3, 0, -1], [1.5, 0, 0, 2]]
+    torch.testing.assert_close(FREE.to_rates(action), torch.tensor(expected).double())
+    assert FREE.speeds_of(action)[0].tolist() == [-0.25, 0, 0, 0]
+    assert FREE.speeds_of(action)[2].tolist() == [1, 1, -0.5, 0]
+    assert [FREE.names[i] for i in FREE.part(action)] == ["back", "up", "left", "up"]
+    slow = torch.tensor([[-0.72, 0, 0, 0], [-0.74, 0, 0, 0], [-0.9, 0.5, 0, 0.9]])
+    assert [FREE.names[i] for i in FREE.part(slow)] == ["forward", "back", "up"]  # at -1/3 m/s
+    for number, name in enumerate(FREE.names):
+        assert FREE.part(FREE.always(name)) == number
+    standing = torch.stack([FREE.always(name) for name in ("left", "up")])
+    assert FREE.to_rates(standing)[:, 0].tolist() == pytest.approx([0.0, 0.0], abs=1e-6)
+    only = ContinuousActions.of(SETTINGS.replace(yaw_rate=0.0, backward_speed=4.0))
+    assert only.names == ("forward", "left", "right", "back") and only.entry.shape == (3,)
+
+
+def test_probabilities_of_all_parts_are_the_frequencies_of_samples():
+    means, logs = [0.2, 0.5, -0.3, 0.4], [0.0, 0.5, 0.2, -0.4]
+    outputs = torch.tensor([*means, *logs], dtype=torch.float64)
+    mean, deviation = normal_of(outputs)
+    noise = torch.randn(400_000, 4, generator=torch.Generator().manual_seed(0)).double()
+    action = (mean + deviation * noise).tanh()
+    fractions = FREE.fractions(action)
+    belongs = torch.stack(
+        [
+            *(fractions[:, 1] > 1 / 3, fractions[:, 1] < -1 / 3),
+            *(fractions[:, 2] > 1 / 3, fractions[:, 2] < -1 / 3),
+            *(fractions[:, 3] > 1 / 3, fractions[:, 3] < -1 / 3),
+            fractions[:, 0] < -0.25 / 3,
+        ],
+        -1,
+    ).double()
+    count = belongs.sum(-1, keepdim=True)
+    counted = torch.cat([(count == 0).double(), belongs / count.clamp(min=1)], -1)
+    expected = FREE.probabilities(outputs)
+    assert expected.sum().item() == pytest.approx(1.0)
+    torch.testing.assert_close(counted.mean(0), expected, atol=0.003, rtol=0)
+    assert torch.autograd.gradcheck(FREE.probabilities, outputs.requires_grad_())

@@ -7,13 +7,14 @@ from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.policies.baselines import ConstantAgent, OracleAgent, RandomAgent, make_baseline
-from drone_rl.sim.actions import Move
+from drone_rl.sim.actions import MOVE_SETS, Move
 from drone_rl.sim.tasks import as_task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.trust.baselines import BASELINES, run_baselines
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import side_stream, world_random_state
 from tests.continuous import make_env
+from tests.second_dynamics import Turning
 from tests.second_task import Posts
 
 TASK = TaskSettings(num_cubes=1)
@@ -69,9 +70,15 @@ def test_baselines_with_continuous_actions():
 
 
 def test_baseline_that_is_no_action_is_refused():
-    actions = SimpleNamespace(names=("throttle", "pitch"))
-    with pytest.raises(InputError, match=r"baseline=forward of task=.* which have throttle, pitch"):
-        make_baseline("forward", as_task(TASK), actions, torch.Generator())
+    with pytest.raises(InputError, match=r"baseline=forward of task=.* which have fly, turn left"):
+        make_baseline("forward", as_task(TASK), Turning.actions, torch.Generator())
+
+
+def test_a_drone_that_only_turns_has_baselines_that_turn():
+    for name, action in (("forward", 0), ("left", 1), ("right", 2)):
+        turning = MOVE_SETS["moves_turning"]
+        agent = make_baseline(name, as_task(TASK), turning, torch.Generator())
+        assert agent.act(SimpleNamespace(rows=torch.arange(2))).action.tolist() == [action] * 2
 
 
 def test_oracle_of_other_actions_is_refused():

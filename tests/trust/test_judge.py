@@ -2,10 +2,14 @@
 
 import json
 import re
+from unittest.mock import patch
 
 import pytest
 
 import drone_rl
+from drone_rl.config import TASKS
+from drone_rl.sim.tasks.task import MAKERS
+from drone_rl.sim.tasks.term_task import define_task
 from drone_rl.trust.judge import Judgement, Judgements
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
@@ -118,3 +122,23 @@ def test_table_of_judgements():
         ["a", "good", "yes", "95.0% (90.0% to 100%)"],
         ["<b>", "none of these", "no", "60.0% (58.0% to 62.0%)"],
     ]
+
+
+@pytest.mark.parametrize("task", ["pillars", {"name": "pillars", "num_rows": 2}])
+def test_baselines_of_any_task_are_judged_by_name(task):
+    done = drone_rl.judge("oracle", task=task, episodes=4, progress=silent)
+    assert done.terms.goals == "rows" and done.greedy.success.share == 1.0
+
+
+def test_a_baseline_of_a_task_of_terms_is_judged_and_its_oracle_is_missed():
+    with patch.dict(TASKS), patch.dict(MAKERS):
+        define_task(
+            "near_ball",
+            objects={"ball": {"role": "goal", "x": 4.0, "y": 0.0, "z": 2.5}},
+            reward=["reached"],
+            success=["all_goals"],
+        )
+        done = drone_rl.judge("forward", task="near_ball", episodes=4, progress=silent)
+        assert done.greedy.success.share == 1.0
+        with pytest.raises(InputError, match="task=near_ball has no oracle"):
+            drone_rl.judge("oracle", task="near_ball", progress=silent)

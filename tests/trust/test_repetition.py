@@ -5,11 +5,18 @@ import torch
 
 from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import TaskSettings
+from drone_rl.config.inputs import Goal, GrayImage, describe_inputs
 from drone_rl.envs import DroneEnv, GrayPixels
 from drone_rl.envs.rollout import Act
-from drone_rl.policies import make_actor
+from drone_rl.policies import ImageNetwork, make_actor
 from drone_rl.sim.actions import Move
-from drone_rl.trust.repetition import InGroups, WithOtherImages, exchange_images, repeat
+from drone_rl.trust.repetition import (
+    InGroups,
+    WithOtherInputs,
+    exchange_images,
+    exchange_inputs,
+    repeat,
+)
 from drone_rl.utils.seeding import Stream
 from tests.trust.subjects import SMALL, TASK, Blind, Steering
 
@@ -20,11 +27,11 @@ EPISODES = 60
 def make_run():
     """Episodes of a network or an agent, with the environments in the state before them."""
 
-    def run(policy, task=TASK, episodes=EPISODES, num_envs=20):
-        env = DroneEnv(
-            num_envs, task, SMALL, transforms=[GrayPixels()], seed=3, stream=Stream.REPORT
-        )
-        actor = make_actor(policy, env.action_spec) if hasattr(policy, "in_shape") else policy
+    def run(policy, task=TASK, episodes=EPISODES, num_envs=20, inputs=None):
+        transforms = [GrayPixels()]
+        how = {"transforms": transforms, "inputs": inputs, "seed": 3, "stream": Stream.REPORT}
+        env = DroneEnv(num_envs, task, SMALL, **how)
+        actor = make_actor(policy, env.action_spec) if isinstance(policy, ImageNetwork) else policy
         state = env.state_dict()
         greedy = rollout(actor, env, episodes)
         env.load_state_dict(state)
@@ -177,9 +184,36 @@ def test_groups_of_environments_share_calls(make_run):
 def test_other_images_are_those_of_the_next_environment_and_its_last_ones(make_run):
     whole, other = Noting(), Noting()
     make_run(whole, episodes=20)
-    make_run(WithOtherImages(other), episodes=20)
+    make_run(WithOtherInputs(other), episodes=20)
     last = torch.zeros(20)
     for (rows, own), (same_rows, seen) in zip(whole.seen, other.seen, strict=True):
         assert rows == same_rows
         last[rows] = own
         assert torch.equal(seen, last[[(row + 1) % 20 for row in rows]])
+
+
+class ToGoal(ImageNetwork):
+    """Goes to the side of its goal, and has an image that it does not use."""
+
+    in_keys = ("gray", "goal")
+
+    def __init__(self, weight=0.0):
+        super().__init__()
+        self.weight = weight
+
+    def forward(self, gray, goal):  # pyright: ignore[reportIncompatibleMethodOverride]
+        side = goal[..., 1] + self.weight * gray.flatten(1).mean(-1)
+        return torch.stack([0.3 - side.abs(), side, -side], -1)
+
+
+@pytest.mark.parametrize("weight", [0.0, 0.01])
+def test_an_input_is_ignored_only_if_no_action_changes_with_it(make_run, weight):
+    inputs = describe_inputs({"gray": GrayImage(), "goal": Goal()}, SMALL, ())
+    env, actor, greedy = make_run(ToGoal(weight), inputs=inputs)
+    uses = exchange_inputs(env, actor, greedy)
+    assert uses["goal"].own > 0.95 and uses["goal"].exchanged < 0.7
+    assert not (uses["goal"].is_ignored or uses["goal"].is_dispensable)
+    assert uses["gray"].is_dispensable and uses["gray"].success.mean == pytest.approx(0, abs=0.05)
+    assert uses["gray"].is_ignored == (weight == 0.0)
+    steps = int(greedy.length.sum())
+    assert uses["gray"].changed.trials == 3 * steps  # of three other environments

@@ -16,7 +16,7 @@ from drone_rl.config import (
 from drone_rl.config.networks import Lstm
 from drone_rl.envs import GrayPixels
 from drone_rl.envs.rollout import Act
-from drone_rl.sim.actions import MOVES
+from drone_rl.sim.actions import MOVE_SETS, MOVES
 from drone_rl.sim.entities import CHASE
 from drone_rl.sim.rendering.appearance import product, rotate, turned
 from drone_rl.sim.rendering.scene import SemanticClass
@@ -91,6 +91,14 @@ def test_video_that_cannot_be_written(tmp_path):
 def test_film_of_another_task(make_pipeline):
     frames = list(film_episode(*make_pipeline(1, task=Posts())))
     assert 2 <= len(frames) <= 13 and frames[0].shape == (720, 1280, 3)
+
+
+def test_bars_of_many_actions_are_in_two_rows():
+    canvas, actions = Canvas(), MOVE_SETS["moves_full"]
+    _draw_bars(canvas, None, Act(torch.tensor([0])), actions)
+    places = [x for x, _ in canvas.texts]
+    assert places == [300, 540, 780, 1020] * 2
+    assert max(length for _, length, _ in canvas.bars) == 100
 
 
 @pytest.mark.parametrize("actions", [MOVES, FIVE])

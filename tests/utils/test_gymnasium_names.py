@@ -4,11 +4,13 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 
-from drone_rl.sim.tasks import as_task
-from drone_rl.utils.gymnasium_names import ENVIRONMENTS
+from drone_rl.config import TASKS
+from drone_rl.sim.tasks.task import MAKERS
+from drone_rl.sim.tasks.term_task import define_task
 from tests.forked import run_forked
 
 ROOT = Path(__file__).parents[2]
@@ -41,12 +43,24 @@ def test_the_readme_example_prints_nothing():
     assert (done.stdout, done.stderr) == ("", "")
 
 
-@pytest.mark.parametrize("name", ENVIRONMENTS)
-def test_each_name_makes_its_task(name):
-    spec = gymnasium.spec(name)
-    assert spec.kwargs == {"task": ENVIRONMENTS[name]}
-    assert spec.max_episode_steps is None  # the task's own limit counts, once
-    assert as_task(spec.kwargs["task"]).largest_reward > 0
+def test_import_registers_the_shipped_tasks():
+    code = (
+        "import gymnasium, drone_rl\n"
+        "before = [name for name in gymnasium.registry if name.startswith('drone_rl/')]\n"
+        "import drone_rl.sim.tasks\n"
+        "after = [name for name in gymnasium.registry if name.startswith('drone_rl/')]\n"
+        "assert before == after == ['drone_rl/CollectCubes-v0', 'drone_rl/Pillars-v0'], after\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_an_own_task_has_a_name_of_its_own():
+    with patch.dict(TASKS), patch.dict(MAKERS), patch.dict(gymnasium.registry):
+        objects = {"ball": {"role": "goal"}}
+        define_task("reach_2_balls", objects=objects, reward=["reached"], success=["all_goals"])
+        with gymnasium.make("drone_rl/Reach2Balls-v0", step_limit=7) as env:
+            assert env.unwrapped.batch.task.values()["step_limit"] == 7
+            assert env.spec.max_episode_steps is None  # the task's own limit counts, once
 
 
 def test_gymnasium_suggests_a_name():

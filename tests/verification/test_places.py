@@ -12,7 +12,6 @@ from drone_rl.config.networks import Mlp
 from drone_rl.explanations.report.places import rows
 from drone_rl.explanations.scenes import Scenes, place_target
 from drone_rl.policies.policy import Policy
-from drone_rl.policies.zoo.description import IMAGE
 from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
@@ -25,7 +24,7 @@ def small():
     """A policy of 12x5 pixels with random weights and opinions."""
     good = drone_rl.load_policy("good")
     image = good.description.inputs["pixels"].replace(size=(5, 12))
-    description = good.description.replace(inputs={IMAGE: image}, network=Mlp(hidden=(8,)))
+    description = good.description.replace(inputs={"pixels": image}, network=Mlp(hidden=(8,)))
     network = description.build_network(torch.Generator().manual_seed(3))
     weights = {name: 20 * value for name, value in network.state_dict().items()}
     return Policy(

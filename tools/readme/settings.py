@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from drone_rl.cli.hydra.composition import GROUPS, PARTS, SEVERAL
+from drone_rl.cli.hydra.composition import CHOSEN, GROUPS, PARTS, SEVERAL
 from drone_rl.cli.main import COMMANDS, find_command
 from drone_rl.config import TASKS, BaseTaskSettings
 from drone_rl.config.configuration import Changes
@@ -28,6 +28,10 @@ BAR = "&#124;"
 """A bar within a cell."""
 _TASK = "task"
 _HEAD = "| setting | values | unit | default | meaning |\n| --- | --- | --- | --- | --- |"
+
+
+_VARIANTS = {**PARTS, **SEVERAL, **{group: part for group, (part, _) in CHOSEN.items()}}
+"""Groups whose choices are variants of a part."""
 
 
 def list_groups() -> str:
@@ -58,7 +62,7 @@ def list_terms() -> str:
 
 def list_parts() -> str:
     """Return the parts of a training that have variants, with a table for each variant."""
-    return "\n\n".join(_part(group, part) for group, part in {**PARTS, **SEVERAL}.items())
+    return "\n\n".join(_part(group, part) for group, part in _VARIANTS.items())
 
 
 def list_commands() -> str:
@@ -73,7 +77,9 @@ def list_choices(conf: Path) -> str:
     """Return a table of the groups and their choices: files of conf/, and registered names."""
     folders = {path.parent for path in conf.glob("**/*.yaml")} - {conf, conf / "hydra"}
     registered: dict[str, list[str]] = {group: [choice] for group, (_, choice) in GROUPS.items()}
-    registered |= {group: [*part.registry] for group, part in PARTS.items()} | {_TASK: [*TASKS]}
+    registered |= {
+        group: [*part.registry] for group, part in _VARIANTS.items() if group not in SEVERAL
+    } | {_TASK: [*TASKS]}
     names = {
         str(folder.relative_to(conf)): [p.stem for p in folder.glob("*.yaml")] for folder in folders
     }
@@ -122,7 +128,7 @@ def _part(group: str, part: type[Part]) -> str:
     for name, variant in part.registry.items():
         lines.append(f"**`{name}`** {about(variant)}")
         if variant.model_fields:
-            inside = f"{name}." if group in SEVERAL else ""
+            inside = f"{name}." if group in (*SEVERAL, *CHOSEN) else ""
             lines.append(make_table(variant, f"{group}.{inside}"))
     return "\n\n".join(lines)
 
@@ -155,7 +161,7 @@ def _link(cls: type) -> str:
     groups = {
         BaseTaskSettings: _TASK,
         **{c: g for g, (c, _) in GROUPS.items()},
-        **{c: g for g, c in {**PARTS, **SEVERAL}.items()},
+        **{c: g for g, c in _VARIANTS.items()},
     }
     return f"[{groups[cls]}](#{groups[cls]})"
 

@@ -110,7 +110,7 @@ def _defaults_of(command: type[CommandSettings]) -> tuple[dict[str, Any], dict[s
         if name in GROUPS:
             groups[name] = GROUPS[name][1] if isinstance(value, Settings) else None
         if isinstance(kind, Changes):
-            values[name] = dict.fromkeys(kind.names)
+            groups[name], values[name] = None, dict.fromkeys(kind.names)
         elif name in CHOSEN:
             groups[name] = [CHOSEN[name][1]]
         elif name in SEVERAL:

@@ -1,6 +1,5 @@
 """`drone-rl COMMAND --help`: print settings and examples."""
 
-import inspect
 import shlex
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,6 +11,7 @@ from omegaconf import OmegaConf
 
 from drone_rl.cli.commands import TABLE
 from drone_rl.cli.hydra.mistakes import choices, composed, flattened, similar
+from drone_rl.cli.settings import CommandSettings
 from drone_rl.config import TASKS
 from drone_rl.config.configuration import Changes
 from drone_rl.config.parts import Named, Parts
@@ -36,7 +36,7 @@ _RUN_FOLDER = "Folder of this command's files; a new one under outputs/ by defau
 def show_help(
     command: str,
     overrides: Sequence[str],
-    settings: type[Settings],
+    settings: type[CommandSettings],
     topics: Sequence[str] = (),
 ) -> None:
     """Print the settings and groups of a command, or what `topics` names, and examples.
@@ -58,7 +58,7 @@ def show_help(
     described |= {g: (f"One of: {', '.join(names)}.", "") for g, names in groups.items()}
     described |= {"hydra.run.dir": (_RUN_FOLDER, ""), "plugins": (_PLUGINS, "")}
     name = command.replace("_", "-")
-    print(f"drone-rl {name} [setting=value ...]\n\n{inspect.getdoc(settings)}\n")
+    print(f"drone-rl {name} [setting=value ...]\n\n{settings.description()}\n")
     if not topics:
         print(f"Settings, with their values; drone-rl {name} --help GROUP lists those of a group:")
         keys = [key for key in keys if "." not in key or key == "hydra.run.dir"]

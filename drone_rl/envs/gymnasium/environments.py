@@ -21,7 +21,7 @@ Mask = NDArray[np.bool_]
 
 
 class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
-    """`gymnasium.make_vec("drone_rl/CollectCubes-v0", num_envs=64)`; see `DroneWorld`.
+    """`gymnasium.make_vec("drone_rl/MyTask-v0", num_envs=64)`; see `DroneWorld`.
 
     It behaves like Gymnasium's `SyncVectorEnv` of `DroneWorld`s: after `reset(seed=7)` environment
     i samples the same episodes as a single one after `reset(seed=7 + i)`.
@@ -203,9 +203,10 @@ _ONLY = torch.zeros(1, dtype=torch.int64)
 
 
 class DroneWorld(gymnasium.Env[NDArray[Any], Any]):
-    """A drone with a task: `gymnasium.make("drone_rl/CollectCubes-v0", num_cubes=2)`.
+    """A drone with a task: `gymnasium.make("drone_rl/MyTask-v0", step_limit=50)` for my_task.
 
-    `import drone_rl` registers the name; `"drone_rl:drone_rl/CollectCubes-v0"` needs no import.
+    The name is registered with the task: `import drone_rl` registers those of the package, your
+    module its own. Gymnasium imports a module before a colon: `"my_module:drone_rl/MyTask-v0"`.
 
     Observations are camera images, RGB bytes (height, width, 3), after the `transforms`, if any,
     among which may be camera faults and stacks of frames. With `observations="state"` they are the

@@ -5,12 +5,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from drone_rl.config.commands import ServeSettings
 from drone_rl.config.configuration import from_arguments
 from drone_rl.flight.airsim.server import AirsimServer
 from drone_rl.flight.airsim.settings_file import AirsimSettings, parse_settings, read_settings
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.server_thread import ServerThread
+from drone_rl.flight.settings import ServeSettings
 from drone_rl.utils.files import as_path
 
 _log = logging.getLogger(__name__)

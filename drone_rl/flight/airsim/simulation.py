@@ -11,7 +11,6 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.config.commands import ServeSettings
 from drone_rl.flight.airsim.cameras import make_cameras
 from drone_rl.flight.airsim.messages import (
     Pose,
@@ -33,6 +32,7 @@ from drone_rl.flight.airsim.settings_file import (
 from drone_rl.flight.airsim.stage import Stage
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.flight.image_types import ImageType
+from drone_rl.flight.settings import ServeSettings
 from drone_rl.sim.coordinates import Attitude
 from drone_rl.sim.entities import find_camera
 from drone_rl.utils.errors import InputError, did_you_mean

@@ -14,12 +14,19 @@ import torch
 from PIL import Image
 from torch import Tensor
 
-from drone_rl.config.commands import CAMERAS, FLY_MODES, FlySettings
-from drone_rl.flight.fly_page.pilots import CONTROLS, Axes, Controls, VelocityPilot, make_pilot
+from drone_rl.flight.fly_page.pilots import (
+    CONTROLS,
+    Axes,
+    Controls,
+    VelocityPilot,
+    make_pilot,
+    parts_of,
+)
 from drone_rl.flight.fly_page.recorder import Recorder
 from drone_rl.flight.fly_page.saliency import LiveSaliency
 from drone_rl.flight.fly_page.world import Seen, World
 from drone_rl.flight.image_types import encode
+from drone_rl.flight.settings import CAMERAS, FLY_MODES, FlySettings
 from drone_rl.policies.policy import Policy
 from drone_rl.sim.coordinates import Attitude
 from drone_rl.sim.dynamics import BodyState
@@ -265,7 +272,7 @@ class Flight:
             "size": region.size if region else _SIZE,
             "actions": list(actions.names),
             "order": [int(part) for part in actions.order],
-            "discrete": not actions.entry.shape,
+            "controls": list(parts_of(actions)),
             "dynamics": world.has_dynamics,
             "cameras": list(CAMERAS),
             "limits": LIMITS,

@@ -142,7 +142,7 @@ function usable(control) {
   if (!state || state.pilot === "policy") return false;
   if (state.mode === "computer_vision") return !BUTTONS[control];
   if (state.mode === "simple_flight") return !/pitch|roll/.test(control);
-  return hello.discrete ? hello.actions.includes(control) : /forward|left|right/.test(control) && !/roll/.test(control);
+  return hello.controls.includes(control);
 }
 
 const keyOf = event => event.key.length === 1 ? event.key.toLowerCase() : event.key;

@@ -2,6 +2,7 @@
 
 import abc
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -12,6 +13,7 @@ from drone_rl.flight.commands.path_following import YawMode
 from drone_rl.flight.commands.pilot import Pilot
 from drone_rl.flight.commands.state import LandedState
 from drone_rl.flight.fly_page.world import World
+from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import FlightState, Obstacles, Quadrotor
 
 CONTROLS = tuple(KEYS)
@@ -36,10 +38,18 @@ _BRAKING = 2.5
 _STANDS = 0.25
 """Speed at which braking is over, m/s."""
 _AXES = (("forward", "backward"), ("left", "right"), ("up", "down"), ("yaw_left", "yaw_right"))
+_PARTS = {"backward": "back", "yaw_left": "turn left", "yaw_right": "turn right"}
+"""Actions of controls with other names."""
 _HALF = 0.5
 """Deflection from which a stick counts as a held control."""
 _MOST_STEPS = 5
 """Steps at once after a delay; more are dropped."""
+
+
+def parts_of(actions: Actions) -> dict[str, int]:
+    """Return the parts that controls choose, by the names of the controls."""
+    parts = ((name, actions.like(_PARTS.get(name, name))) for name in CONTROLS)
+    return {name: part for name, part in parts if part is not None}
 
 
 class Controls:
@@ -163,21 +173,24 @@ class ActionPilot(_Steps):
                 self._take(action)
 
     def _discrete(self, seconds: float, controls: Controls, speed: float) -> list[Tensor]:
-        names = self.world.actions.names
-        held = [name for name in controls.repeating if name in names]
+        parts = parts_of(self.world.actions)
+        held = [name for name in controls.repeating if name in parts]
         count = self._due(seconds, speed) if held else 0
         if not held:
             self._left = 0.0
-        pressed = [name for name in controls.presses if name in names]
-        return [torch.tensor([names.index(n)]) for n in (*pressed, *held[-1:] * count)]
+        pressed = [name for name in controls.presses if name in parts]
+        return [torch.tensor([parts[name]]) for name in (*pressed, *held[-1:] * count)]
 
     def _continuous(self, seconds: float, controls: Controls, speed: float) -> list[Tensor]:
-        forward, left, _, turn = controls.axes
-        if not any((forward, left, turn)):
+        actions: Any = self.world.actions
+        deflections = zip(_AXES, controls.axes, strict=True)
+        parts = parts_of(actions)
+        axes = [value if plus in parts else 0.0 for (plus, _), value in deflections]
+        if not any(axes):
             self._left = 0.0
             return []
         count = max(bool(controls.presses), self._due(seconds, speed))
-        return [torch.tensor([[2.0 * max(0.0, forward) - 1.0, left, turn]])] * count
+        return [actions.commanded(*axes)[None]] * count
 
 
 class _Drone(Pilot):

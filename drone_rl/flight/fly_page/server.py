@@ -17,10 +17,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
-from drone_rl.config.commands import FlySettings
 from drone_rl.config.configuration import from_arguments
 from drone_rl.flight.fly_page.flight import Flight
 from drone_rl.flight.server_thread import ServerThread, listening
+from drone_rl.flight.settings import FlySettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.utils.errors import InputError, extra
 from drone_rl.utils.files import as_path

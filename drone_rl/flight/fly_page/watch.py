@@ -9,7 +9,6 @@ from typing import Any, Literal
 from PIL import Image
 from torch import Tensor
 
-from drone_rl.config.commands import CAMERAS
 from drone_rl.flight.airsim.messages import to_world
 from drone_rl.flight.airsim.serving import RunningServer
 from drone_rl.flight.airsim.simulation import Simulation
@@ -17,6 +16,7 @@ from drone_rl.flight.fly_page.flight import JPEG_QUALITY, Camera, message, packe
 from drone_rl.flight.fly_page.server import FlyPage
 from drone_rl.flight.fly_page.world import HEIGHT, WIDTH
 from drone_rl.flight.image_types import ImageType, encode
+from drone_rl.flight.settings import CAMERAS
 from drone_rl.sim.entities import CHASE
 from drone_rl.trust.video import render_chase
 

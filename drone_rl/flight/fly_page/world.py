@@ -18,6 +18,7 @@ from drone_rl.policies.actor import Exploring
 from drone_rl.policies.policy import Policy
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import BodyState, ComputerVision, FlightState, Quadrotor
+from drone_rl.sim.dynamics.state import twist_about_z
 from drone_rl.sim.entities import CHASE
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import ObjectTask
@@ -138,23 +139,27 @@ class World:
         """Prepare the drone, which a person may have turned or lifted, for the policy's actions.
 
         A drone without dynamics is levelled at once, at the task's altitude unless its actions
-        change that; one with dynamics gets heading and altitude as targets of its controller.
+        change that; one with dynamics gets heading and altitude as targets of its controller. The
+        heading is that of the start, 0, unless the actions change it.
         """
         body, start = self.body, self.worlds.dynamics.start(self.body.position)
-        altitude = self.task.origin[2]
+        altitude, names = self.task.origin[2], self.actions.names
+        turns, climbs = "turn left" in names, "up" in names
         if isinstance(start, FlightState):
             same = (
                 body if isinstance(body, FlightState) else start.moved(body.position, body.attitude)
             )
             flying = same.settled()
-            flying.reference[:, _HEADING], flying.reference[:, _ALTITUDE] = 0.0, altitude
+            if not turns:
+                flying.reference[:, _HEADING] = 0.0
+            if not climbs:
+                flying.reference[:, _ALTITUDE] = altitude
             self._place(flying)
             return
-        if "up" not in self.actions.names:
-            place = start.position.clone()
+        place = start.position.clone()
+        if not climbs:
             place[:, 2] = altitude
-            start = start.moved(place)
-        self._place(start)
+        self._place(start.moved(place, twist_about_z(body.attitude) if turns else None))
 
     @torch.no_grad()
     def see(self) -> Seen:

@@ -25,7 +25,8 @@ HEADING_GAIN = 1.5
 """Yaw rate per radian of heading error, per second."""
 IN_FLIGHT = 0.1
 """Least throttle in the air; below 0.05 the firmware assumes that the drone has landed."""
-_SIDEWAYS = (Mode.POSITION, Mode.VELOCITY, Mode.HEADING_VELOCITY)
+_PLACES = (Mode.POSITION, Mode.HEADING_POSITION)
+_SIDEWAYS = (*_PLACES, Mode.VELOCITY, Mode.HEADING_VELOCITY)
 _HEADINGS = (Mode.ANGLE, Mode.RATE)
 _HEIGHTS = (Mode.POSITION, Mode.VELOCITY)
 
@@ -134,11 +135,11 @@ def setpoint_of(
     if sideways not in _SIDEWAYS or heading not in _HEADINGS or height not in _HEIGHTS:
         names = ", ".join(mode.name.lower() for mode in goals.modes)
         raise InputError(f"modes={names} are no setpoint; give velocities or positions")
-    values, drifts = first_row(goals.values), first_row(goals.drifts)
+    values, drifts = first_row(goals.values), first_row(goals.world_drifts)
     wanted = values + drifts * since
     to_place = velocity_to(wanted[[0, Y, Z]], readings, settings)
     x, y = float(values[0]), float(values[Y])
-    if sideways is Mode.POSITION:
+    if sideways in _PLACES:
         limit = settings.velocity_limit
         x, y = (_clamp(to_place[i] + float(drifts[i]), -limit, limit) for i in (0, Y))
     elif sideways is Mode.HEADING_VELOCITY:

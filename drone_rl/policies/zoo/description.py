@@ -232,8 +232,9 @@ class PolicyDescription(Model):
     def sees_pixels(self) -> bool:
         """Whether its only input is the image that `camera` and `transforms` describe."""
         seen = self.inputs.get(PIXELS)
-        is_plain = isinstance(seen, ImageInput) and seen.modality == "rgb"
-        return len(self.inputs) == 1 and is_plain and seen.camera.name == "front"
+        if len(self.inputs) > 1 or not isinstance(seen, ImageInput):
+            return False
+        return (seen.modality, seen.camera.name) == ("rgb", "front")
 
     @property
     def frames(self) -> int:

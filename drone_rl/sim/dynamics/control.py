@@ -2,12 +2,13 @@
 
 import dataclasses
 import enum
+import math
 
 import torch
 from torch import Tensor
 
 from drone_rl.config import ActionSettings
-from drone_rl.sim.actions import DIRECTIONS, MOVES
+from drone_rl.sim.actions import MOVE_SETS
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.dynamics.state import FlightState
 
@@ -32,6 +33,9 @@ class Mode(enum.IntEnum):
     """Metres, world frame."""
     ROTOR = 6
     """Fraction of a rotor's full thrust, 0 to 1; all four axes are rotors then."""
+    HEADING_POSITION = 7
+    """A position, metres, world frame, which drifts forward and to the left of the goal's heading,
+    an angle."""
 
 
 Modes = tuple[Mode, Mode, Mode, Mode]
@@ -46,18 +50,29 @@ class FlightGoals:
     mode of all four or of none; headings have no other mode than `RATE` and `ANGLE`."""
     values: Tensor  # (num_envs, 4) float64
     drift: Tensor | None = None  # (num_envs, 4) float64
-    """Rate of change of positions and headings per second; 0 by default."""
+    """Rate of change of positions and headings per second; 0 by default. World frame, but see
+    `HEADING_POSITION`."""
 
     @property
     def drifts(self) -> Tensor:
         """`drift`, zeros if it is None."""
         return torch.zeros_like(self.values) if self.drift is None else self.drift
 
+    @property
+    def world_drifts(self) -> Tensor:
+        """`drifts` in the world frame."""
+        if self.modes[X] is not Mode.HEADING_POSITION:
+            return self.drifts
+        (x, y, turn, up), heading = self.drifts.unbind(-1), self.values[:, HEADING]
+        cos, sin = heading.cos(), heading.sin()
+        return torch.stack([cos * x - sin * y, sin * x + cos * y, turn, up], -1)
+
     def reference_after(self, seconds: float, body: FlightState) -> Tensor:
         """Return `FlightState.reference` after `seconds` of a command; `body` has the drones."""
-        has_target = [mode is Mode.POSITION for mode in self.modes]
+        places = Mode.POSITION, Mode.HEADING_POSITION
+        has_target = [mode in places for mode in self.modes]
         has_target[HEADING] = self.modes[HEADING] is Mode.ANGLE
-        target = self.values + seconds * self.drifts
+        target = self.values + seconds * self.world_drifts
         return torch.where(torch.tensor(has_target), target, body.settled().reference)
 
 
@@ -67,38 +82,44 @@ def rotor_goals(rotors: Tensor) -> FlightGoals:
 
 
 class Moves:
-    """The chapter's moves: each moves the target position at a constant speed.
+    """Moves and turns: each moves the target position, or heading, at a constant speed.
 
-    At the start of a move, the target is at most the lead away from the drone, along x and along y.
+    At the start of a move, the target is at most the lead away from the drone, along each axis.
     """
 
-    MODES = (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.POSITION)
-    actions = MOVES
+    MODES = (Mode.HEADING_POSITION, Mode.HEADING_POSITION, Mode.ANGLE, Mode.POSITION)
 
-    def __init__(self, settings: ActionSettings) -> None:
-        self.lead = settings.move_lead
-        self.drifts = torch.zeros(len(DIRECTIONS), 4, dtype=torch.float64)
-        self.drifts[:, :2] = torch.tensor(DIRECTIONS, dtype=torch.float64)[:, :2]
-        self.drifts *= settings.move_speed
-        """Speed of the target for each move, metres a second. Shape: (moves, 4)."""
+    def __init__(self, settings: ActionSettings, most_turn: float = math.inf) -> None:
+        """Take settings, and the yaw rate that the drone can follow, radians a second."""
+        self.actions = actions = MOVE_SETS[settings.kind]
+        self.lead, self.climbs = settings.move_lead, "up" in actions.names
+        self._axes, self._places = ([X, Y, Z], [0, 1, 2]) if self.climbs else ([X, Y], [0, 1])
+        speeds = actions.speeds_of(torch.arange(len(actions))).double()
+        ahead, left, up = (settings.move_speed * speeds[:, :3]).unbind(-1)
+        turn = min(math.radians(settings.yaw_rate), most_turn) * speeds[:, 3]
+        self.drifts = torch.stack([ahead, left, turn, up], -1)
+        """Speed of the target for each move, metres or radians a second. Shape: (moves, 4)."""
 
     def goals(self, body: FlightState, action: Tensor) -> FlightGoals:
         """Return the goals until the next action. `action`: (num_envs,)."""
-        place = body.position[:, :2]
-        wanted = body.reference.clone()
-        wanted[:, :2] = place + (wanted[:, :2] - place).clamp(-self.lead, self.lead)
+        place, wanted = body.position[:, self._places], body.reference.clone()
+        away = (wanted[:, self._axes] - place).clamp(-self.lead, self.lead)
+        wanted[:, self._axes] = place + away
         return FlightGoals(self.MODES, wanted, self.drifts.to(action.device)[action])
 
 
 class Velocities:
-    """Speed forward, speed to the left and yaw rate; the height is kept."""
+    """Speed forward, speed to the left and yaw rate; the height is kept if there is no climb."""
 
     MODES = (Mode.HEADING_VELOCITY, Mode.HEADING_VELOCITY, Mode.RATE, Mode.POSITION)
 
     def __init__(self, settings: ActionSettings) -> None:
         self.actions = ContinuousActions.of(settings)
+        self._climbs = settings.climb_speed > 0
 
     def goals(self, body: FlightState, action: Tensor) -> FlightGoals:
-        """Return the goals until the next action. `action`: (num_envs, 3)."""
-        height = body.reference[:, 3:]
-        return FlightGoals(self.MODES, torch.cat([self.actions.to_rates(action), height], -1))
+        """Return the goals until the next action. `action`: (num_envs, 3), or 4 with climb."""
+        rates = self.actions.to_rates(action)
+        if self._climbs:
+            return FlightGoals((*self.MODES[:3], Mode.VELOCITY), rates)
+        return FlightGoals(self.MODES, torch.cat([rates, body.reference[:, 3:]], -1))

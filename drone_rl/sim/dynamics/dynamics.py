@@ -1,6 +1,7 @@
 """How a drone moves: the protocol, moves and speeds without inertia, and the choice by settings."""
 
 import dataclasses
+import math
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
@@ -9,10 +10,16 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import COMPUTER_VISION, MOVES_SETTINGS, ActionSettings, DynamicsSettings
-from drone_rl.sim.actions import DIRECTIONS, DIRECTIONS_3D, MOVES, MOVES_3D, Actions
+from drone_rl.sim.actions import MOVE_SETS, MOVES, Actions
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.dynamics.quadrotor import Quadrotor
-from drone_rl.sim.dynamics.state import BodyState, Obstacles, heading_of
+from drone_rl.sim.dynamics.state import (
+    BodyState,
+    Obstacles,
+    along_heading,
+    heading_of,
+    turned,
+)
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance, shown
 
@@ -50,22 +57,31 @@ class Dynamics(Protocol):
 
 
 class ComputerVision(Dynamics):
-    """Moves a step forward, left, right and possibly up or down, at once and without turning."""
+    """Moves of one length along the drone's heading, and turns about z; both are done at once."""
 
-    def __init__(self, step_length: float = 1.0, *, is_3d: bool = False) -> None:
-        """Set the length of a move, metres, and whether there are moves up and down."""
+    def __init__(
+        self, step_length: float = 1.0, actions: Actions = MOVES, turn_step: float = 0.0
+    ) -> None:
+        """Set the length of a move, metres, the set of moves, and the angle of a turn, degrees."""
         self.step_length = step_length
-        self.actions: Actions = MOVES_3D if is_3d else MOVES
-        directions = DIRECTIONS_3D if is_3d else DIRECTIONS
-        self.moves = torch.tensor(directions, dtype=torch.float64) * step_length
-        """Metres, world frame. Shape: (number of actions, 3), float64."""
+        self.actions: Actions = actions
+        speeds = actions.speeds_of(torch.arange(len(actions))).double()
+        half = 0.5 * math.radians(turn_step) * speeds[:, 3]
+        self.moves = speeds[:, :3] * step_length
+        """Metres, in the drone's frame. Shape: (number of actions, 3), float64."""
+        self.turns = torch.stack([half.cos(), half.sin()], -1)
+        """Cosine and sine of half the angle to the left. Shape: (number of actions, 2), float64."""
+        self._can_turn = bool(half.any())
 
     def step(
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
     ) -> BodyState:
         """Return the drones after a move."""
-        moves = self.moves.to(action.device)
-        return body.moved(body.position + moves[action])
+        move = self.moves.to(action.device)[action]
+        position = body.position + along_heading(body.attitude, move)
+        if not self._can_turn:
+            return body.moved(position)
+        return body.moved(position, turned(body.attitude, self.turns.to(action.device)[action]))
 
 
 class Kinematic(Dynamics):
@@ -81,10 +97,11 @@ class Kinematic(Dynamics):
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
     ) -> BodyState:
         """Return the drones a time step later; velocities are those of the step."""
-        forward, left, rate = self._continuous.to_rates(action).unbind(-1)
+        forward, left, rate, *climb = self._continuous.to_rates(action).unbind(-1)
         heading = heading_of(body.attitude)
         cos, sin, zero = heading.cos(), heading.sin(), torch.zeros_like(heading)
-        velocity = torch.stack([cos * forward - sin * left, sin * forward + cos * left, zero], -1)
+        level = [cos * forward - sin * left, sin * forward + cos * left]
+        velocity = torch.stack([*level, *(climb or [zero])], -1)
         half = (heading + rate * self._seconds) / 2
         return dataclasses.replace(
             body,
@@ -120,19 +137,16 @@ def make_dynamics(
             )
         return dynamics
     dynamics, actions = dynamics or COMPUTER_VISION, actions or MOVES_SETTINGS
-    if actions.kind == "moves_3d":
-        moves = default()
-        if not dynamics.is_computer_vision or type(moves) is not ComputerVision:
-            raise InputError(
-                "actions=moves_3d needs dynamics=computer_vision and a task with moves; give them, "
-                "or actions=moves"
-            )
-        return ComputerVision(moves.step_length, is_3d=True)
     if not dynamics.is_computer_vision:
         return Quadrotor(dynamics, actions)
+    if actions.kind == "velocity":
+        return Kinematic(actions, dynamics.control_timestep)
+    moves = default()
     if actions.kind == "moves":
-        return default()
-    return Kinematic(actions, dynamics.control_timestep)
+        return moves
+    if type(moves) is not ComputerVision:
+        raise InputError(f"actions={actions.kind} needs a task with moves; give actions=moves")
+    return ComputerVision(moves.step_length, MOVE_SETS[actions.kind], actions.turn_step)
 
 
 def draw_seeds(random_states: Sequence[np.random.RandomState]) -> Tensor:

@@ -141,16 +141,32 @@ def loaded(before: wp.array2d[wp.float64], world: int) -> CommandedDrone:
 
 
 @wp.func
+def drift_of(command: FlightCommand, world: int) -> wp.vec4d:
+    """Return the rates of change of a drone's goal, see `FlightGoals.world_drifts`."""
+    drifts = command.drifts[world]
+    drift = wp.vec4d(drifts[0], drifts[1], drifts[2], drifts[3])
+    if command.modes[0] == Mode.HEADING_POSITION:
+        cos = wp.cos(command.goals[world, 2])
+        sin = wp.sin(command.goals[world, 2])
+        drift[0] = cos * drifts[0] - sin * drifts[1]
+        drift[1] = sin * drifts[0] + cos * drifts[1]
+    return drift
+
+
+@wp.func
 def goal_of(command: FlightCommand, world: int, start: wp.vec3d) -> Goal:
     """Return a drone's goal; positions count from the start."""
     goal = Goal()
-    goal.modes = command.modes
+    drift = drift_of(command, world)
     for axis in range(4):
+        goal.modes[axis] = command.modes[axis]
+        if command.modes[axis] == Mode.HEADING_POSITION:
+            goal.modes[axis] = int(Mode.POSITION)
         value = command.goals[world, axis]
-        if command.modes[axis] == Mode.POSITION:
+        if goal.modes[axis] == Mode.POSITION:
             value = value - start[wp.min(axis, 2)]
         goal.values[axis] = float(value)
-        goal.drift[axis] = float(command.drifts[world, axis])
+        goal.drift[axis] = float(drift[axis])
     return goal
 
 
@@ -293,13 +309,14 @@ def _write_touch(
 def _write_reference(command: FlightCommand, after: wp.array2d[wp.float64], world: int) -> None:
     """Write the reference after a command, see `FlightGoals.reference_after`."""
     seconds = wp.float64(command.frame.tick) * wp.float64(command.ticks)
+    drift = drift_of(command, world)
     for axis in range(4):
-        reference = command.goals[world, axis] + seconds * command.drifts[world, axis]
+        reference = command.goals[world, axis] + seconds * drift[axis]
         if axis == 2:
             if command.modes[2] != Mode.ANGLE:
                 axes = rigid.axes_of(four(after, world, fs.ATTITUDE))
                 reference = wp.float64(wp.atan2(axes.forward[1], axes.forward[0]))
-        elif command.modes[axis] != Mode.POSITION:
+        elif command.modes[axis] != Mode.POSITION and command.modes[axis] != Mode.HEADING_POSITION:
             reference = after[world, fs.POSITION + wp.min(axis, 2)]
         after[world, fs.REFERENCE + axis] = reference
 

@@ -1,4 +1,4 @@
-"""The chapter's moves by a quadrotor for fused kernels, bit for bit those of `Quadrotor.step`."""
+"""Moves for fused kernels, bit for bit those of `ComputerVision.step` and `Quadrotor.step`."""
 
 import torch
 import warp as wp
@@ -18,9 +18,10 @@ class Fleet:
 
     command: FlightCommand
     lead: wp.float64
+    climbs: bool
     is_gimballed: int
     moves: wp.array2d[wp.float64]
-    """Velocity of the target position, one row an action."""
+    """See `Moves.drifts`."""
     numbers: wp.array2d[wp.float64]
     """See `FlightState`; no rows in computer-vision mode."""
 
@@ -36,14 +37,41 @@ def fly_move(fleet: Fleet, world: int, action: int) -> wp.vec3d:
     """Fly a drone through a move. Returns its position, metres."""
     for axis in range(4):
         wanted = fleet.numbers[world, fs.REFERENCE + axis]
-        if axis < 2:
-            place = fleet.numbers[world, fs.POSITION + axis]
+        if axis < 2 or (axis == 3 and fleet.climbs):
+            place = fleet.numbers[world, fs.POSITION + wp.min(axis, 2)]
             wanted = place + wp.clamp(wanted - place, -fleet.lead, fleet.lead)
         fleet.command.goals[world, axis] = wanted
         fleet.command.drifts[world, axis] = fleet.moves[action, axis]
     run(fleet.command, fleet.numbers, fleet.numbers, world)
     numbers = fleet.numbers[world]
     return wp.vec3d(numbers[fs.POSITION], numbers[fs.POSITION + 1], numbers[fs.POSITION + 2])
+
+
+LEAST = wp.constant(wp.float64(fs.LEAST))
+
+
+@wp.func
+def along_heading(attitude: wp.vec4d, vector: wp.vec3d) -> wp.vec3d:
+    """See the function of this name in `state`."""
+    w = attitude[0]
+    z = attitude[3]
+    square = wp.max(w * w + z * z, LEAST)
+    cos = (w * w - z * z) / square
+    sin = wp.float64(2.0) * w * z / square
+    return wp.vec3d(cos * vector[0] - sin * vector[1], sin * vector[0] + cos * vector[1], vector[2])
+
+
+@wp.func
+def turned(attitude: wp.vec4d, turn: wp.vec2d) -> wp.vec4d:
+    """See the function of this name in `state`."""
+    c = turn[0]
+    s = turn[1]
+    return wp.vec4d(
+        c * attitude[0] - s * attitude[3],
+        c * attitude[1] - s * attitude[2],
+        s * attitude[1] + c * attitude[2],
+        s * attitude[0] + c * attitude[3],
+    )
 
 
 @wp.func
@@ -75,7 +103,7 @@ def make_fleet(quadrotor: Quadrotor | None, numbers: Tensor) -> Fleet:
         zeros = torch.zeros(2, len(numbers), 4, dtype=torch.float64)
         goals = FlightGoals(steering.MODES, *zeros)
         fleet.command = make_command(quadrotor.frame, goals, quadrotor.settings.control_ticks)
-        fleet.lead = steering.lead
+        fleet.lead, fleet.climbs = steering.lead, steering.climbs
         fleet.is_gimballed = int(quadrotor.mount == "gimbal")
         fleet.moves = wp.from_torch(steering.drifts.contiguous())
     return fleet

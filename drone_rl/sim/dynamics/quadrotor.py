@@ -26,7 +26,10 @@ class Quadrotor:
         """Take the drone's body, controller and air, and its actions (moves by default)."""
         self.settings = settings
         self._action_settings = actions = actions or ActionSettings()
-        self.steering = Moves(actions) if actions.kind == "moves" else Velocities(actions)
+        if actions.kind == "velocity":
+            self.steering = Velocities(actions)
+        else:
+            self.steering = Moves(actions, settings.rate_limit[2])
         self.frame = make_airframe(settings)
         self.actions: Actions = self.steering.actions
         self.mount: str = settings.camera_mount

@@ -157,6 +157,9 @@ class AppliedRules:
         roles = torch.tensor([ROLES.index(of.role) for of in self._objects], dtype=torch.int32)
         objects.shapes, objects.roles = _warp(shapes.to(device)), _warp(roles.to(device))
         objects.sizes = _warp(sizes.to(device), wp.vec3d)
+        angles = torch.tensor([of.heading for of in self._objects], dtype=torch.float64).deg2rad()
+        turns = torch.stack([angles.cos(), angles.sin()], -1)
+        objects.turns = _warp(turns.to(device), wp.vec2d)
         world.objects = objects
         world.low, world.high = self._bounds
         world.radius = 0.5 * self._settings.drone_size

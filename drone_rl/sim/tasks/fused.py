@@ -42,11 +42,11 @@ class FusedObjects:
         self.steps = torch.zeros(count, dtype=torch.int32)
         self.end_reasons = torch.zeros(count, dtype=torch.int32)
         self._drones = torch.zeros(count, 3, dtype=torch.float64)
-        self._attitudes = torch.zeros(count, 4)
+        self._attitudes = torch.zeros(count, 4, dtype=torch.float64)
         self.arrays: Any = Episodes()
         self.arrays.world = task.rules.world(self._state, self.steps, self.end_reasons, dynamics)
         self.arrays.drones = wp.from_torch(self._drones, dtype=wp.vec3d)
-        self.arrays.attitudes = wp.from_torch(self._attitudes, dtype=wp.vec4)
+        self.arrays.attitudes = wp.from_torch(self._attitudes, dtype=wp.vec4d)
         self.arrays.steps = wp.from_torch(self.steps)
         self.arrays.end_reasons = wp.from_torch(self.end_reasons)
         actions = dynamics.actions
@@ -54,13 +54,14 @@ class FusedObjects:
         self.arrays.speeds = wp.from_torch(speeds, dtype=wp.vec4)
         if isinstance(dynamics, ComputerVision):
             self.arrays.moves = wp.from_torch(dynamics.moves.contiguous(), dtype=wp.vec3d)
+            self.arrays.turns = wp.from_torch(dynamics.turns, dtype=wp.vec2d)
         quadrotor = dynamics if isinstance(dynamics, Quadrotor) else None
         self._numbers = torch.zeros(count if quadrotor else 0, NUMBERS, dtype=torch.float64)
         self.arrays.fleet = make_fleet(quadrotor, self._numbers)
         self.poses: Any = PoseArrays()
         frames = torch.zeros(count, 1 + DRONE_FRAME + len(task.objects), 3)
         self.poses.positions = wp.from_torch(frames, dtype=wp.vec3)
-        self.poses.attitudes = wp.from_torch(self._attitudes, dtype=wp.vec4)
+        self.poses.attitudes = wp.zeros(count, dtype=wp.vec4, device="cpu")
 
     def paid(self, count: int) -> Tensor:
         """Return the sum of each reward term in the first episodes. Shape: (count, R), float32.
@@ -79,7 +80,7 @@ class FusedObjects:
             if name not in ("body", "steps", "end_reason"):
                 values[:count] = getattr(state, name)
         self._drones[:count] = state.drone
-        self._attitudes[:count] = state.body.attitude.float()
+        self._attitudes[:count] = state.body.attitude
         if isinstance(state.body, FlightState):
             self._numbers[:count] = state.body.numbers
         for values in (self.steps, self.end_reasons):

@@ -10,7 +10,7 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 BALL = wp.constant(0)
 CYLINDER = wp.constant(1)
 BOX = wp.constant(2)
-"""Shapes; a cylinder stands upright, and a box is parallel to the world's axes."""
+"""Shapes; a cylinder stands upright, and a box is turned about the vertical axis alone."""
 GOAL = wp.constant(0)
 OBSTACLE = wp.constant(1)
 DECORATION = wp.constant(2)
@@ -29,6 +29,8 @@ class Objects:
     roles: wp.array[int]
     sizes: wp.array[wp.vec3d]
     """Half extents; of a ball and a cylinder the first is the radius."""
+    turns: wp.array[wp.vec2d]
+    """Cosine and sine of the heading."""
     places: wp.array2d[wp.vec3d]
     """Centres. Shape: (N, P), as of what follows."""
     present: wp.array2d[wp.bool]
@@ -48,7 +50,10 @@ class Nearest:
 
 @wp.func
 def distance_to(shape: int, size: wp.vec3d, away: wp.vec3d) -> wp.float64:
-    """Return the distance of a point to a surface, negative inside; `away` is from the centre."""
+    """Return the distance of a point to a surface, negative inside.
+
+    `away` leads from the centre, as the object is turned.
+    """
     zero = wp.float64(0.0)
     if shape == BALL:
         return wp.length(away) - size[0]
@@ -61,12 +66,19 @@ def distance_to(shape: int, size: wp.vec3d, away: wp.vec3d) -> wp.float64:
 
 
 @wp.func
+def turned(objects: Objects, thing: int, vector: wp.vec3d) -> wp.vec3d:
+    """Return a vector of the world's frame as an object is turned."""
+    cos, sin = objects.turns[thing][0], objects.turns[thing][1]
+    return wp.vec3d(cos * vector[0] + sin * vector[1], cos * vector[1] - sin * vector[0], vector[2])
+
+
+@wp.func
 def nearest(objects: Objects, env: int, point: wp.vec3d, role: int) -> Nearest:
     """Return the nearest present object of a role; at an infinite distance if there is none."""
     found = Nearest(wp.float64(wp.inf), int(NOTHING))
     for i in range(objects.shapes.shape[0]):
         if objects.roles[i] == role and objects.present[env, i]:
-            away = point - objects.places[env, i]
+            away = turned(objects, i, point - objects.places[env, i])
             distance = distance_to(objects.shapes[i], objects.sizes[i], away)
             if distance < found.distance:
                 found.distance = distance
@@ -85,8 +97,8 @@ def sweep(
     """
     shape = objects.shapes[thing]
     size = objects.sizes[thing]
-    start = before - objects.places[env, thing]
-    path = now - before
+    start = turned(objects, thing, before - objects.places[env, thing])
+    path = turned(objects, thing, now - before)
     if distance_to(shape, size, start) <= radius:
         return wp.float64(0.0)
     low = wp.float64(0.0)

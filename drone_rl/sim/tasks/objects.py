@@ -1,6 +1,7 @@
 """Tasks whose rules are about objects: their state, and what their rules share."""
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -55,6 +56,8 @@ class ObjectEntity(VisualEntity):
         half = settings.half_size
         size = {"ball": half[:1], "cylinder": (half[0], half[2]), "box": half}[settings.shape]
         self._add_geom(_KINDS[settings.shape], size, settings.color, name)
+        half_angle = 0.5 * math.radians(settings.heading)
+        self.geom.quat = math.cos(half_angle), 0.0, 0.0, math.sin(half_angle)
 
 
 class ObjectTask(Task[ObjectState]):
@@ -172,9 +175,10 @@ class ObjectTask(Task[ObjectState]):
         return state.places - torch.nn.functional.pad(hidden[..., None], (2, 0))
 
     def obstacles(self, state: ObjectState) -> Obstacles | None:
-        """Return what is solid, if all of it is of one size."""
+        """Return what is solid, if all of it is of one size and parallel to the axes."""
         solid = [i for i, of in enumerate(self.each) if of.role == "obstacle"]
-        if len({self.each[i].half_size for i in solid}) != 1:
+        is_turned = any(self.each[i].heading for i in solid)
+        if is_turned or len({self.each[i].half_size for i in solid}) != 1:
             return None
         return Obstacles(self.places(state)[:, solid], self.each[solid[0]].half_size)
 

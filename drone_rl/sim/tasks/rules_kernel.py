@@ -9,7 +9,15 @@ import warp as wp
 
 from drone_rl.config.terms import Term
 from drone_rl.sim.dynamics.flight_kernel import four, three
-from drone_rl.sim.dynamics.moves_kernel import Fleet, camera_attitude, fly_move, is_flying, is_lost
+from drone_rl.sim.dynamics.moves_kernel import (
+    Fleet,
+    along_heading,
+    camera_attitude,
+    fly_move,
+    is_flying,
+    is_lost,
+    turned,
+)
 from drone_rl.sim.dynamics.rigid_body_kernel import axes_of
 from drone_rl.sim.dynamics.state import ATTITUDE, VELOCITY
 from drone_rl.sim.rendering.devices import start_warp
@@ -41,10 +49,11 @@ class Episodes:
 
     world: World
     drones: wp.array[wp.vec3d]
-    attitudes: wp.array[wp.vec4]
-    """Of drones in computer-vision mode, which keep them."""
+    attitudes: wp.array[wp.vec4d]
+    """Of drones in computer-vision mode."""
     moves: wp.array[wp.vec3d]
-    """One an action, in computer-vision mode. Metres, world frame."""
+    """See `ComputerVision.moves`."""
+    turns: wp.array[wp.vec2d]
     speeds: wp.array[wp.vec4]
     """`Step.action` of each action."""
     fleet: Fleet
@@ -241,7 +250,7 @@ class Rules:
             env = wp.tid()
             of = constants.objects
             world = World(
-                Objects(of.shapes, of.roles, of.sizes, places, present, touched),
+                Objects(of.shapes, of.roles, of.sizes, of.turns, places, present, touched),
                 constants.low,
                 constants.high,
                 constants.radius,
@@ -286,8 +295,10 @@ class Rules:
                 motion.attitude = four(envs.fleet.numbers, env, ATTITUDE)
                 motion.velocity = three(envs.fleet.numbers, env, VELOCITY)
             else:
-                motion.now = motion.before + envs.moves[action]
-                motion.attitude = envs.attitudes[env]
+                attitude = envs.attitudes[env]
+                motion.now = motion.before + along_heading(attitude, envs.moves[action])
+                envs.attitudes[env] = turned(attitude, envs.turns[action])
+                motion.attitude = wp.vec4(envs.attitudes[env])
             envs.drones[env] = motion.now
             return float(advance(envs.world, env, motion))
 
@@ -324,6 +335,8 @@ def place(envs: Episodes, env: int, poses: PoseArrays) -> None:
     poses.positions[env, DRONE_FRAME] = wp.vec3(envs.drones[env])
     if is_flying(envs.fleet):
         poses.attitudes[env] = camera_attitude(envs.fleet, env)
+    else:
+        poses.attitudes[env] = wp.vec4(envs.attitudes[env])
     objects = envs.world.objects
     for i in range(objects.shapes.shape[0]):
         at = objects.places[env, i]

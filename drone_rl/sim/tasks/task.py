@@ -22,6 +22,8 @@ from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.gymnasium_names import register_environment
+from drone_rl.utils.plugins import check_name
 from drone_rl.utils.schema import shown
 from drone_rl.utils.settings import prefixed_errors
 
@@ -235,15 +237,15 @@ class NoSettings(BaseTaskSettings):
 def register_task(
     settings: type[BaseTaskSettings] | Task[Any], make: Callable[[Any], Task[Any]] | None = None
 ) -> None:
-    """Register a task by name, for settings and policy files.
+    """Register a task by name, for settings, policy files and Gymnasium.
 
     Args:
         settings: Class of the task's settings, or a task without settings.
         make: Makes the task from its settings; not for a task without settings.
 
     Raises:
-        InputError: Another task has this name, unless both are without settings or a notebook's
-            cell ran again, or an argument is of the wrong kind.
+        InputError: The name is invalid, or another task has it, unless both are without settings
+            or a notebook's cell ran again, or an argument is of the wrong kind.
     """
     if isinstance(settings, Task):
         as_settings(settings)
@@ -255,12 +257,14 @@ def register_task(
             "settings and what makes it: register_task(MySettings, MyTask)"
         )
     _require_name(settings)
+    check_name(settings.name, "define_task")
     other = TASKS.get(settings.name, settings)
     if (other.__module__, other.__name__) != (settings.__module__, settings.__name__):
         raise InputError(f"there is a task called {settings.name}; give another name")
     with prefixed_errors(settings.__name__):
         settings()  # its defaults are checked
     TASKS[settings.name], MAKERS[settings] = settings, make
+    register_environment(settings.name)
 
 
 def _require_name(of: type) -> None:

@@ -175,12 +175,12 @@ class TermTask(ObjectTask):
     def _has_room(self, of: ObjectSettings, place: Any, placed: list[Any], start: Any) -> bool:
         """Return whether boxes around an object, the ones before it and the drone keep apart."""
         s = self.settings
-        half, drone = np.array(of.half_size), np.array(start)
+        reach, drone = np.array(of.reach), np.array(start)
         if of.role != "decoration":
-            gap = np.abs(place - drone) - half - 0.5 * s.drone_size
+            gap = np.abs(place - drone) - reach - 0.5 * s.drone_size
             if np.linalg.norm(gap.clip(0)) <= s.start.apart:
                 return False
-        gaps = (np.abs(place - other) - half - np.array(o.half_size) for o, other in placed)
+        gaps = (np.abs(place - other) - reach - np.array(o.reach) for o, other in placed)
         return of.apart == 0 or all(np.linalg.norm(gap.clip(0)) >= of.apart for gap in gaps)
 
     def start(self, sampled: Tensor, body: BodyState) -> ObjectState:
@@ -218,7 +218,7 @@ class TermTask(ObjectTask):
         """Return changes of its scenes; random goals are as far ahead as goals ever are."""
         s = self.settings
         goals = [of for of in self.each if of.role == "goal"]
-        reach = max(of.half_size[1] for of in goals) + 0.5 * self.drone_size
+        reach = max(of.reach[1] for of in goals) + 0.5 * self.drone_size
         near = reach + 0.5 * s.step_length
         far, wide = (
             max(

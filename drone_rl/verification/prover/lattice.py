@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import TaskSettings
-from drone_rl.sim.actions import DIRECTIONS
+from drone_rl.sim.actions import MOVES
 from drone_rl.sim.dynamics import BodyState
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, CubesEnd
 from drone_rl.sim.tasks.objects import ObjectState
@@ -226,7 +226,7 @@ def explore(settings: TaskSettings, cubes: Tensor) -> Graph:
 
 def _follow(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> tuple[Nodes, Tensor]:
     """Return the nodes after each move (K * A), and the `CubesEnd` of each move (K, A)."""
-    moves = torch.tensor(DIRECTIONS).long()
+    moves = MOVES.speeds_of(torch.arange(len(MOVES)))[:, :3].long()
     each = torch.arange(len(nodes)).repeat_interleave(len(moves))
     before = nodes[each]
     ahead, aside, _ = (moves.repeat(len(nodes), 1)).unbind(-1)

@@ -9,7 +9,7 @@ import yaml
 from hydra.errors import HydraException
 
 from drone_rl.cli.main import COMMANDS
-from drone_rl.config import DynamicsSettings, PillarsSettings, TaskSettings
+from drone_rl.config import BaseTaskSettings, DynamicsSettings, PillarsSettings, TaskSettings
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.zoo import describe
 from drone_rl.utils.errors import InputError
@@ -80,9 +80,12 @@ def test_the_first_and_last_values_of_every_sweep_describes_a_policy(name, setti
 
 @pytest.mark.parametrize("command", ["evaluate", "prove", "explain"])
 def test_any_setting_of_the_task_can_be_changed_for_a_trained_policy(command, config, settings):
-    assert set(config(command).task) == {*TaskSettings.model_fields, *PillarsSettings.model_fields}
+    names = {*TaskSettings.model_fields, *PillarsSettings.model_fields, "name"}
+    assert set(config(command).task) == names
     assert settings(command).task == {}
     assert settings(command, "task.num_cubes=5").task == {"num_cubes": 5}
+    chosen = settings(command, "task=pillars", "task.num_rows=5").task
+    assert BaseTaskSettings.read(chosen, "task") == PillarsSettings(num_rows=5)
 
 
 @pytest.mark.parametrize("override", ["task.num_cubs=3", "network=no_such", "trainer.total=1"])

@@ -4,11 +4,11 @@ import math
 
 import pytest
 
-from drone_rl.config.commands import ServeSettings
 from drone_rl.flight.airsim.messages import Pose, nanoseconds
 from drone_rl.flight.airsim.methods import call
 from drone_rl.flight.airsim.settings_file import parse_settings
 from drone_rl.flight.airsim.simulation import Simulation, Wait
+from drone_rl.flight.settings import ServeSettings
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ import struct
 import pytest
 
 import drone_rl
-from drone_rl.config.commands import FlySettings
 from drone_rl.flight.fly_page.flight import Flight
 from drone_rl.flight.fly_page.world import World
+from drone_rl.flight.settings import FlySettings
 
 
 def decode(frame):

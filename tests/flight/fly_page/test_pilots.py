@@ -5,8 +5,11 @@ import math
 import pytest
 import torch
 
+from drone_rl.config import ActionSettings
+from drone_rl.config.networks import SmallCnn
 from drone_rl.flight.fly_page.pilots import Controls, make_pilot
 from drone_rl.sim.dynamics import FlightState
+from tests.untrained import untrained
 
 
 class Steps(list):
@@ -89,6 +92,27 @@ def test_a_held_key_repeats_the_action_at_the_speed(make_world):
     controls.hold(["forward", "right"])
     fly(pilot, controls, 0.1)
     assert steps[-1][1] == [2]
+
+
+@pytest.mark.parametrize(
+    ("kind", "keys", "expected"),
+    [
+        ("moves_turning", ["left", "yaw_right", "backward"], [[1], [2]]),  # it has no moves back
+        ("moves_full", ["left", "yaw_right", "backward", "up"], [[1], [7], [5], [3]]),
+    ],
+)
+def test_keys_choose_turns(make_world, kind, keys, expected):
+    network = SmallCnn(channels=(2,), hidden=(4,))
+    world = make_world(untrained(network, actions=ActionSettings(kind=kind)))
+    world.move(world.body.moved(world.body.position, torch.tensor([[0.8, 0, 0, 0.6]]).double()))
+    steps, controls = Steps(), Controls()
+    pilot = make_pilot("actions", world, steps.note)
+    assert world.body.attitude[0].tolist() == pytest.approx([0.8, 0, 0, 0.6])  # it stays turned
+    for key in keys:
+        controls.hold([key])
+        fly(pilot, controls, 0.05)
+        controls.hold([])
+    assert [action for _, action, _ in steps] == expected
 
 
 def test_continuous_actions_follow_keys_and_sticks(make_world):

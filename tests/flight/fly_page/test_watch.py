@@ -9,10 +9,10 @@ import threading
 import pytest
 from PIL import Image
 
-from drone_rl.config.commands import CAMERAS, ServeSettings
 from drone_rl.flight.airsim.settings_file import parse_settings
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.fly_page.watch import Watched
+from drone_rl.flight.settings import CAMERAS, ServeSettings
 from drone_rl.utils.errors import InputError
 
 

@@ -4,10 +4,10 @@ import pytest
 import torch
 
 import drone_rl
-from drone_rl.config.commands import CAMERAS
 from drone_rl.config.networks import Lstm, SmallCnn
 from drone_rl.config.transforms import Gray, Noise, Stack
 from drone_rl.envs import GrayPixels
+from drone_rl.flight.settings import CAMERAS
 from drone_rl.sim.dynamics import FlightState, Quadrotor
 from tests.untrained import untrained
 

@@ -60,9 +60,12 @@ DEFAULT = {
             "kind": "moves",
             "move_speed": 4.0,
             "move_lead": 0.5,
+            "turn_step": 15.0,
             "forward_speed": 4.0,
             "sideways_speed": 3.0,
             "yaw_rate": 45.0,
+            "climb_speed": 0.0,
+            "backward_speed": 0.0,
         },
         "axes": [
             {"name": "forward", "unit": "moves", "low": 0.0, "high": 1.0, "step": 1.0},
@@ -312,6 +315,13 @@ def test_axes_of_actions_have_units_and_bounds():
         ("turn left", "degrees/s", -30.0, 30.0, None),
     ]
     assert [axis.name for axis in ActionSettings(kind="moves_3d").axes] == ["forward", "left", "up"]
+    free = ActionSettings(kind="velocity", climb_speed=2.0, backward_speed=1.0).axes
+    assert [(axis.name, axis.low) for axis in free[::3]] == [("forward", -1.0), ("up", -2.0)]
+    full = [tuple(axis.model_dump().values()) for axis in ActionSettings(kind="moves_full").axes]
+    assert full[::3] == [
+        ("forward", "moves", -1.0, 1.0, 1.0),
+        ("turn left", "turns", -1.0, 1.0, 1.0),
+    ]
 
 
 def test_environment_uses_described_or_given_dynamics(monkeypatch):

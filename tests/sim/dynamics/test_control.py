@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.config import ActionSettings
+from drone_rl.config import ActionSettings, DynamicsSettings
 from drone_rl.sim.actions import Move
-from drone_rl.sim.dynamics import FlightState, Mode
+from drone_rl.sim.dynamics import FlightState, Mode, Quadrotor
 from drone_rl.sim.dynamics.control import Moves, Velocities
 from tests.flying import (
     ANGLES,
@@ -194,7 +194,7 @@ def test_move_shifts_the_position_goal():
     goals = Moves(MOVES_SETTINGS).goals(
         drones(), torch.tensor([Move.FORWARD, Move.LEFT, Move.RIGHT])
     )
-    assert goals.modes == (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.POSITION)
+    assert goals.modes == Moves.MODES
     assert goals.values.tolist() == [[1.0, 2.0, 0.0, 2.5]] * 3
     assert goals.drifts.tolist() == [[4, 0, 0, 0], [0, 4, 0, 0], [0, -4, 0, 0]]
 
@@ -206,6 +206,44 @@ def test_position_goal_stays_within_its_lead():
     expected = [[1.3, 2.5, 0.1, 2.5], [0.5, 1.8, 0.1, 2.5], [1.0, 2.0, 0.1, 3.0]]
     assert goals.values.tolist() == [pytest.approx(row) for row in expected]
     assert body.reference[0, 1] == 9.0
+
+
+def test_moves_drift_along_the_goals_heading():
+    """At a heading of 90 degrees forward is +y and left -x; a turn drifts by the yaw rate."""
+    body, quarter = drones(), math.pi / 2
+    body.reference[:, 2] = quarter
+    body.reference[:, 3] = 9.0
+    steering = Moves(ActionSettings(kind="moves_full", yaw_rate=90.0))
+    actions = torch.tensor([steering.actions.names.index(n) for n in ("back", "left", "turn left")])
+    goals = steering.goals(body, actions)
+    expected = torch.tensor([[0, -4, 0, 0], [-4, 0, 0, 0], [0, 0, quarter, 0]]).double()
+    torch.testing.assert_close(goals.world_drifts, expected)
+    assert goals.values[0].tolist() == [1.0, 2.0, quarter, 3.0]  # the lead upwards is 0.5 m
+    after = goals.reference_after(0.5, body)
+    torch.testing.assert_close(after[1], torch.tensor([-1.0, 2.0, quarter, 3.0]).double())
+    torch.testing.assert_close(after[2, 2], torch.tensor(1.5 * quarter).double())
+    assert Moves(ActionSettings(kind="moves_full"), 0.5).drifts[6].tolist() == [0, 0, 0.5, 0]
+
+
+def test_a_quadrotor_flies_moves_along_its_heading():
+    """20 turns of 4.455 degrees (45 degrees/s for 0.099 s), then forward at 4 m/s, then up."""
+    drone = Quadrotor(DynamicsSettings(mode="simple_flight"), ActionSettings(kind="moves_full"))
+    body, names = hovering(drone), drone.actions.names
+
+    def fly(body, name, count):
+        for _ in range(count):
+            body = drone.step(body, torch.tensor([names.index(name)]))
+        return body
+
+    body = fly(body, "turn left", 20)
+    assert math.degrees(body.heading.item()) == pytest.approx(20 * 4.455, abs=2)
+    torch.testing.assert_close(body.position, doubles((0, 0, 100)), atol=0.05, rtol=0)
+    x, y, z = fly(body, "forward", 20).position[0].tolist()
+    assert (x, z) == pytest.approx((0.0, 100.0), abs=0.2) and 5.0 < y < 8.0
+    x, y, z = fly(body, "up", 20).position[0].tolist()
+    assert (x, y) == pytest.approx((0.0, 0.0), abs=0.1) and 105.0 < z < 108.0
+    x, y, z = fly(body, "back", 20).position[0].tolist()
+    assert (x, z) == pytest.approx((0.0, 100.0), abs=0.2) and -8.0 < y < -5.0
 
 
 def test_velocity_actions_use_the_heading_frame_and_keep_height():

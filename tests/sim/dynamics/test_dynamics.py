@@ -144,6 +144,64 @@ def test_moves_are_one_meter_forward_left_and_right():
     assert half.position.tolist() == [[1, 0.5, 0], [0, 1.5, 0], [0, -0.5, 0]]
 
 
+FULL = ActionSettings(kind="moves_full", turn_step=90.0)
+
+
+def moved(*names, settings=FULL, start=(0.0, 0.0, 2.0)):
+    """Return a drone after moves of half a metre."""
+    dynamics = make_dynamics(TASK.make_dynamics, None, settings)
+    body = dynamics.start(torch.tensor([start], dtype=torch.float64))
+    for name in names:
+        body = dynamics.step(body, dynamics.actions.always(name)[None])
+    return body
+
+
+def test_moves_go_along_the_heading():
+    """Of the world: forward is +y after a turn to the left, left is -x, right +x, back -y."""
+    there = moved("up", "turn left", "forward", "forward", "left", "back", "down", "down")
+    torch.testing.assert_close(there.position, torch.tensor([[-0.5, 0.5, 1.5]]).double())
+    torch.testing.assert_close(there.attitude, torch.tensor([[0.5**0.5, 0, 0, 0.5**0.5]]).double())
+    beside = moved("turn right", "forward", "turn right", "forward").position
+    torch.testing.assert_close(beside, torch.tensor([[-0.5, -0.5, 2.0]]).double())
+
+
+def test_turns_of_the_step_add_up():
+    """24 turns of 15 degrees are a whole one, after which forward is +x again."""
+    turning = ActionSettings(kind="moves_turning")
+    assert turning.turn_step == 15.0
+    quarter = moved(*["turn left"] * 6, "forward", settings=turning)
+    torch.testing.assert_close(quarter.position, torch.tensor([[0.0, 0.5, 2.0]]).double())
+    whole = moved(*["turn left"] * 24, "forward", settings=turning)
+    torch.testing.assert_close(whole.position, torch.tensor([[0.5, 0.0, 2.0]]).double())
+    assert moved(*["turn right"] * 24, settings=turning).attitude.norm().item() == pytest.approx(1)
+
+
+def test_moves_of_turned_drones_go_along_the_heading_too():
+    """A start to the left of the world's x: "moves" has no turns of its own."""
+    dynamics = make_dynamics(TASK.make_dynamics)
+    left = torch.tensor([[0.5**0.5, 0.0, 0.0, 0.5**0.5]] * 2, dtype=torch.float64)
+    body = dynamics.start(torch.zeros(2, 3).double()).moved(torch.zeros(2, 3).double(), left)
+    after = dynamics.step(body, torch.tensor([Move.FORWARD, Move.RIGHT]))
+    torch.testing.assert_close(after.position, torch.tensor([[0, 0.5, 0], [0.5, 0, 0]]).double())
+
+
+def test_a_mirrored_episode_has_the_mirrored_actions_bit_for_bit():
+    actions = make_dynamics(TASK.make_dynamics, None, FULL.replace(turn_step=11.0)).actions
+    names = [actions.names[i] for i in actions.sample((40,), torch.Generator().manual_seed(0))]
+    images = [actions.names[actions.mirrored[actions.names.index(name)]] for name in names]
+    settings = FULL.replace(turn_step=11.0)
+    one, other = moved(*names, settings=settings), moved(*images, settings=settings)
+    assert torch.equal(one.position * torch.tensor([1, -1, 1]), other.position)
+    assert torch.equal(one.attitude * torch.tensor([1, 1, 1, -1]), other.attitude)
+
+
+def test_moves_need_a_task_with_moves():
+    with pytest.raises(InputError, match=r"^actions=moves_full needs a task with moves"):
+        make_dynamics(Turning, None, FULL)
+    with pytest.raises(InputError, match=r"^yaw_rate=0.0 is none for the turns of actions=moves_"):
+        FULL.replace(yaw_rate=0.0)
+
+
 SETTINGS = ActionSettings(kind="velocity", forward_speed=4, sideways_speed=3, yaw_rate=90)
 
 
@@ -162,6 +220,20 @@ def test_step_length_follows_from_the_velocity():
     assert body.attitude.tolist() == [[1, 0, 0, 0]]
     assert flown((-1.0, 0.0, 0.0)).position.tolist() == [[1.0, 2.0, 3.0]]
     assert flown((1.0, 0.0, 0.0), timestep=0.5).position[0, 0] == 3.0
+
+
+def test_climb_and_backward_are_flown():
+    settings = SETTINGS.replace(climb_speed=2.0, backward_speed=1.0)
+    dynamics = Kinematic(settings, timestep=0.5)
+    body = dynamics.start(torch.tensor([[1.0, 2.0, 3.0]], dtype=torch.float64))
+    body = dynamics.step(body, torch.tensor([[-1.0, 0.0, 0.0, 0.5]]))  # -1 m/s, and 1 m/s up
+    assert body.position[0].tolist() == pytest.approx([0.5, 2.0, 3.5])
+    assert body.velocity[0].tolist() == pytest.approx([-1.0, 0.0, 1.0])
+    drone = Quadrotor(FLIGHT, settings)
+    flown = drone.start(torch.tensor([[0.0, 0.0, 10.0]], dtype=torch.float64))
+    for _ in range(40):
+        flown = drone.step(flown, torch.tensor([[-1.0, 0.0, 0.0, 0.5]]))
+    assert flown.velocity[0].tolist() == pytest.approx([-1.0, 0.0, 1.0], abs=0.15)
 
 
 def test_turn_takes_effect_in_the_next_step():

@@ -12,13 +12,15 @@ from drone_rl.sim.tasks.geometry_kernel import BALL, BOX, CYLINDER, OBSTACLE
 _GEOMS = {int(BALL): "sphere", int(CYLINDER): "cylinder", int(BOX): "box"}
 
 
-def one(shape, size):
+def one(shape, size, heading=0.0):
     """An obstacle at x = 10."""
     start_warp("cpu")
     objects = geometry.Objects()
     objects.shapes = wp.array([int(shape)], dtype=int, device="cpu")
     objects.roles = wp.array([int(OBSTACLE)], dtype=int, device="cpu")
     objects.sizes = wp.array([size], dtype=wp.vec3d, device="cpu")
+    turn = np.cos(np.radians(heading)), np.sin(np.radians(heading))
+    objects.turns = wp.array([turn], dtype=wp.vec2d, device="cpu")
     objects.places = wp.array([[(10.0, 0.0, 0.0)]], dtype=wp.vec3d, device="cpu")
     objects.present = wp.array([[True]], dtype=wp.bool, device="cpu")
     objects.touched = wp.array([[False]], dtype=wp.bool, device="cpu")
@@ -71,6 +73,18 @@ def test_distances(shape, size, point, distance):
     (found,) = nearest(one(shape, size), [point])
     assert found["distance"] == pytest.approx(distance)
     assert found["thing"] == 0
+
+
+def test_a_box_is_turned_to_the_left():
+    box = one(BOX, (3.0, 1.0, 1.0), heading=90.0)  # 2 m along x and 6 m along y
+    assert nearest(box, [(6.0, 0.0, 0.0)])[0]["distance"] == pytest.approx(3.0)
+    assert nearest(box, [(10.0, 4.0, 0.0)])[0]["distance"] == pytest.approx(1.0)
+    box = one(BOX, (2.0, 1.0, 1.0), heading=30.0)
+    tip = 10.0 + 2.0 * np.cos(np.pi / 6), 2.0 * np.sin(np.pi / 6), 0.0  # of its own x axis
+    assert nearest(box, [tip])[0]["distance"] == pytest.approx(0.0, abs=1e-12)
+    # along y at x = 10 the side is 1 m / cos 30 degrees away
+    (when,) = sweep(box, [(10.0, 5.0, 0.0)], [(10.0, 0.0, 0.0)], 0.0)
+    assert when == pytest.approx((5.0 - 1.0 / np.cos(np.pi / 6)) / 5.0)
 
 
 @pytest.mark.parametrize("shape", _GEOMS)

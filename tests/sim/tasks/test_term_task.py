@@ -9,6 +9,7 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 import drone_rl
 from drone_rl import InputError, Step, define_task, reward
 from drone_rl.acceleration import FusedEpisodes
+from drone_rl.config import ActionSettings
 from drone_rl.config.appearance import AppearanceSettings, check_appearance
 from drone_rl.config.camera import CameraSettings
 from drone_rl.config.task import TASKS, BaseTaskSettings
@@ -70,6 +71,20 @@ def test_a_goal_is_reached_where_the_balls_touch():
     assert made.task.places(made.state)[0, 0, 2] < 0.0  # it has vanished
 
 
+def test_a_drone_turns_to_a_goal_beside_it():
+    """It looks to the left, along +y, and the ball is 6 m ahead on +x: a turn of 90 degrees."""
+    settings = {"name": "test_reach", "start": {"heading": 90.0}, "step_limit": 20}
+    actions = ActionSettings(kind="moves_turning", turn_step=45.0)
+    made = Worlds(1, BaseTaskSettings.read(settings), actions=actions)
+    made.reset(torch.arange(1), [np.random.RandomState(0)])
+    assert made.task.edits.next_offset(made.state)[0].tolist() == pytest.approx([0.0, -6.0, 0.0])
+    assert made.state.sides[0, 0] == 2  # on its right
+    rewards, end = fly(made, RIGHT, RIGHT, *[FORWARD] * 4)
+    assert rewards == pytest.approx([0, 0, 0.5, 0.5, 0.5, 0.5]) and end == "RUNNING"
+    assert fly(made, FORWARD)[1] == "SUCCESS"
+    assert made.state.body.position[0].tolist() == pytest.approx([5.0, 0.0, 2.5])
+
+
 def test_an_obstacle_is_touched_between_two_positions():
     made = worlds()
     fly(made, LEFT, LEFT, FORWARD, FORWARD)
@@ -124,8 +139,8 @@ def test_starts_turn_the_drone_and_the_offset_of_its_goal():
         return step.goal[1] + 100.0 * step.goal[0] + 10000.0 * step.heading
 
     made = worlds(start={"heading": 90.0}, reward={"test_offset": 1.0})
-    # at (1, 0), looking to y: the goal is 5 m to the right; a float's rounding of 10000 pi / 2
-    assert fly(made, FORWARD)[0] == pytest.approx([10000 * np.pi / 2 - 5.0], abs=0.01)
+    # at (0, 1), looking to y: the goal is 6 m to the right; a float's rounding of 10000 pi / 2
+    assert fly(made, FORWARD)[0] == pytest.approx([10000 * np.pi / 2 - 106.0], abs=0.01)
 
 
 def test_terms_see_the_goal_from_a_start_that_is_turned():
@@ -169,6 +184,18 @@ def test_the_image_is_that_of_the_heading():
         made = worlds(objects={"ball": ball}, start={"heading": heading})
         shown.append(made.render(made.state, made.view(modality="segmentation")))
     assert torch.equal(*shown) and len(shown[0].unique()) == 3  # sky, ground and ball
+
+
+def test_a_turned_box_is_drawn_and_touched_as_its_twin_that_is_not():
+    shown, ends = [], []
+    for size, heading in (([6.0, 1.0, 4.0], 0.0), ([1.0, 6.0, 4.0], 90.0)):
+        wall = {"size": size, "heading": heading, "x": 6.0, "y": 2.5}  # y is 2 to 3
+        made = worlds(objects={"ball": {**BALL, "x": 20.0}, "wall": wall})
+        shown.append(made.render(made.state))
+        clear = fly(made, *[FORWARD] * 6)[1]  # the drone's side is 1.6 m away
+        ends.append((clear, *fly(made, LEFT), *fly(made, LEFT)))
+    assert ends[0] == ends[1] and ends[0][0] == "RUNNING" and ends[0][-1] == "CONTACT"
+    assert (shown[0] != shown[1]).any(-1).float().mean() < 0.01  # but for rounding at edges
 
 
 def test_sampled_objects_keep_apart():
@@ -254,6 +281,22 @@ def test_fused_episodes_are_the_stepped_ones(start):
     assert sum(sums) == pytest.approx(logged["train/reward"], abs=1e-5)
     shares = [logged[f"reward_share/{name}"] for name in rewards]
     assert sum(shares) == pytest.approx(1.0) and max(shares) < 1.0
+
+
+@pytest.mark.parametrize("kind", ["moves", "moves_turning", "moves_full"])
+def test_fused_episodes_with_headings_at_random_are_the_stepped_ones(kind):
+    values = {
+        "objects": {"ball": {**BALL, "y": [-3.0, 3.0]}},
+        "start": {"heading": [-180.0, 180.0]},
+    }
+    task = BaseTaskSettings.read({"name": "test_reach", **values})
+    how = {"task": task, "num_envs": 32, "actions": ActionSettings(kind=kind)}
+    collectors = [make(compiled=fused, info=("attitude",), **how) for fused in (True, False)]
+    assert isinstance(collectors[0].fused, FusedEpisodes)
+    with set_exploration_type(ExplorationType.DETERMINISTIC):
+        one, other = (collector.collect() for collector in collectors)
+    for key in ("pixels", "action", ("next", "reward"), ("next", "info", "attitude")):
+        assert torch.equal(one[key], other[key]), key
 
 
 def test_velocity_of_a_move_is_its_length_over_the_steps_time():
