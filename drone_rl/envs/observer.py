@@ -318,8 +318,9 @@ class ImageSource:
         numbers = torch.tensor([_CLASS_CHANNELS[kind] for kind in kinds], device=images.device)
         return numbers[images.long()]  # -1, the sky, is the last one
 
-    def read(self, state: State, appearance: Appearance | None) -> Tensor:
+    def read(self, state: State, seen: Tensor, appearance: Appearance | None) -> Tensor:
         """Return what the camera gives in states, without errors; see `drone_rl.envs.readings`."""
+        del seen
         view = dataclasses.replace(self.view, modalities=(self._modality,))
         return self._reading(self.worlds.render(state, view, appearance))
 
@@ -363,6 +364,11 @@ class VectorSource:
         values = measure(self.seen.quantity, self.worlds, state)[..., None, None]
         self.last = self.faults(values, rows, starts)
         return self.pipeline(self.last, rows, starts)[..., 0, 0] / self.seen.scale
+
+    def read(self, state: State, seen: Tensor, appearance: Appearance | None) -> Tensor:
+        """Return what the sensor gave, as it was observed. Shape: (k, n)."""
+        del state, appearance
+        return seen * self.seen.scale
 
     def example(self) -> Tensor:
         """Return zeros. Shape: (1, n)."""

@@ -86,7 +86,8 @@ class Readings:
         values = _copied(given)
         if values is None:
             raise InputError(f"{name}={shown(given)} is no array of numbers; give {form}")
-        fits = values.dtype == dtype if dtype == torch.uint8 else values.dtype != torch.bool
+        is_rgb = dtype == torch.uint8 and shape[-1] == 3
+        fits = values.dtype == dtype if is_rgb else values.dtype != torch.bool
         if not fits or tuple(values.shape[0 if single else 1 :]) != shape:
             other = "several to act_batch" if single else "one to act"
             raise InputError(

@@ -47,6 +47,12 @@ class StepContext:
         """The inputs of policies, by name."""
         return self.observer.observe(self.state, self.rows, self.starts, self.appearance)
 
+    @functools.cached_property
+    def readings(self) -> dict[str, Tensor]:
+        """What sensors and, without errors, cameras give; see `drone_rl.envs.readings`."""
+        sources, look = self.observer.sources, self.appearance
+        return {name: s.read(self.state, self.inputs[name], look) for name, s in sources.items()}
+
     def part(self, which: Tensor, inputs: Mapping[str, Tensor] | None = None) -> "StepContext":
         """Return the context of some of these environments, by their position, (j,).
 

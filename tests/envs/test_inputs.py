@@ -1,0 +1,189 @@
+"""Inputs of policies: their values by hand, and the same values from readings of real sensors."""
+
+import numpy as np
+import pytest
+import torch
+
+import drone_rl
+from drone_rl import InputError, define_task
+from drone_rl.config.inputs import Altitude, DepthImage, Goal, GrayImage, LastAction
+from drone_rl.config.networks import SmallCnn
+from drone_rl.envs import base_env
+from drone_rl.envs.rollout import ActorAgent, steps
+from tests.untrained import untrained
+
+FORWARD, LEFT = 0, 1
+BOX = {"size": [2.0, 2.0, 2.0], "x": 6.0, "y": 0.0, "z": 2.5}
+BALL = {"shape": "ball", "role": "goal", "size": [1.0, 1.0, 1.0], "x": 9.0, "y": 3.0, "z": 4.5}
+
+
+@pytest.fixture
+def see():
+    """Return a function that makes environments of the task and acts in them."""
+    objects, rewards = {"box": BOX, "ball": BALL}, {"progress": 1.0}
+    define_task("test_inputs", objects=objects, reward=rewards, success=["all_goals"])
+    envs = []
+
+    def observe(inputs, *actions, num_envs=1, **task):
+        """Return the inputs at each step, of shapes (T, num_envs, *)."""
+        settings = drone_rl.config.BaseTaskSettings.read({"name": "test_inputs", **task}, "task")
+        env = drone_rl.make_env(num_envs, task=settings, inputs=inputs)
+        envs.append(env)
+        seen = [env.reset()]
+        for action in actions:
+            seen.append(env.step(seen[-1].set("action", torch.full((num_envs,), action)))["next"])
+        return torch.stack([step.select(*inputs) for step in seen])
+
+    yield observe
+    for env in envs:
+        env.close()
+
+
+def test_depth_of_a_box_is_that_along_the_axis_of_the_camera(see):
+    seen = see({"depth": DepthImage(maximum=10.0, size=(9, 9))}, FORWARD)["depth"][:, 0, 0]
+    # the face is at x 5, the camera 0.4 m in front of the drone; standardized by 0.5 and 0.25
+    for step, face in zip(seen, (4.6, 3.6), strict=True):
+        assert step[4, 4] == pytest.approx((face / 10.0 - 0.5) / 0.25, abs=1e-5)
+        assert step[0, 0] == pytest.approx(2.0)  # the sky is the maximum
+
+
+def test_a_camera_looks_down(see):
+    down = DepthImage(camera="down", maximum=10.0, size=(9, 9))
+    below = float(see({"down": down})["down"][0, 0, 0, 4, 4])
+    assert 10.0 * (0.25 * below + 0.5) == pytest.approx(2.5, abs=0.5)  # its mount is below the drone
+
+
+def test_a_segmentation_is_the_same_in_every_scene(see):
+    seen = see(["segmentation"])["segmentation"][0, 0]
+    assert seen.sum(0).eq(1).all()
+    assert seen[:, 12, 32].tolist() == [0, 1, 0, 0, 0]  # target, obstacle, ground, other, sky
+    assert seen[:, -1, 0].tolist() == [0, 0, 1, 0, 0] and seen[:, 0, 0].tolist() == [0, 0, 0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("heading", "expected"), [(0.0, [0.9, 0.3, 0.2]), (90.0, [0.3, -0.9, 0.2])]
+)
+def test_the_goal_is_where_the_drone_sees_it_after_a_turn(see, heading, expected):
+    goal = see(["goal"], start={"heading": heading})["goal"][0, 0]
+    assert goal.tolist() == pytest.approx(expected, abs=1e-6)
+
+
+def test_the_last_action_starts_at_zero(see):
+    assert see(["last_action"], FORWARD, LEFT)["last_action"][:, 0].tolist() == [
+        [0.0, 0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0, 0.0],
+    ]
+
+
+def test_errors_of_vectors_are_in_their_unit(see):
+    late = see({"goal": Goal(delay=1)}, FORWARD, FORWARD)["goal"][:, 0, 0]
+    assert late.tolist() == pytest.approx([0.9, 0.9, 0.8])
+    lost = see({"goal": Goal(loss=1.0)}, FORWARD, FORWARD)["goal"][:, 0, 0]
+    assert lost.tolist() == pytest.approx([0.9, 0.9, 0.9])
+    noise = see({"altitude": Altitude(noise=0.5)}, *[LEFT] * 9, num_envs=200)["altitude"]
+    assert 5.0 * noise.mean() == pytest.approx(2.5, abs=0.05)
+    assert 5.0 * noise.std() == pytest.approx(0.5, abs=0.05)
+    bias = 5.0 * see({"altitude": Altitude(bias=0.5)}, LEFT, num_envs=200)["altitude"] - 2.5
+    assert torch.equal(bias[0], bias[1])
+    assert -0.5 <= bias.min() < -0.45 < 0.45 < bias.max() <= 0.5
+
+
+def test_images_of_a_stack_begin_with_the_first_frame(see):
+    seen = see({"two": GrayImage(stack=2), "one": "gray"}, FORWARD)
+    assert torch.equal(seen["two"][1, 0, 0], seen["one"][0, 0, 0])
+    assert torch.equal(seen["two"][1, 0, 1], seen["one"][1, 0, 0])
+
+
+@pytest.mark.parametrize(
+    ("inputs", "message"),
+    [
+        ([], "inputs=.*: it must have at least 1"),
+        (["gray", "gray"], "inputs: .* names an input twice"),
+        (["gray", "foo"], "inputs.foo='foo': it must be one of"),
+        ({"gray": {"name": "gray", "stack": 0}}, "inputs.gray.stack=0: it must be a whole"),
+        (["velocity"], "drones that move at once have no velocity"),
+    ],
+)
+def test_inputs_that_there_are_not_are_one_line(inputs, message, see):
+    with pytest.raises(InputError, match=f"^{message}"):
+        see(inputs)
+
+
+def test_inputs_are_given_without_a_camera():
+    with pytest.raises(InputError, match="leave them out"):
+        drone_rl.make_env(1, camera={"width": 32}, inputs=["gray"])
+
+
+# Policies
+
+INPUTS = {
+    "gray": GrayImage(noise=0.1, stack=2, size=(17, 33)),
+    "down": DepthImage(camera="down"),
+    **{name: name for name in ("rgb", "segmentation", "normals", "goal", "altitude")},
+    "last_action": LastAction(delay=1),
+}
+
+
+@pytest.fixture
+def policy(see):
+    """Return an untrained policy of several inputs in the task."""
+    del see
+    return untrained(SmallCnn(channels=(4,)), task="test_inputs", inputs=INPUTS)
+
+
+@torch.no_grad()
+def test_act_equals_the_network_in_its_environment(policy):
+    clean = policy._described(inputs=policy.description.without_faults().inputs)
+    network = clean.make_network()
+    with clean.flying(3) as (env, actor):
+        base = base_env(env)
+        for step in steps(ActorAgent(actor), base.observer, base.start(), num_steps=4):
+            seen = step.context.inputs
+            logits = network(*(seen[name] for name in network.in_keys))
+            acted = clean.act_batch(**step.context.readings)
+            torch.testing.assert_close(acted, logits.argmax(-1))
+    clean.reset()
+    first = {name: values[0].numpy() for name, values in step.context.readings.items()}
+    policy.reset()
+    assert clean.act(**first) == policy.act(**first)  # without simulated errors
+
+
+def readings(policy, **others):
+    images = {
+        "gray": np.zeros((17, 33, 3), np.uint8),
+        "rgb": np.zeros((25, 64, 3), np.uint8),
+        "down": np.zeros((25, 64)),
+        "segmentation": np.zeros((25, 64), np.uint8),
+        "normals": np.zeros((25, 64, 3)),
+    }
+    vectors = {"goal": [1, 2, 3], "altitude": [1.0], "last_action": np.zeros(4)}
+    return {**images, **vectors, **others}
+
+
+@pytest.mark.parametrize(
+    ("others", "message"),
+    [
+        ({"depth": 0}, "depth is no input of the policy; it reads gray, down, rgb"),
+        ({"goal": [1, 2]}, r"goal of shape \(2,\) .* give float32 of shape \(3\)"),
+        ({"goal": [1, 2, np.nan]}, "goal has NaN"),
+        ({"goal": "left"}, "goal='left' is no array of numbers"),
+        ({"gray": np.zeros((17, 33, 3))}, r"gray of shape .* give uint8 of shape \(17, 33, 3\)"),
+    ],
+)
+def test_readings_that_do_not_fit_are_one_line(policy, others, message):
+    with pytest.raises(InputError, match=f"^{message}"):
+        policy.act(**readings(policy, **others))
+
+
+def test_inputs_that_are_not_given_are_one_line(policy):
+    given = readings(policy)
+    del given["goal"]
+    with pytest.raises(InputError, match="^the policy reads gray, .*; give goal, too$"):
+        policy.act(**given)
+    with pytest.raises(InputError, match="give them by name"):
+        policy.act(given["gray"])
+    batch = {name: np.array(values)[None] for name, values in readings(policy).items()}
+    batch["goal"] = np.zeros((2, 3))
+    with pytest.raises(InputError, match="several numbers of drones: .* goal of 2"):
+        policy.act_batch(**batch)
