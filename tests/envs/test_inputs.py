@@ -50,7 +50,9 @@ def test_depth_of_a_box_is_that_along_the_axis_of_the_camera(see):
 def test_a_camera_looks_down(see):
     down = DepthImage(camera="down", maximum=10.0, size=(9, 9))
     below = float(see({"down": down})["down"][0, 0, 0, 4, 4])
-    assert 10.0 * (0.25 * below + 0.5) == pytest.approx(2.5, abs=0.5)  # its mount is below the drone
+    assert 10.0 * (0.25 * below + 0.5) == pytest.approx(
+        2.5, abs=0.5
+    )  # its mount is below the drone
 
 
 def test_a_segmentation_is_the_same_in_every_scene(see):
@@ -179,11 +181,78 @@ def test_readings_that_do_not_fit_are_one_line(policy, others, message):
 def test_inputs_that_are_not_given_are_one_line(policy):
     given = readings(policy)
     del given["goal"]
-    with pytest.raises(InputError, match="^the policy reads gray, .*; give goal, too$"):
+    with pytest.raises(InputError, match=r"^the policy reads gray, .*; give goal, too$"):
         policy.act(**given)
     with pytest.raises(InputError, match="give them by name"):
         policy.act(given["gray"])
     batch = {name: np.array(values)[None] for name, values in readings(policy).items()}
     batch["goal"] = np.zeros((2, 3))
-    with pytest.raises(InputError, match="several numbers of drones: .* goal of 2"):
+    with pytest.raises(InputError, match=r"several numbers of drones: .* goal of 2"):
         policy.act_batch(**batch)
+
+
+# Gymnasium and Stable-Baselines3
+
+
+def test_gymnasium_observes_a_dictionary(see):
+    check_env = pytest.importorskip("gymnasium.utils.env_checker").check_env
+    inputs = {"down": DepthImage(camera="down"), "goal": Goal()}
+    want = see(inputs)[0]
+    world = drone_rl.DroneWorld("test_inputs", inputs=inputs)
+    check_env(world, skip_render_check=True)
+    seen, _ = world.reset(seed=0)
+    assert {name: values.shape for name, values in seen.items()} == {
+        "down": (1, 25, 64),
+        "goal": (3,),
+    }
+    assert all(np.array_equal(values, want[name][0]) for name, values in seen.items())
+    with pytest.raises(InputError, match="leave them out"):
+        drone_rl.DroneWorld("test_inputs", inputs=["gray"], camera={"width": 32})
+    with pytest.raises(InputError, match="inputs are of policies"):
+        drone_rl.DroneWorld("test_inputs", inputs=["gray"], observations="state")
+
+
+def test_a_batch_ends_with_the_last_inputs(see):
+    pytest.importorskip("gymnasium")
+    del see
+    options = {"inputs": ["gray", "goal"], "step_limit": 2, "autoreset_mode": "SameStep"}
+    worlds = drone_rl.DroneWorlds(2, "test_inputs", **options)
+    worlds.reset(seed=0)
+    worlds.step(np.array([FORWARD] * 2))
+    seen, *_, info = worlds.step(np.array([FORWARD, LEFT]))
+    assert worlds.observation_space.contains(seen)
+    last = [info["final_obs"][i]["goal"].tolist() for i in range(2)]
+    assert last == [pytest.approx([0.7, 0.3, 0.2]), pytest.approx([0.8, 0.2, 0.2])]
+    assert seen["goal"].tolist() == [pytest.approx([0.9, 0.3, 0.2])] * 2
+
+
+def test_a_model_of_several_inputs_is_read_back(see):
+    sb3 = pytest.importorskip("stable_baselines3")
+    from stable_baselines3.common.vec_env import VecNormalize
+
+    del see
+    worlds = drone_rl.DroneWorlds(2, "test_inputs", inputs=INPUTS, autoreset_mode="SameStep")
+    env = drone_rl.Sb3Worlds(worlds)
+    model = sb3.PPO("MultiInputPolicy", env, n_steps=4, batch_size=4, n_epochs=1)
+    policy = drone_rl.policy_from(model.learn(8))  # checks it on episodes
+    assert [*policy.inputs] == [*INPUTS]
+    judged = drone_rl.judge(policy, episodes=4, task={"step_limit": 3}, progress=lambda *_: None)
+    assert judged.greedy.episodes == 4
+    with pytest.raises(InputError, match=r"^VecNormalize makes the dictionary"):
+        drone_rl.policy_from(model, env=VecNormalize(env))
+
+
+def test_a_callable_gets_a_dictionary_of_inputs(see):
+    del see
+
+    def to_the_goal(inputs):
+        return inputs["goal"] @ torch.tensor([[1.0, 0, 0], [0, 9, -9], [0, 0, 0]])
+
+    inputs = {"depth": "depth", "goal": "goal"}
+    policy = drone_rl.policy_from(to_the_goal, task="test_inputs", inputs=inputs)
+    with policy.flying(2) as (env, actor):
+        assert actor(env.reset())["logits"].tolist() == [pytest.approx([0.9, 2.7, -2.7])] * 2
+    with pytest.raises(
+        InputError, match=r"a dictionary of inputs of shapes depth \(1, 1, 25, 64\)"
+    ):
+        drone_rl.policy_from(lambda inputs: inputs["gray"], task="test_inputs", inputs=inputs)

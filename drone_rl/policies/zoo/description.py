@@ -33,6 +33,7 @@ from drone_rl.config.inputs import (
     PIXELS,
     ImageInput,
     InputDescription,
+    VectorInput,
     describe_inputs,
     first_camera,
     require_name,
@@ -208,25 +209,8 @@ class PolicyDescription(Model):
 
     @property
     def shapes(self) -> dict[str, tuple[int, ...]]:
-        """Shape of each input as the network gets it: (C, H, W) of an image, (n,) of a vector."""
-        return {
-            name: self._frame(seen).shape if isinstance(seen, ImageInput) else (seen.size,)
-            for name, seen in self.inputs.items()
-        }
-
-    def _frame(self, image: ImageInput) -> Frame:
-        """Return shape and type of an image after its transforms."""
-        frame = image.frame
-        for transform in image.transforms:
-            frame = output_of(transform, frame)
-            if math.prod(frame.shape) > MAX_NUMBERS:
-                raise InputError(
-                    f"the transform {transform.name} makes images of shape {frame.shape}; give "
-                    f"sizes that make at most {MAX_NUMBERS} numbers"
-                )
-        if not frame.is_float:
-            raise InputError("the network needs floats; add a transform such as gray")
-        return frame
+        """Shape of each input as the network gets it, see `shapes_of`."""
+        return shapes_of(self.inputs)
 
     @property
     def sees_pixels(self) -> bool:
@@ -391,6 +375,33 @@ def describe(settings: TrainSettings) -> PolicyDescription:
         appearance=settings.appearance,
         dynamics=settings.dynamics,
     )
+
+
+def shapes_of(inputs: Mapping[str, ImageInput | VectorInput]) -> dict[str, tuple[int, ...]]:
+    """Return the shape of each input as a network gets it: (C, H, W) of an image, (n,) of a vector.
+
+    Raises:
+        InputError: An image is too large, or still bytes.
+    """
+    return {
+        name: _frame_of(seen).shape if isinstance(seen, ImageInput) else (seen.size,)
+        for name, seen in inputs.items()
+    }
+
+
+def _frame_of(image: ImageInput) -> Frame:
+    """Return shape and type of an image after its transforms."""
+    frame = image.frame
+    for transform in image.transforms:
+        frame = output_of(transform, frame)
+        if math.prod(frame.shape) > MAX_NUMBERS:
+            raise InputError(
+                f"the transform {transform.name} makes images of shape {frame.shape}; give "
+                f"sizes that make at most {MAX_NUMBERS} numbers"
+            )
+    if not frame.is_float:
+        raise InputError("the network needs floats; add a transform such as gray")
+    return frame
 
 
 def output_of(transform: Transform, frame: Frame) -> Frame:
