@@ -315,7 +315,8 @@ class ImageSource:
         if self._modality != "segmentation":
             return images
         kinds = [*self.worlds.scene.semantic_classes, SemanticClass.SKY]
-        numbers = torch.tensor([_CLASS_CHANNELS[kind] for kind in kinds], device=images.device)
+        numbers = [_CLASS_CHANNELS[kind] for kind in kinds]
+        numbers = torch.tensor(numbers, dtype=torch.uint8, device=images.device)
         return numbers[images.long()]  # -1, the sky, is the last one
 
     def read(self, state: State, seen: Tensor, appearance: Appearance | None) -> Tensor:

@@ -10,6 +10,9 @@ from drone_rl.config.inputs import Altitude, DepthImage, Goal, GrayImage, LastAc
 from drone_rl.config.networks import SmallCnn
 from drone_rl.envs import base_env
 from drone_rl.envs.rollout import ActorAgent, steps
+from drone_rl.policies import make_actor
+from drone_rl.policies.zoo import make_onnx, open_onnx
+from drone_rl.trust.onnx_export import agreement
 from tests.untrained import untrained
 
 FORWARD, LEFT = 0, 1
@@ -256,3 +259,40 @@ def test_a_callable_gets_a_dictionary_of_inputs(see):
         InputError, match=r"a dictionary of inputs of shapes depth \(1, 1, 25, 64\)"
     ):
         drone_rl.policy_from(lambda inputs: inputs["gray"], task="test_inputs", inputs=inputs)
+
+
+# Exported models
+
+
+def test_an_exported_model_has_the_inputs_by_name(see):
+    onnxruntime = pytest.importorskip("onnxruntime")
+    pytest.importorskip("onnxscript")
+    del see
+    inputs = {**INPUTS, "gray": GrayImage(noise=0.1)}
+    policy = untrained(SmallCnn(channels=(4,)), task="test_inputs", inputs=inputs)
+    network = policy.make_network()
+    network.rescale(torch.full((3,), 50.0), torch.zeros(3))
+    content = make_onnx(policy.description, network, {})
+    session = onnxruntime.InferenceSession(content)
+    assert {entry.name: entry.shape[1:] for entry in session.get_inputs()} == {
+        "gray": [25, 64, 3],
+        "down": [25, 64],
+        "rgb": [25, 64, 3],
+        "segmentation": [25, 64],
+        "normals": [25, 64, 3],
+        "goal": [3],
+        "altitude": [1],
+        "last_action": [4],
+    }
+    clean = policy._described(inputs=policy.description.without_faults().inputs)
+    env = clean.make_env(8)
+    actor = make_actor(network, env.action_spec, torch.Generator().manual_seed(0))
+    found = agreement(env, actor, open_onnx(content), 40)
+    env.close()
+    assert found.difference <= 1e-5 and found.actions_differ == 0 and found.frames == 320
+
+
+def test_models_of_stacks_are_not_exported(policy):
+    pytest.importorskip("onnxscript")
+    with pytest.raises(InputError, match="sees a stack of frames"):
+        make_onnx(policy.description, policy.make_network(), {})

@@ -222,8 +222,9 @@ class PolicyDescription(Model):
 
     @property
     def frames(self) -> int:
-        """Number of frames that the network gets at once."""
-        return math.prod(t.N for t in self.transforms if isinstance(t, Stack))
+        """Number of frames of an image that the network gets at once."""
+        stacks = [[t.N for t in i.transforms if isinstance(t, Stack)] for i in self.images.values()]
+        return max(map(math.prod, stacks), default=1)
 
     @property
     def is_recurrent(self) -> bool:
