@@ -122,6 +122,10 @@ class ImageInput(Model):
             else Frame((channels, *self.size), True)
         )
 
+    def reading(self) -> Self:
+        """Return what the camera gives, without what is done with it."""
+        return self.replace(transforms=(), maximum=None if self.maximum is None else 1.0)
+
     def without_errors(self) -> Self:
         """Return the same without camera faults."""
         return self.replace(
@@ -159,6 +163,10 @@ class VectorInput(Model):
     def size(self) -> int:
         """Number of its numbers."""
         return SIZES[self.quantity]
+
+    def reading(self) -> Self:
+        """Return what the sensor gives, without what is done with it."""
+        return self.without_errors().replace(scale=1.0)
 
     def without_errors(self) -> Self:
         """Return the same without noise, bias, delay and loss."""
@@ -405,6 +413,21 @@ def describe_inputs(
         with prefixed_errors(f"inputs.{name}"):
             made[name] = settings.described(camera, transforms)
     return made
+
+
+def is_plain(inputs: Mapping[str, ImageInput | VectorInput]) -> bool:
+    """Return whether the only input is the image that `camera` and `transforms` describe."""
+    seen = inputs.get(PIXELS)
+    if len(inputs) > 1 or not isinstance(seen, ImageInput):
+        return False
+    return (seen.modality, seen.camera.name) == ("rgb", "front")
+
+
+def recorded_inputs(
+    inputs: Mapping[str, ImageInput | VectorInput],
+) -> dict[str, ImageInput | VectorInput]:
+    """Return what demonstrations for a policy record by name; nothing for the plain image."""
+    return {} if is_plain(inputs) else {name: seen.reading() for name, seen in inputs.items()}
 
 
 def first_camera(inputs: Mapping[str, ImageInput | VectorInput]) -> CameraSettings:

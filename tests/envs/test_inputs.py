@@ -1,8 +1,11 @@
 """Inputs of policies: their values by hand, and the same values from readings of real sensors."""
 
+import io
+
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 import drone_rl
 from drone_rl import InputError, define_task
@@ -10,9 +13,15 @@ from drone_rl.config.inputs import Altitude, DepthImage, Goal, GrayImage, LastAc
 from drone_rl.config.networks import SmallCnn
 from drone_rl.envs import base_env
 from drone_rl.envs.rollout import ActorAgent, steps
+from drone_rl.flight.fly_page.flight import Flight
+from drone_rl.flight.settings import FlySettings
 from drone_rl.policies import make_actor
-from drone_rl.policies.zoo import make_onnx, open_onnx
+from drone_rl.policies.zoo import describe, make_onnx, open_onnx
+from drone_rl.training import demonstrations
+from drone_rl.training.cloning import clone
 from drone_rl.trust.onnx_export import agreement
+from drone_rl.trust.video import film_episode, render_step
+from tests.flight.fly_page.conftest import decode
 from tests.untrained import untrained
 
 FORWARD, LEFT = 0, 1
@@ -296,3 +305,50 @@ def test_models_of_stacks_are_not_exported(policy):
     pytest.importorskip("onnxscript")
     with pytest.raises(InputError, match="sees a stack of frames"):
         make_onnx(policy.description, policy.make_network(), {})
+
+
+# Demonstrations, films and the page
+
+
+def test_a_policy_learns_from_demonstrations_of_its_inputs(tmp_path):
+    names = ["gray", "depth", "segmentation", "last_action"]
+    task = {"num_cubes": 1, "first_distance": 4.0}
+    settings = drone_rl.TrainSettings(task=task, inputs=names)
+    paths = demonstrations.record_oracle(tmp_path, settings, flights=2)
+    conditions = demonstrations.FlightConditions.of(settings)
+    found = demonstrations.read_demonstrations(tmp_path, conditions)
+    assert len(paths) == len(found) == 2
+    for one in found:
+        assert {name: values.shape[1:] for name, values in one.readings.items()} == {
+            "gray": (25, 64, 3),
+            "depth": (25, 64),
+            "segmentation": (25, 64),
+            "last_action": (4,),
+        }
+        moved = np.eye(4)[one.actions[:-1]] * np.array([1, 1, -1, 0])  # right is -1 to the left
+        expected = np.where(one.actions[:-1, None] == 2, [0, -1, 0, 0], moved)
+        assert np.array_equal(one.readings["last_action"][1:], expected)
+    network = describe(settings).build_network(torch.Generator().manual_seed(0))
+    done = clone(settings.replace(demonstrations=str(tmp_path)), network, found)["cloning"]
+    assert done["accuracy"] > 0.9
+    other = demonstrations.FlightConditions.of(settings.replace(inputs=["gray", "depth"]))
+    with pytest.raises(InputError, match=r"recorded with inputs.segmentation=.*=absent"):
+        demonstrations.read_demonstrations(tmp_path, other)
+
+
+def test_the_page_shows_each_image_and_vector(policy, tmp_path):
+    flight = Flight(policy, FlySettings(saliency=False), tmp_path)
+    state, images = decode(flight.frame())
+    picture = Image.open(io.BytesIO(images["observation"]))
+    assert picture.size == (64, 17 + 4 * 25)
+    assert "goal 9.00 3.00 2.00; altitude 2.50; last_action 0.00" in state["texts"]["vectors"]
+    flight.close()
+
+
+def test_films_show_each_image(policy):
+    with policy.flying(1) as (env, actor):
+        base = base_env(env)
+        base.start()
+        shown = render_step(base).camera
+        assert shown.shape == (17 + 4 * 25, 64, 3) and shown.dtype == torch.uint8
+        assert len(list(film_episode(env, actor))) > 1

@@ -36,6 +36,7 @@ from drone_rl.config.inputs import (
     VectorInput,
     describe_inputs,
     first_camera,
+    is_plain,
     require_name,
 )
 from drone_rl.config.networks import Lstm, Network
@@ -215,10 +216,7 @@ class PolicyDescription(Model):
     @property
     def sees_pixels(self) -> bool:
         """Whether its only input is the image that `camera` and `transforms` describe."""
-        seen = self.inputs.get(PIXELS)
-        if len(self.inputs) > 1 or not isinstance(seen, ImageInput):
-            return False
-        return (seen.modality, seen.camera.name) == ("rgb", "front")
+        return is_plain(self.inputs)
 
     @property
     def frames(self) -> int:
