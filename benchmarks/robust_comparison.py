@@ -52,7 +52,7 @@ TOUCHED_BY: dict[str, tuple[str, ...]] = {
     "slow_noise": ("transforms.noise",),
     "blur": ("transforms.blur",),
     "dead_rows": ("transforms.dead_rows",),
-    "frozen_frames": ("transforms.frozen_frames",),
+    "frozen_frames": ("transforms.frozen_frames", "transforms.held_frames"),
     "late_frames": ("transforms.late_frames",),
     "step_length": ("task.step_length",),
     "action_delay": ("transforms.late_frames",),

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from drone_rl.config.registry import register_transform as register_transform
     from drone_rl.config.sensors import SensorSettings as SensorSettings
     from drone_rl.config.terms import end as end
+    from drone_rl.config.terms import event as event
     from drone_rl.config.terms import reward as reward
     from drone_rl.config.terms import success as success
     from drone_rl.config.training import CloningSettings as CloningSettings
@@ -73,6 +74,7 @@ if TYPE_CHECKING:
     from drone_rl.policies.sb3 import Sb3Trunk as Sb3Trunk
     from drone_rl.sim.sensors import Sensors as Sensors
     from drone_rl.sim.tasks import register_task as register_task
+    from drone_rl.sim.tasks.step_kernel import Mover as Mover
     from drone_rl.sim.tasks.step_kernel import Step as Step
     from drone_rl.sim.tasks.term_task import define_task as define_task
     from drone_rl.training.demonstrations import Demonstration as Demonstration

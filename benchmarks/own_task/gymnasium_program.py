@@ -3,13 +3,12 @@
 import json
 import sys
 
+import gymnasium
 import reach_ball  # noqa: F401 (registers the task)
 from gymnasium.utils.env_checker import check_env
 
-import drone_rl
-
-check_env(drone_rl.DroneWorld(task="reach_ball"), skip_render_check=True)
-worlds = drone_rl.DroneWorlds(num_envs=16, task="reach_ball")
+check_env(gymnasium.make("drone_rl/ReachBall-v0").unwrapped, skip_render_check=True)
+worlds = gymnasium.make_vec("drone_rl/ReachBall-v0", num_envs=16)
 worlds.reset(seed=0)
 worlds.action_space.seed(0)
 episodes = 0

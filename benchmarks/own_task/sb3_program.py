@@ -3,6 +3,7 @@
 import json
 import sys
 
+import gymnasium
 import reach_ball  # noqa: F401 (registers the task)
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecMonitor, VecTransposeImage
@@ -10,11 +11,13 @@ from stable_baselines3.common.vec_env import VecMonitor, VecTransposeImage
 import drone_rl
 
 camera = drone_rl.CameraSettings(width=64, height=40)  # CnnPolicy needs at least 36 x 36 pixels
-worlds = drone_rl.DroneWorlds(
-    num_envs=32, task="reach_ball", camera=camera, autoreset_mode="SameStep"
+worlds = gymnasium.make_vec(
+    "drone_rl/ReachBall-v0", num_envs=32, camera=camera, autoreset_mode="SameStep"
 )
 env = VecTransposeImage(VecMonitor(drone_rl.Sb3Worlds(worlds)))
 model = PPO("CnnPolicy", env, seed=0, n_steps=64, batch_size=512)
 model.learn(4096)
-verdict = drone_rl.judge(model, episodes=50)
+model.save("ppo.zip")
+policy = drone_rl.policy_from(PPO.load("ppo.zip"), task="reach_ball", camera=camera)
+verdict = drone_rl.judge(policy, episodes=50)
 sys.stdout.write(json.dumps({"episodes": verdict.greedy.episodes}))

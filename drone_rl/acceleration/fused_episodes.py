@@ -10,19 +10,26 @@ from typing import Any, Self
 import torch
 import warp as wp
 from torch import Tensor
-from torchrl.envs import CatFrames, Transform
+from torchrl.envs import CatFrames
 from torchrl.envs.utils import ExplorationType
 
 from drone_rl.acceleration import rollout_kernel
 from drone_rl.acceleration.fused_network import ActivationRecorder
 from drone_rl.acceleration.packed_layers import PackedNetwork, Reasons, unsupported
 from drone_rl.envs import DroneEnv, Observer
+from drone_rl.envs.camera_faults import Shift
 from drone_rl.envs.drone_env import Entries
-from drone_rl.envs.transforms import CropRows, StandardizePixels
-from drone_rl.policies.actor import CategoricalActor
+from drone_rl.envs.transforms import (
+    ChromaticityPixels,
+    CropRows,
+    GrayPixels,
+    RgbPixels,
+    StandardizePixels,
+)
+from drone_rl.policies.actor import CategoricalActor, SquashedActor
 from drone_rl.policies.networks import require_finite
 from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
-from drone_rl.sim.rendering.raytrace.renderer import Raytracer
+from drone_rl.sim.rendering.raytrace.renderer import Raytracer, as_images, make_scratch
 from drone_rl.sim.rendering.raytrace.structs_kernel import Images
 from drone_rl.sim.tasks import State
 from drone_rl.sim.tasks.fused import fused_rules
@@ -47,7 +54,7 @@ class FusedEpisodes:
     def __init__(
         self,
         env: DroneEnv,
-        actor: CategoricalActor,
+        actor: CategoricalActor | SquashedActor,
         keeps_inputs: bool,
         network: PackedNetwork,
         rules: Any,
@@ -59,26 +66,28 @@ class FusedEpisodes:
         worlds, view = env.worlds, env.observer.image.view
         count = worlds.num_envs
         self._workers = WorkerPool(count, num_threads)
-        raytracer: Any = worlds.renderer
-        camera: Any = rollout_kernel.CameraView()
-        inputs = raytracer.kernel_inputs(view, self._workers.size)
-        camera.view, camera.geoms, camera.materials, camera.scratch = inputs
-        camera.poses = rules.poses
-        camera.mean, camera.deviation = _mean_and_deviation(env.observer)
-        self._camera = camera
-        self._visible, self._num_frames = _visible_lines(env.observer), _num_frames(env.observer)
+        transforms = self._transforms = Transforms(env.observer)
+        self._camera: Any = rollout_kernel.CameraView()
+        transforms.write(self._camera, count, self._workers.size)
+        scratch = (view.height * view.width, len(worlds.scene.shown(view.show_drone)))
+        self._camera.scratch = make_scratch(self._workers.size, *scratch)
+        self._visible, self._num_frames = transforms.visible, transforms.num_frames
         size = network.offsets.outputs[-1]
         shape = (self._workers.size, int(rollout_kernel.TOGETHER) * size)
         self._workspaces = wp.empty(shape, dtype=float, device="cpu")
-        size_of_frames = self._num_frames * view.height * view.width
+        channels = transforms.num_frames * transforms.num_channels
+        size_of_frames = channels * view.height * view.width
         self._length = max(1, min(_MAX_STEPS, _MAX_PIXELS // (count * size_of_frames)))
         self._num_rows = rows = count * self._length
-        num_actions = worlds.dynamics.actions.num_outputs
+        actions = worlds.dynamics.actions
+        self._is_continuous = _is_continuous(env)
+        kind = torch.float32 if self._is_continuous else torch.int32
+        self._num_draws = max(1, sum(actions.entry.shape))
         self._buffer = RolloutBuffer(
             {
-                "pixels": torch.empty(rows, self._num_frames, view.height, view.width),
-                "logits": torch.empty(rows, num_actions),
-                "action": torch.empty(rows, dtype=torch.int32),
+                "pixels": torch.empty(rows, channels, view.height, view.width),
+                "logits": torch.empty(rows, actions.num_outputs),
+                "action": torch.empty(rows, *actions.entry.shape, dtype=kind),
                 "reward": torch.empty(rows),
                 "end_reason": torch.empty(rows, dtype=torch.int32),
             }
@@ -88,7 +97,12 @@ class FusedEpisodes:
         self.activations = ActivationRecorder(launches * rows, size)
         """Of the last batch, for a `FusedNetwork` that learns from it."""
         self._owner = getattr(self._actor.network, "owner", "the policy")
-        self._kernel = rollout_kernel.make_kernel(*rules.functions)
+        is_plain = transforms.is_plain and env.appearances.middle is None
+        self._kernel = rollout_kernel.make_kernel(
+            *rules.functions,
+            rollout_kernel.decide_numbers if self._is_continuous else rollout_kernel.decide_move,
+            rollout_kernel.show_plain if is_plain else rollout_kernel.show_any,
+        )
         load_kernels(self._kernel.module)
 
     @classmethod
@@ -106,12 +120,11 @@ class FusedEpisodes:
         reasons = [*_not_fused(env), *_not_fused_policy(env, actor)]
         worlds = env.worlds
         rules = fused_rules(worlds.task, worlds.dynamics, worlds.state)
-        if rules is None:
-            names = f"{type(worlds.task).__name__} with {type(worlds.dynamics).__name__}"
-            reasons.append(f"task {names} is not fused")
-        if reasons or rules is None:
+        if isinstance(rules, str):
+            return Reasons([rules, *reasons])
+        if reasons:
             return Reasons(reasons)
-        lines, view = _visible_lines(env.observer), env.observer.image.view
+        lines, view = Transforms(env.observer).visible, env.observer.image.view
         hidden = view.height - (lines.stop - lines.start)
         network = PackedNetwork(actor.network, lines.start * view.width, hidden * view.width)
         return cls(env, actor, keeps_inputs, network, rules, num_threads)
@@ -128,6 +141,7 @@ class FusedEpisodes:
             return None
         load_kernels(self._kernel.module).result()
         self._rules.begin(started)
+        self._look(started)
         self.activations.recording = None
         self._network.pack()
         count, names = len(started), ["action", "reward", "end_reason"]
@@ -161,8 +175,21 @@ class FusedEpisodes:
             END_REASON: logged.pop("end_reason").long(),
             **terms,
             **logged,
-            "action": logged["action"].long(),
+            "action": logged["action"] if self._is_continuous else logged["action"].long(),
         }
+
+    def _look(self, started: State) -> None:
+        """Encode the appearance and the poses of environments that start, and their shifts."""
+        env, camera = self._env, self._camera
+        worlds, rows = env.worlds, torch.arange(len(started))
+        look = worlds.combine(env.appearances.current(rows))
+        raytracer: Any = worlds.renderer
+        launch = raytracer.encode(env.observer.image.view, worlds.poses(started, look), look)
+        camera.view, camera.geoms, camera.poses = launch.view, launch.geoms, launch.poses
+        camera.materials, camera.has_effects = launch.materials, launch.effects is not None
+        if launch.effects is not None:
+            camera.effects = launch.effects
+        self._transforms.begin(rows)
 
     def close(self) -> None:
         """End the threads."""
@@ -170,10 +197,12 @@ class FusedEpisodes:
 
     def _launch(self, num_envs: int, part: int, kept: Iterable[str]) -> Tensor:
         """Run up to `_length` steps; return the logits. `kept` are kept beyond the next launch."""
-        draws = torch.full((num_envs, self._length), -1.0)  # the most probable action
+        greedy = 0.0 if self._is_continuous else -1.0  # the most probable action
+        draws = torch.full((num_envs, self._length * self._num_draws), greedy)
         if self._actor.exploration == ExplorationType.RANDOM:
             source: Any = self._actor.generator
-            draws.uniform_(generator=source)
+            sample = draws.normal_ if self._is_continuous else draws.uniform_
+            sample(generator=source)
         opened, frames = self._buffer.open(part, kept), Images()
         pixels = opened["pixels"]
         gray: Any = wp.from_torch(pixels.flatten(2).flatten(0, 1))
@@ -185,7 +214,11 @@ class FusedEpisodes:
         rollout.observations = wp.from_torch(pixels.flatten(1))
         rollout.last_observations = wp.from_torch(self._last_observations)
         rollout.logits = wp.from_torch(opened["logits"])
-        rollout.actions = wp.from_torch(opened["action"])
+        rollout.num_steps = self._length
+        if self._is_continuous:
+            rollout.numbers = wp.from_torch(opened["action"])
+        else:
+            rollout.actions = wp.from_torch(opened["action"])
         rollout.rewards = wp.from_torch(opened["reward"])
         rollout.end_reasons = wp.from_torch(opened["end_reason"])
         first, last = part * self._num_rows, (part + 1) * self._num_rows
@@ -202,36 +235,85 @@ class FusedEpisodes:
         return opened["logits"]
 
 
-def _mean_and_deviation(observer: Observer) -> tuple[float, float]:
-    """Return what the kernel subtracts from gray pixels, and then divides them by."""
+def _is_continuous(env: DroneEnv) -> bool:
+    """Return whether actions are numbers instead of indices."""
+    return env.worlds.dynamics.actions.entry.dtype.is_floating_point
+
+
+_AFTER: dict[type, tuple[type, ...]] = {
+    CropRows: (),
+    StandardizePixels: (),
+    CatFrames: (),
+    Shift: (CropRows,),
+    ChromaticityPixels: (StandardizePixels, CatFrames),
+}
+"""Transforms that the kernel has, each with those that it can't follow."""
+
+
+class Transforms:
+    """The transforms of an observer for the kernel; see `unfused_transforms`."""
+
+    def __init__(self, observer: Observer) -> None:
+        """Read the settings of the transforms."""
+        self._view, self._pipeline = observer.image.view, observer.image.pipeline
+        self._by_type = {
+            type(transform): transform for transform in observer.image.pipeline.transforms
+        }
+        is_rgb = observer.image.view.modalities == ("rgb",)
+        self.num_channels = 1 + is_rgb + (is_rgb and ChromaticityPixels not in self._by_type)
+        """Of a frame."""
+        self.num_frames = observer.image.pipeline.earlier + 1
+        """Of an observation."""
+        crop: Any = self._by_type.get(CropRows)
+        self.visible = slice(0, self._view.height)
+        """Rows of rendered frames that the policy sees."""
+        if crop is not None:
+            self.visible = slice(crop.values.top, crop.values.bottom)
+        self.is_plain = not is_rgb and Shift not in self._by_type
+        """Whether `show_plain` has them."""
+        self._shifts = torch.zeros(0, 2, dtype=torch.int32)
+
+    def write(self, camera: Any, num_envs: int, num_workers: int) -> None:
+        """Write what does not change to a `CameraView`."""
+        given, view = self._by_type, self._view
+        scale: Any = given.get(StandardizePixels)
+        camera.mean, camera.deviation = (scale.values.mean, scale.values.std) if scale else (0, 1)
+        chromaticity: Any = given.get(ChromaticityPixels)
+        camera.floor = chromaticity.values.floor if chromaticity else 0.0
+        camera.num_channels = self.num_channels
+        self._shifts = torch.zeros(num_envs, 2, dtype=torch.int32)
+        camera.shifts = wp.from_torch(self._shifts)
+        camera.rendered = as_images(view.new_images(num_workers))
+
+    def begin(self, rows: Tensor) -> None:
+        """Sample the shifts of environments, (k,), whose episodes start, as `Observer` does."""
+        shift: Any = self._by_type.get(Shift)
+        for stage in self._pipeline.stages:
+            if shift is not None and stage.model is shift.model:
+                stage(torch.zeros(len(rows), 1, 1, 1), rows, True)
+                assert stage.memory is not None
+                self._shifts[: len(rows)] = stage.memory[: len(rows)].int()
+
+
+def unfused_transforms(observer: Observer) -> list[str]:
+    """Return reasons against fusing the transforms."""
+    first = next(map(type, observer.image.transforms), None)
+    if first not in (GrayPixels, RgbPixels) or observer.image.faults.stages:
+        return ["frames that are neither gray nor rgb are not fused"]
+    reasons, before = list[str](), set[type]()
     for transform in observer.image.pipeline.transforms:
-        if type(transform) is StandardizePixels:
-            return transform.values.mean, transform.values.std
-    return 0.0, 1.0
-
-
-def _visible_lines(observer: Observer) -> slice:
-    """Return the rows of rendered frames that the policy sees."""
-    for transform in observer.image.pipeline.transforms:
-        if type(transform) is CropRows:
-            return slice(transform.values.top, transform.values.bottom)
-    return slice(0, observer.image.view.height)
-
-
-def _num_frames(observer: Observer) -> int:
-    """Return the number of frames of an observation."""
-    return observer.image.pipeline.earlier + 1
-
-
-def _is_fusable(transform: Transform) -> bool:
-    """Return whether the kernel has a transform."""
-    if type(transform) is CatFrames:
-        return (transform.dim, transform.padding) == (-3, "same")
-    return type(transform) in (CropRows, StandardizePixels)
+        kind: Any = type(transform)
+        is_known = kind in _AFTER and not before & {kind, *_AFTER[kind]}
+        if kind is CatFrames:
+            is_known &= (transform.dim, transform.padding) == (-3, "same")
+        if not is_known:
+            reasons.append(f"transform {kind.__name__} is not fused")
+        before.add(kind)
+    return reasons
 
 
 def _not_fused(env: DroneEnv) -> list[str]:
-    """Return reasons against fusing the renderer, the appearance or the transforms."""
+    """Return reasons against fusing the renderer or the transforms."""
     worlds, reasons = env.worlds, []
     if type(worlds.renderer) is not Raytracer or worlds.renderer.device.type != "cpu":
         device = worlds.state.end_reason.device.type
@@ -240,30 +322,21 @@ def _not_fused(env: DroneEnv) -> list[str]:
         reasons.append(f"environment {type(env).__name__} is not fused")
     if not env.observer.sees_pixels:
         return [*reasons, f"inputs {', '.join(env.observer.sources)} are not fused"]
-    if env.observer.image.view.modalities != ("gray",):
-        reasons.append("frames that are not gray are not fused")
-    fused = set[type]()
-    for transform in env.observer.image.pipeline.transforms:
-        kind = type(transform)
-        if kind in fused or not _is_fusable(transform):
-            reasons.append(f"transform {kind.__name__} is not fused")
-        fused.add(kind)
-    if worlds.appearance is not None:
-        reasons.append("visual randomization is not fused")
-    return reasons
+    return [*reasons, *unfused_transforms(env.observer)]
 
 
 def _not_fused_policy(env: DroneEnv, actor: Any) -> list[str]:
     """Return reasons against fusing the actor."""
-    if type(actor) is not CategoricalActor:
+    if type(actor) is not (SquashedActor if _is_continuous(env) else CategoricalActor):
         return [f"policy {type(actor).__name__} is not fused"]
     network = actor.network
     if reasons := unsupported(network):
         return reasons
     if not env.observer.sees_pixels:
         return []  # see `_not_fused`
-    rows, num_actions = _visible_lines(env.observer), env.worlds.dynamics.actions.num_outputs
-    shape = (_num_frames(env.observer), rows.stop - rows.start, env.observer.image.view.width)
+    transforms, num_actions = Transforms(env.observer), env.worlds.dynamics.actions.num_outputs
+    rows, channels = transforms.visible, transforms.num_frames * transforms.num_channels
+    shape = (channels, rows.stop - rows.start, env.observer.image.view.width)
     if (network.in_shape, network.num_actions) != (shape, num_actions):
         return [
             f"a network from {network.in_shape} to {network.num_actions} outputs is not fused "

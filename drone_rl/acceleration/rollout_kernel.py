@@ -10,8 +10,13 @@ from typing import Any
 import warp as wp
 
 from drone_rl.acceleration.layers_kernel import Layers, copy, row_size, run_convolutions, run_linear
+from drone_rl.policies.actor import MAX_ACTION
+from drone_rl.sim.continuous_actions import LEAST_LOG, MOST_LOG, MOST_MEAN, SHIFT
+from drone_rl.sim.rendering.raytrace.effects_kernel import render_image_with_effects
 from drone_rl.sim.rendering.raytrace.plain_kernel import render_image
 from drone_rl.sim.rendering.raytrace.structs_kernel import (
+    RGB,
+    Effects,
     Geoms,
     Images,
     Materials,
@@ -36,10 +41,20 @@ class CameraView:
     materials: Materials
     scratch: Scratch
     poses: PoseArrays
+    has_effects: bool
+    effects: Effects
+    rendered: Images
+    """An image a worker, before `develop`."""
+    shifts: wp.array2d[int]
+    """Pixels down and to the right of each environment, see `fault_models.shift`."""
+    num_channels: int
+    """1 for gray, 2 for chromaticities, 3 for colors."""
+    floor: float
+    """See `ChromaticityPixels`."""
     mean: float
-    """Subtracted from each pixel."""
+    """Subtracted from each number."""
     deviation: float
-    """Each pixel is divided by it."""
+    """Each number is divided by it."""
 
 
 @wp.struct
@@ -50,10 +65,11 @@ class Rollout:
     layers: Layers
     workspaces: wp.array2d[float]
     """Outputs of all layers for `TOGETHER` frames, one a worker."""
+    num_steps: int
     draws: wp.array2d[float]
-    """Uniform samples for actions; below 0 for the most probable one. Shape: (num_envs, steps)."""
+    """Samples for actions, see `choose` and `squash`. Shape: (num_envs, steps * numbers)."""
     frames: Images
-    """Frames, `num_frames` a row: those of an observation, oldest first."""
+    """Gray frames, `num_frames` a row: those of an observation, oldest first."""
     num_frames: int
     observations: wp.array2d[float]
     """The same memory, a row an observation."""
@@ -61,6 +77,8 @@ class Rollout:
     """Of each environment, before the first step of the launch."""
     logits: wp.array2d[float]
     actions: wp.array[int]
+    numbers: wp.array2d[float]
+    """Continuous actions."""
     rewards: wp.array[float]
     end_reasons: wp.array[int]
     """0 while the episode goes on."""
@@ -74,6 +92,154 @@ for (int i = 0; i < count; ++i) values.data[i] = (values.data[i] - mean) / devia
 def standardise(values: wp.array[float], count: int, mean: float, deviation: float) -> None:
     """Subtract the mean and divide by the deviation."""
     ...
+
+
+@wp.func_native("""
+#pragma clang fp contract(off)
+for (int y = 0; y < height; ++y) {
+    const int from = wp::clamp(y - down, 0, height - 1) * width;
+    float* to = target.data + first + y * width;
+    for (int x = 0; x < width; ++x) {
+        const int at = from + wp::clamp(x - right, 0, width - 1);
+        to[x] = (source.data[at] - mean) / deviation;
+    }
+}""")
+def develop_gray(
+    source: wp.array[float],
+    width: int,
+    height: int,
+    down: int,
+    right: int,
+    mean: float,
+    deviation: float,
+    target: wp.array[float],
+    first: int,
+) -> None:
+    """Write a gray image to `target` from index `first` on, shifted and standardized."""
+    ...
+
+
+@wp.func_native("""
+#pragma clang fp contract(off)
+const int size = width * height;
+for (int y = 0; y < height; ++y) {
+    const int from = wp::clamp(y - down, 0, height - 1) * width;
+    float* to = target.data + first + y * width;
+    for (int x = 0; x < width; ++x) {
+        const auto color = source.data[from + wp::clamp(x - right, 0, width - 1)];
+        float red = color[0] / 255.0f, green = color[1] / 255.0f, blue = color[2] / 255.0f;
+        if (channels == 2) {
+            const float total = red + green + blue, third = total / 3.0f;
+            red = (red - third) / (total + floor);
+            blue = (blue - third) / (total + floor);
+        } else {
+            to[size + x] = (green - mean) / deviation;
+        }
+        to[x] = (red - mean) / deviation;
+        to[(channels - 1) * size + x] = (blue - mean) / deviation;
+    }
+}""")
+def develop_rgb(
+    source: wp.array[wp.vec3ub],
+    width: int,
+    height: int,
+    down: int,
+    right: int,
+    channels: int,
+    floor: float,
+    mean: float,
+    deviation: float,
+    target: wp.array[float],
+    first: int,
+) -> None:
+    """Write the same of an image in color, or of its chromaticities if there are two channels."""
+    ...
+
+
+@wp.func
+def show_plain(rollout: Rollout, env: int, row: int, worker: int) -> None:
+    """Render gray without effects, and standardize: the newest frame of observation `row`."""
+    camera = rollout.camera
+    newest = (row + 1) * rollout.num_frames - 1
+    render_image(
+        camera.view,
+        0,
+        camera.geoms,
+        camera.poses,
+        env,
+        camera.materials,
+        camera.scratch,
+        worker,
+        rollout.frames,
+        newest,
+    )
+    frame = rollout.frames.gray[newest]
+    standardise(frame, frame.shape[0], camera.mean, camera.deviation)
+
+
+@wp.func
+def show_any(rollout: Rollout, env: int, row: int, worker: int) -> None:
+    """Do the same with all effects, mountings and transforms."""
+    camera = rollout.camera
+    view = camera.view
+    mounted = env % view.cameras.shape[0]
+    if camera.has_effects:
+        render_image_with_effects(
+            view,
+            mounted,
+            camera.geoms,
+            camera.poses,
+            env,
+            camera.materials,
+            camera.scratch,
+            worker,
+            camera.rendered,
+            worker,
+            camera.effects,
+        )
+    else:
+        render_image(
+            view,
+            mounted,
+            camera.geoms,
+            camera.poses,
+            env,
+            camera.materials,
+            camera.scratch,
+            worker,
+            camera.rendered,
+            worker,
+        )
+    target = rollout.observations[row]
+    first = (rollout.num_frames - 1) * camera.num_channels * view.height * view.width
+    down = camera.shifts[env, 0]
+    right = camera.shifts[env, 1]
+    if (view.what & RGB) != 0:
+        develop_rgb(
+            camera.rendered.rgb[worker],
+            view.width,
+            view.height,
+            down,
+            right,
+            camera.num_channels,
+            camera.floor,
+            camera.mean,
+            camera.deviation,
+            target,
+            first,
+        )
+    else:
+        develop_gray(
+            camera.rendered.gray[worker],
+            view.width,
+            view.height,
+            down,
+            right,
+            camera.mean,
+            camera.deviation,
+            target,
+            first,
+        )
 
 
 @wp.func
@@ -101,6 +267,38 @@ def choose(logits: wp.array[float], at: int, count: int, draw: float) -> int:
 
 
 @wp.func
+def squash(mean: float, log: float, draw: float) -> float:
+    """Return a number of a continuous action from a standard normal sample; see `normal_of`."""
+    share = 1.0 / (1.0 + wp.exp(-(log + SHIFT)))
+    deviation = wp.exp(LEAST_LOG + (MOST_LOG - LEAST_LOG) * share)
+    number = MOST_MEAN * wp.tanh(mean / MOST_MEAN) + deviation * draw
+    return wp.clamp(wp.tanh(number), -MAX_ACTION, MAX_ACTION)
+
+
+@wp.func
+def decide_move(
+    rollout: Rollout, outputs: wp.array[float], at: int, env: int, step: int, row: int
+) -> int:
+    """Choose a discrete action from outputs of the network that begin at `at`, and record it."""
+    action = choose(outputs, at, rollout.logits.shape[1], rollout.draws[env, step])
+    rollout.actions[row] = action
+    return action
+
+
+@wp.func
+def decide_numbers(  # noqa: ANN201 (an array)
+    rollout: Rollout, outputs: wp.array[float], at: int, env: int, step: int, row: int
+):
+    """Sample a continuous action; see `decide_move`."""
+    numbers = rollout.numbers[row]
+    count = numbers.shape[0]
+    for i in range(count):
+        draw = rollout.draws[env, step * count + i]
+        numbers[i] = squash(outputs[at + i], outputs[at + count + i], draw)
+    return numbers
+
+
+@wp.func
 def stack(rollout: Rollout, env: int, step: int, row: int, is_start: bool) -> None:
     """Write the earlier frames of an observation; at an episode's start all are the newest."""
     seen = rollout.observations[row]
@@ -116,13 +314,15 @@ def stack(rollout: Rollout, env: int, step: int, row: int, is_start: bool) -> No
 
 
 @functools.cache
-def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (functions that Warp compiles)
+def make_kernel(states: Any, place: Any, move: Any, decide: Any, show: Any) -> Any:  # noqa: C901 (functions that Warp compiles)
     """Return the kernel for the rules of a task; see `drone_rl.sim.tasks.fused.fused_rules`.
 
     Args:
         states: Warp structure of the environments, with "steps" and "end_reasons".
         place: Writes the poses that are rendered: (states, env, poses).
         move: Steps an environment: (states, env, action). Returns the reward.
+        decide: `decide_move` or `decide_numbers`.
+        show: `show_plain` or `show_any`.
     """
 
     @wp.func
@@ -130,28 +330,13 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
         first: int, last: int, step: int, worker: int, rollout: Rollout, envs: states
     ) -> int:
         """Render running environments, compute the convolutions; return how many are running."""
-        camera = rollout.camera
-        newest = rollout.num_frames - 1
         running = int(0)
         for env in range(first, last):
             if envs.end_reasons[env] == 0:
-                row = env * rollout.draws.shape[1] + step
-                place(envs, env, camera.poses)
-                render_image(
-                    camera.view,
-                    0,
-                    camera.geoms,
-                    camera.poses,
-                    env,
-                    camera.materials,
-                    camera.scratch,
-                    worker,
-                    rollout.frames,
-                    row * rollout.num_frames + newest,
-                )
-                frame = rollout.frames.gray[row * rollout.num_frames + newest]
-                standardise(frame, frame.shape[0], camera.mean, camera.deviation)
-                if newest > 0:
+                row = env * rollout.num_steps + step
+                place(envs, env, rollout.camera.poses)
+                show(rollout, env, row, worker)
+                if rollout.num_frames > 1:
                     stack(rollout, env, step, row, envs.steps[env] == 0)
                 seen = rollout.observations[row]
                 run_convolutions(rollout.layers, seen, rollout.workspaces[worker], running)
@@ -169,12 +354,11 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
         running = int(0)
         for env in range(first, last):
             if envs.end_reasons[env] == 0:
-                row = env * rollout.draws.shape[1] + step
+                row = env * rollout.num_steps + step
                 at = running * size + logits_offset
                 for i in range(num_actions):
                     rollout.logits[row, i] = workspace[at + i]
-                action = choose(workspace, at, num_actions, rollout.draws[env, step])
-                rollout.actions[row] = action
+                action = decide(rollout, workspace, at, env, step, row)
                 rollout.rewards[row] = move(envs, env, action)
                 rollout.end_reasons[row] = envs.end_reasons[env]
                 if rollout.outputs.shape[0] > 0:
@@ -191,7 +375,7 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
             end = wp.min(group + TOGETHER, last)
             step = int(0)
             running = int(1)
-            while step < rollout.draws.shape[1] and running > 0:
+            while step < rollout.num_steps and running > 0:
                 running = observe(group, end, step, worker, rollout, envs)
                 run_linear(rollout.layers, rollout.workspaces[worker], 0, running)
                 act(group, end, step, worker, rollout, envs)

@@ -5,15 +5,15 @@ from pathlib import Path
 
 from drone_rl.cli.policies import NO_RUN_FOLDER
 from drone_rl.cli.settings import CommandSettings
-from drone_rl.config.terms import ENDS, REWARDS, SUCCESSES, Terms
+from drone_rl.config.terms import ALL_TERMS, Terms
 from drone_rl.utils.display import aligned
 
 
 class TermsCommand(CommandSettings):
-    """List the terms of rewards, ends and success that tasks can name.
+    """List the terms of rewards, ends, success and events that tasks can name.
 
     Those of your own are listed with plugins=FILE. A weight or parameter is set by
-    task.reward.NAME.weight=-0.3, and likewise task.end and task.success.
+    task.reward.NAME.weight=-0.3, and likewise below the other settings.
     """
 
     @classmethod
@@ -25,8 +25,8 @@ class TermsCommand(CommandSettings):
         """List the terms; return the exit status."""
         from drone_rl.sim import tasks as tasks  # registers the shipped ones; imports torch
 
-        for terms in (REWARDS, ENDS, SUCCESSES):
-            print(f"task.{terms.kind}", aligned(_rows(terms)), "", sep="\n")
+        for setting, terms in ALL_TERMS.items():
+            print(setting, aligned(_rows(terms)), "", sep="\n")
         return 0, None
 
 

@@ -4,6 +4,7 @@
 contain an `ImageInput` or a `VectorInput` for each, which says everything about it.
 """
 
+import dataclasses
 import re
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -31,7 +32,7 @@ from drone_rl.config.transforms import (
 from drone_rl.config.values import Fraction
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.models import Model
-from drone_rl.utils.schema import Real, Several, Text, Whole, shown
+from drone_rl.utils.schema import Annotation, Real, Several, Text, Whole, shown
 from drone_rl.utils.settings import prefixed_errors
 
 PIXELS = "pixels"
@@ -388,16 +389,30 @@ def _check_names(inputs: dict[str, Input]) -> dict[str, Input]:
 RESERVED = {
     *("action", "reward", "done", "terminated", "truncated", "info", "next", "collector", "logits"),
     *("features", "vectors", "is_init", "step_count", "episode_reward", "state_value", "advantage"),
-    *("value_target", "entropy"),
+    *("value_target", "entropy", "probabilities"),
 }
 """Names of other entries of a batch."""
-Inputs = Annotated[
-    dict[Annotated[str, Text(40)], Input],
-    pydantic.BeforeValidator(_named),
-    MinLen(1),
-    MaxLen(MOST_INPUTS),
-    pydantic.AfterValidator(_check_names),
-]
+
+
+@dataclasses.dataclass(frozen=True)
+class InputsByName(Annotation):
+    """The kind of a mapping from names to inputs, which is also read from a list of variants."""
+
+    of: type[Part] = Input
+
+    @property
+    def hint(self) -> Any:
+        """See `Annotation`."""
+        return Annotated[
+            dict[Annotated[str, Text(40)], self.of],
+            pydantic.BeforeValidator(_named),
+            MinLen(1),
+            MaxLen(MOST_INPUTS),
+            pydantic.AfterValidator(_check_names),
+        ]
+
+
+Inputs = Annotated[Mapping[str, Input], InputsByName()]
 _CAMERA = CameraSettings()
 DEFAULT_INPUTS: dict[str, Input] = {PIXELS: CameraPixels()}
 

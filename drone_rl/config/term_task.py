@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self
 from pydantic import BeforeValidator
 
 from drone_rl.config.task import BaseTaskSettings, Color, ObjectRegion
-from drone_rl.config.terms import Ends, Rewards, Success
+from drone_rl.config.terms import Ends, Events, Rewards, Success
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import OneOf, Real, Several, Span, Whole
 from drone_rl.utils.settings import Settings
@@ -55,6 +55,8 @@ class ObjectSettings(Settings):
     """See x; None stands it on the ground."""
     apart: Annotated[float, Real(0.0, 1000.0, unit="m")] = 0.0
     """Least distance between its surface and those of the objects placed before it."""
+    event: Events = {}
+    """What moves it from there in each step, by name; the velocities of several add up."""
 
     @property
     def half_size(self) -> tuple[float, float, float]:

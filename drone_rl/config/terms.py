@@ -1,4 +1,4 @@
-"""Terms of tasks: named functions of a `Step`, for rewards, ends and success.
+"""Terms of tasks: named functions of a `Step`, for rewards, ends and success, or of a `Mover`.
 
 A user's file registers a term with a decorator, and any task can then name it:
 
@@ -56,12 +56,14 @@ class Term:
     """Whether the parameters are `wp.float64` and not `float`."""
 
     @classmethod
-    def of(cls, name: str, function: Callable[..., Any], **own: float) -> "Term":
-        """Return a function as a term; see `Terms.register`."""
+    def of(
+        cls, name: str, function: Callable[..., Any], first: str = "step: Step", **own: float
+    ) -> "Term":
+        """Return a function with a `first` parameter as a term; see `Terms.register`."""
         place, every = place_of(function), [*inspect.signature(function).parameters.values()]
         if not 1 <= len(every) <= 1 + MOST_PARAMETERS:
             raise InputError(
-                f"{place} has {len(every)} parameters; give step: Step and at most "
+                f"{place} has {len(every)} parameters; give {first} and at most "
                 f"{MOST_PARAMETERS} numbers"
             )
         rest = every[1:]
@@ -104,9 +106,9 @@ def _settings_class(name: str, numbers: Mapping[str, float]) -> type[TermSetting
 class Terms:
     """The registered terms of a kind, by name."""
 
-    def __init__(self, kind: str) -> None:
-        """Begin without terms; `kind` is the name of the decorator."""
-        self.kind, self.by_name = kind, dict[str, Term]()
+    def __init__(self, kind: str, first: str = "step: Step") -> None:
+        """Begin without terms; `kind` names the decorator, `first` the functions' parameter."""
+        self.kind, self._first, self.by_name = kind, first, dict[str, Term]()
 
     @property
     def words(self) -> str:
@@ -130,7 +132,7 @@ class Terms:
             if name in self.by_name:
                 owner = self.by_name[name].module
                 require_own(f"{self.kind} {name}", owner, function.__module__)
-            self.by_name[name] = Term.of(name, function, **own)
+            self.by_name[name] = Term.of(name, function, self._first, **own)
             return function
 
         return decorate
@@ -175,6 +177,14 @@ class Terms:
 
 
 REWARDS, ENDS, SUCCESSES = Terms("reward"), Terms("end"), Terms("success")
+EVENTS = Terms("event", "mover: Mover")
+ALL_TERMS = {
+    "task.reward": REWARDS,
+    "task.end": ENDS,
+    "task.success": SUCCESSES,
+    "task.objects.NAME.event": EVENTS,
+}
+"""Every kind of terms by its setting."""
 for _name, _weight in {
     "progress": 1.0,
     "reached": 1.0,
@@ -193,6 +203,8 @@ Ends = Annotated[_Read, ENDS, BeforeValidator(ENDS.read)]
 """Reasons to end an episode, by name."""
 Success = Annotated[_Read, SUCCESSES, BeforeValidator(SUCCESSES.read)]
 """A meaning of success, by name."""
+Events = Annotated[_Read, EVENTS, BeforeValidator(EVENTS.read)]
+"""What moves objects, by name."""
 
 
 def reward(name: str, weight: float = 1.0) -> Callable[[F], F]:
@@ -221,3 +233,12 @@ def success(name: str) -> Callable[[F], F]:
         name: What settings call it: `task.success.NAME`.
     """
     return SUCCESSES.register(name)
+
+
+def event(name: str) -> Callable[[F], F]:
+    """Register what moves an object: a function of a `Mover` that returns a velocity, `wp.vec3`.
+
+    Args:
+        name: What settings call it: `task.objects.OBJECT.event.NAME`.
+    """
+    return EVENTS.register(name)

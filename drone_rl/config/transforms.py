@@ -225,6 +225,13 @@ class FrozenFrames(Fault, target="frozen_frames"):
     """Probability that a frame repeats the previous one."""
 
 
+class HeldFrames(Fault, target="held_frames"):
+    """Frames of a camera that is slower than the control steps: each is repeated until the next."""
+
+    every: Annotated[int, Whole(1, 1000, "steps")] = 2
+    """Control steps from one frame to the next."""
+
+
 class LateFrames(Fault, target="late_frames"):
     """Delayed frames; the first frame is repeated until delayed ones arrive."""
 

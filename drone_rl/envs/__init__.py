@@ -4,6 +4,7 @@ from drone_rl.envs.camera_faults import Blur as Blur
 from drone_rl.envs.camera_faults import CameraFault as CameraFault
 from drone_rl.envs.camera_faults import DeadRows as DeadRows
 from drone_rl.envs.camera_faults import FrozenFrames as FrozenFrames
+from drone_rl.envs.camera_faults import HeldFrames as HeldFrames
 from drone_rl.envs.camera_faults import LateFrames as LateFrames
 from drone_rl.envs.camera_faults import Noise as Noise
 from drone_rl.envs.camera_faults import Shift as Shift

@@ -16,6 +16,7 @@ from drone_rl.envs.fault_models import (
     blur,
     dead_rows,
     frozen_frames,
+    held_frames,
     late_frames,
     noise,
     random_shift,
@@ -118,6 +119,13 @@ class FrozenFrames(_BuiltInFault):
     """Repeat the previous frame at random; see `drone_rl.config.transforms.FrozenFrames`."""
 
     make_model = staticmethod(frozen_frames)
+
+
+@implements(settings.HeldFrames)
+class HeldFrames(_BuiltInFault):
+    """Renew frames every few steps; see `drone_rl.config.transforms.HeldFrames`."""
+
+    make_model = staticmethod(held_frames)
 
 
 @implements(settings.LateFrames)

@@ -85,6 +85,21 @@ def frozen_frames(share: float) -> FaultModel:
     )
 
 
+def held_frames(every: int) -> FaultModel:
+    """Take a new image every so many steps, and repeat it until the next one."""
+
+    def begin(images: Tensor, _: Sample) -> Tensor:
+        return torch.nn.functional.pad(images.flatten(1), (0, 1))  # and its age
+
+    def update(memory: Tensor, images: Tensor, sample: Sample) -> Tensor:
+        older = torch.cat([memory[:, :-1], memory[:, -1:] + 1], 1)
+        return torch.where(older[:, -1:] < every, older, begin(images, sample))
+
+    return FaultModel(
+        lambda images, memory, _: memory[:, :-1].view_as(images), begin, update, hides=True
+    )
+
+
 def out_of_focus(width: float) -> FaultModel:
     """Blur images by a Gaussian of this standard deviation in pixels."""
     return FaultModel(lambda images, memory, _: blur(images, width))

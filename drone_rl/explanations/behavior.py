@@ -124,7 +124,7 @@ def find_loops(flights: RolloutDataset, actions: Actions) -> list[Loop]:
     """Find parts of an episode in which the drone moves back and forth.
 
     Each is a run of reversible moves, of which at least two undo the one before: the drone is
-    back where it was, and away again. No move undoes forward.
+    back where it was, and away again. No such move goes forward.
     """
     moves, episode = flights.tensor("actions"), flights.episode
     kept = {name: flights.tensor(name) for name in actions.fields()}

@@ -1,6 +1,6 @@
 """Sections "response" (maps over the place of one target) and "asymmetry"."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 import torch
@@ -22,6 +22,7 @@ from drone_rl.explanations.scenes import Scenes, place_target
 from drone_rl.policies import ImageNetwork
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.tasks import Grid, State
+from drone_rl.sim.tasks.common import SIDES
 from drone_rl.utils.intervals import mean_interval
 from drone_rl.utils.seeding import Stream, torch_generator
 
@@ -39,7 +40,7 @@ def section(context: Context) -> Response:
     here, actions = response.probabilities, scenes.actions
     there = actions.mirror(here[:, :, ::-1])  # the mirrored map is the map read backwards
     return Response(
-        rows=count_places(response, outcome, scenes.task.strata),
+        rows=count_places(response, outcome),
         blind_below=BLIND,
         asymmetry=float(actions.distance(here, there).mean()),
         map=response,
@@ -156,13 +157,11 @@ def outcome_map(
     return OutcomeMap(**fields, collected=collected.cpu().numpy())
 
 
-def count_places(
-    response: ResponseMap, outcome: OutcomeMap, strata: Sequence[str]
-) -> tuple[ResponseRow, ...]:
-    """Return results by height and stratum, such as "left", "ahead" and "right"."""
+def count_places(response: ResponseMap, outcome: OutcomeMap) -> tuple[ResponseRow, ...]:
+    """Return results by height and side."""
     rows, is_known = [], bool((response.oracle >= 0).all())
     for layer, height in enumerate(response.height.tolist()):
-        for number, side in enumerate(strata):
+        for number, side in enumerate(SIDES):
             blind = response.blind[layer][:, response.stratum == number]
             collected = outcome.collected[layer][:, outcome.stratum == number]
             rows.append(

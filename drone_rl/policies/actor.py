@@ -216,6 +216,10 @@ class CategoricalActor(DirectActor):
     """A `DirectActor` with discrete actions; the fused kernel requires exactly this type."""
 
 
+class SquashedActor(DirectActor):
+    """A `DirectActor` with continuous actions; the same is true."""
+
+
 class RecurrentActor(DirectActor):
     """A `DirectActor` whose network remembers; it acts in one step of each environment."""
 
@@ -247,7 +251,7 @@ def make_actor(
     """
     kind = distribution_of(action_spec.dtype)
     make: type[ProbabilisticActor]
-    make = CategoricalActor if kind is SeededCategorical else DirectActor
+    make = CategoricalActor if kind is SeededCategorical else SquashedActor
     image_network = network if isinstance(network, ImageNetwork) else ImageNetwork
     if image_network.is_recurrent:
         make = RecurrentActor

@@ -113,6 +113,10 @@ class Actions(abc.ABC):
         """Return whether a part has an opposite. Shape: (*), bool."""
         return _take(self.opposite, part) != part
 
+    def goes_forward(self, part: Tensor) -> Tensor:
+        """Return whether a part goes forward. Shape: (*), bool."""
+        return _speeds(self.names, part.device)[part][..., 0] > 0
+
     def turns(self, part: Tensor) -> Tensor:
         """Return whether a part differs from its mirror image. Shape: (*), bool."""
         return _take(self.mirrored, part) != part
@@ -250,8 +254,8 @@ class DiscreteActions(Actions):
         return {"actions": action}
 
     def is_reversible(self, kept: Mapping[str, Tensor]) -> Tensor:
-        """Return whether actions have an opposite."""
-        return self.can_be_undone(kept["actions"])
+        """Return whether actions have an opposite and don't go forward."""
+        return self.can_be_undone(kept["actions"]) & ~self.goes_forward(kept["actions"])
 
 
 def listed(names: tuple[str, ...]) -> str:

@@ -42,7 +42,7 @@ LEAST_LOG, MOST_LOG = -3.0, 0.0
 """Bounds of the deviation's logarithm; at 0 the squashed distribution is about uniform."""
 _FIRST_LOG = -0.5
 """The logarithm for an output of 0."""
-_SHIFT = math.log((_FIRST_LOG - LEAST_LOG) / (MOST_LOG - _FIRST_LOG))
+SHIFT = math.log((_FIRST_LOG - LEAST_LOG) / (MOST_LOG - _FIRST_LOG))
 
 
 class _Signed(NamedTuple):
@@ -205,7 +205,8 @@ class ContinuousActions(Actions):
     def is_reversible(self, kept: Mapping[str, Tensor]) -> Tensor:
         """Return whether actions go or turn to a side, forward at most at a third of full speed."""
         is_slow = kept["rates"][..., FORWARD].abs() <= ASIDE * self.speeds[FORWARD]
-        return self.can_be_undone(kept["actions"]) & is_slow
+        part = kept["actions"]
+        return self.can_be_undone(part) & ~self.goes_forward(part) & is_slow
 
 
 def normal_of(outputs: Tensor) -> tuple[Tensor, Tensor]:
@@ -215,7 +216,7 @@ def normal_of(outputs: Tensor) -> tuple[Tensor, Tensor]:
     -3 to 3, deviations from 0.05 to 1.
     """
     mean, log = outputs.chunk(2, -1)
-    share = (log + _SHIFT).sigmoid()
+    share = (log + SHIFT).sigmoid()
     deviation = (LEAST_LOG + (MOST_LOG - LEAST_LOG) * share).exp()
     return MOST_MEAN * (mean / MOST_MEAN).tanh(), deviation
 

@@ -27,6 +27,8 @@ class TaskVocabulary(Model):
     reach: Phrase = "reach"
     """To do so: "collect"."""
     reached: Phrase = "reached"
+    succeed: Phrase = ""
+    """To end an episode with success: "stay in the air"; empty for that of reaching every goal."""
     target: Phrase = "target"
     """The thing in the image that requires an action: "cube"."""
     handle: Phrase = "reach the target"
@@ -56,14 +58,17 @@ class TaskVocabulary(Model):
     @property
     def reaches(self) -> str:
         """Third person of `reach`."""
-        verb, _, rest = self.reach.partition(" ")
-        return f"{_third(verb)} {rest}".rstrip()
+        return _third(self.reach)
+
+    @property
+    def succeeds(self) -> str:
+        """Third person of `succeed`."""
+        return _third(self.succeed) or f"{self.reaches} every {self.goal}"
 
     @property
     def handles(self) -> str:
         """Third person of `handle`."""
-        verb, _, rest = self.handle.partition(" ")
-        return f"{_third(verb)} {rest}".rstrip()
+        return _third(self.handle)
 
     @property
     def targets(self) -> str:
@@ -102,10 +107,14 @@ class TaskVocabulary(Model):
         return self.model_dump()
 
 
-def _third(verb: str) -> str:
+def _third(phrase: str) -> str:
+    """Return a phrase that begins with a verb in the third person; "" for none."""
+    verb, _, rest = phrase.partition(" ")
     if verb.endswith("y") and verb[-2:-1] not in "aeiou":
-        return f"{verb[:-1]}ies"
-    return f"{verb}es" if verb.endswith(("s", "sh", "ch", "x")) else f"{verb}s"
+        verb = f"{verb[:-1]}ie"
+    elif verb.endswith(("s", "sh", "ch", "x")):
+        verb = f"{verb}e"
+    return f"{verb}s {rest}".rstrip() if verb else ""
 
 
 @functools.cache

@@ -232,10 +232,10 @@ class Worlds:
         self, state: State, view: View, appearance: Appearance | None = None
     ) -> dict[Modality, Tensor]:
         """Render several cameras and modalities in one pass; see `Renderer.render`."""
-        combined = self._combine(appearance)
+        combined = self.combine(appearance)
         return self.renderer.render(view, self.poses(state, combined), combined)
 
-    def _combine(self, appearance: Appearance | None) -> Appearance | None:
+    def combine(self, appearance: Appearance | None) -> Appearance | None:
         """Return the combined appearance; the same object as before if nothing has changed."""
         if appearance is None:
             return self.appearance

@@ -131,7 +131,7 @@ class Rule(Model):
     def text(self) -> str:
         """The rule as text, for all strata and baselines."""
         return f"""\
-good: the share of episodes in which every goal is reached is more than \
+good: the share of episodes that succeed is more than \
 {100 * self.good_share:g}% of the oracle's, and so are more than {100 * self.side_share:g}% of the \
 goals of each stratum (such as left, ahead and right), wherever more than \
 {100 * self.offered_share:g}% of episodes offer one. good, but trivial: the same, but random \

@@ -17,17 +17,21 @@ from drone_rl.config import (
     AppearanceSettings,
     CameraSettings,
     DynamicsSettings,
+    PillarsSettings,
     TaskSettings,
 )
 from drone_rl.envs import (
+    ChromaticityPixels,
     CropRows,
     DroneEnv,
     GrayPixels,
     Resize,
     RgbPixels,
+    Shift,
     StandardizePixels,
 )
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN, make_actor
+from drone_rl.policies.actor import SquashedNormal
 from drone_rl.sim.dynamics import Quadrotor
 from drone_rl.sim.dynamics.state import LOST
 from drone_rl.sim.tasks.collect_cubes import CubesEnd
@@ -49,10 +53,18 @@ def make(
     network=None,
     dynamics=None,
     actions=None,
+    appearance=None,
     **how,
 ):
     made = [transform() for transform in transforms]
-    env = DroneEnv(num_envs, task, dynamics=dynamics, actions=actions, transforms=made)
+    env = DroneEnv(
+        num_envs,
+        task,
+        dynamics=dynamics,
+        actions=actions,
+        appearance=appearance,
+        transforms=made,
+    )
     generator = torch.Generator().manual_seed(0)
     if network is None:
         shape = tuple(env.observation_spec["pixels"].shape[1:])
@@ -89,6 +101,27 @@ WORLDS = (
 )
 
 
+def assert_replayed(batch, env):
+    """Take the actions of a batch of five episodes again in equal environments."""
+    state, ids = env.reset(), batch["collector", "traj_ids"]
+    episodes = [batch[ids == i] for i in ids.unique()]
+    assert len(episodes) == 5 and ids.tolist() == sorted(ids.tolist())
+    for t in range(max(map(len, episodes))):
+        is_on = torch.tensor([t < len(episode) for episode in episodes])
+        rows = [episode[t] for episode in episodes if t < len(episode)]
+        assert torch.equal(torch.stack([r["pixels"] for r in rows]), state["pixels"][is_on])
+        action = env.action_spec.zero()
+        action[is_on] = torch.stack([row["action"] for row in rows])
+        state = env.step(state.set("action", action).set("_step", is_on))
+        for key in (("next", "reward"), ("next", "done"), ("next", "truncated"), REASON):
+            assert torch.equal(torch.stack([row[key] for row in rows]), state[key][is_on])
+        for name in ("drone", "attitude"):
+            if ("next", "info", name) in batch.keys(True):
+                reported = torch.stack([row["next", "info", name] for row in rows])
+                assert torch.equal(reported, state["next", "info", name][is_on])
+        state = state["next"]
+
+
 @pytest.mark.parametrize("first", range(3))
 @pytest.mark.parametrize("second", range(3))
 def test_fused_episodes_equal_their_replay_by_torchrl_bit_for_bit(first, second):
@@ -109,30 +142,51 @@ def test_fused_episodes_equal_their_replay_by_torchrl_bit_for_bit(first, second)
     with torch.no_grad():
         network.layers.logits.weight.mul_(100)
     actor = make_actor(network, env.action_spec, generator)
-    collector = EpisodeCollector(acting, actor, compiled=True, info=("collected", "drone"))
+    collector = EpisodeCollector(acting, actor, compiled=True, info=("drone", "attitude"))
     assert isinstance(collector.fused, FusedEpisodes)
     for _ in range(2):
-        batch, state = collector.collect(), env.reset()
-        ids = batch["collector", "traj_ids"]
-        episodes = [batch[ids == i] for i in ids.unique()]
-        assert len(episodes) == 5 and ids.tolist() == sorted(ids.tolist())
-        for t in range(max(map(len, episodes))):
-            is_on = torch.tensor([t < len(episode) for episode in episodes])
-            rows = [episode[t] for episode in episodes if t < len(episode)]
-            assert torch.equal(torch.stack([r["pixels"] for r in rows]), state["pixels"][is_on])
-            action = torch.zeros(5, dtype=torch.int64)
-            action[is_on] = torch.stack([row["action"] for row in rows])
-            state = env.step(state.set("action", action).set("_step", is_on))
-            for key in (("next", "reward"), ("next", "done"), ("next", "truncated"), REASON):
-                assert torch.equal(torch.stack([row[key] for row in rows]), state[key][is_on])
-            for name in ("collected", "drone"):
-                reported = torch.stack([row["next", "info", name] for row in rows])
-                assert torch.equal(reported, state["next", "info", name][is_on])
-            state = state["next"]
+        batch = collector.collect()
+        assert_replayed(batch, env)
         assert batch["next", "done"].sum() == 5
         network = collector.actor.module[0].module
         assert torch.allclose(network(batch["pixels"]), batch["logits"], atol=1e-5)
     assert collector.episodes == 10 and collector.frames > 10
+
+
+VELOCITY = ActionSettings(kind="velocity", forward_speed=4.0)
+CLIMBING = VELOCITY.replace(climb_speed=1.0, backward_speed=0.5)
+PILLARS = PillarsSettings(step_limit=40)
+
+
+@pytest.mark.parametrize("task", [SHORT.replace(step_limit=40), PILLARS])
+@pytest.mark.parametrize("dynamics", [None, FLYING, GIMBAL.replace(gusts=2.0, control_ticks=66)])
+@pytest.mark.parametrize("actions", [ActionSettings(), VELOCITY, CLIMBING])
+def test_flight_at_velocities_and_among_obstacles_is_fused(task, dynamics, actions):
+    how = {"dynamics": dynamics, "actions": actions, "info": ("drone", "attitude")}
+    collector = make(task, **how)
+    assert isinstance(collector.fused, FusedEpisodes)
+    env = make(task, **how).base_env
+    for _ in range(2):
+        batch = collector.collect()
+        assert_replayed(batch, env)
+    outputs = collector.actor.network(batch["pixels"])
+    torch.testing.assert_close(outputs, batch["logits"], atol=1e-4, rtol=1e-4)
+
+
+def test_continuous_actions_are_the_squashed_medians_or_samples():
+    how = {"dynamics": FLYING, "actions": VELOCITY, "num_envs": 100}
+    collector = make(**how)
+    with set_exploration_type(DETERMINISTIC):
+        batch = collector.collect()
+    expected = SquashedNormal(batch["logits"]).deterministic_sample
+    torch.testing.assert_close(batch["action"], expected)
+    batch = collector.collect()
+    normal = SquashedNormal(batch["logits"])
+    draws = (batch["action"].atanh() - normal.loc) / normal.scale
+    count = len(draws)
+    # four standard errors
+    assert draws.mean(0).tolist() == pytest.approx([0.0] * 3, abs=4 / count**0.5)
+    assert draws.std(0).tolist() == pytest.approx([1.0] * 3, abs=4 / (2 * count) ** 0.5)
 
 
 @pytest.mark.parametrize("is_cropped_first", [True, False])
@@ -251,7 +305,10 @@ def test_observations_are_optional():
             {"transforms": (GrayPixels, lambda: CropRows(2, 22), lambda: CropRows(1, 19))},
             "transform CropRows is not fused",
         ),
-        ({"transforms": (RgbPixels,)}, "frames that are not gray are not fused"),
+        (
+            {"transforms": (GrayPixels, lambda: CropRows(2, 20), lambda: Shift(1, 1))},
+            "transform Shift is not fused",
+        ),
         ({"task": Posts()}, "task Posts with ComputerVision is not fused"),
         ({"network": MLP((1, 25, 64), 3)}, "network MLP is not fused"),
     ],
@@ -259,8 +316,7 @@ def test_observations_are_optional():
 def test_log_states_why_a_collector_is_not_fused(how, reason):
     collector = make(**how) if "network" in how or "task" in how else None
     if collector is None:
-        channels = 3 if how["transforms"] == (RgbPixels,) else 1
-        collector = make(network=SmallCNN((channels, 18 if channels == 1 else 25, 64), 3), **how)
+        collector = make(network=SmallCNN((1, 18, 64), 3), **how)
     assert reason in collector.name and collector.name.startswith("stepping collector: ")
     assert make().name == "fused collector"
 
@@ -301,17 +357,41 @@ def test_shutdown_ends_the_threads():
     assert not any(thread.is_alive() for thread in begun)
 
 
-@pytest.mark.parametrize("visibility", [30.0, (10.0, 30.0)])
-def test_environments_with_fog_fall_back(visibility):
-    look = AppearanceSettings(fog_visibility=visibility)
-    env = DroneEnv(3, SHORT, appearance=look, transforms=[GrayPixels(), StandardizePixels()])
-    network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,))
-    actor = make_actor(network, env.action_spec, torch.Generator().manual_seed(0))
-    collector = EpisodeCollector(env, actor, compiled=True)
-    assert "visual randomization" in collector.name or "effects" in collector.name
-    batch, plain = collector.collect(), make(num_envs=3).collect()
-    assert batch["next", "done"].sum() == 3
-    assert batch["pixels"][0].mean() > plain["pixels"][0].mean()  # fog is bright
+STACK = partial(CatFrames, 2, dim=-3, in_keys=["pixels"])
+RANDOM = AppearanceSettings(
+    sun_elevation=(10.0, 80.0),
+    shadows=0.5,
+    sky_zenith=((0.1, 0.2, 0.4), (0.6, 0.7, 0.9)),
+    fog_visibility=(40.0, 100.0),
+    ground_texture=("none", "checker"),
+    object_texture=("none", "bricks"),
+    distractors=(0, 3),
+    camera_offset=((-0.2, -0.2, -0.2), (0.2, 0.2, 0.2)),
+    camera_turn=((-3.0, -3.0, -3.0), (3.0, 3.0, 3.0)),
+    camera_widening=(-5.0, 5.0),
+    exposure=(0.7, 1.4),
+)
+
+
+@pytest.mark.parametrize("look", [None, AppearanceSettings(fog_visibility=30.0), RANDOM])
+@pytest.mark.parametrize(
+    "transforms",
+    [
+        (GrayPixels,),
+        (GrayPixels, partial(Shift, 4, 6), STACK, StandardizePixels, partial(CropRows, 3, 23)),
+        (RgbPixels, StandardizePixels),
+        (RgbPixels, partial(Shift, 6, 9), ChromaticityPixels, StandardizePixels, STACK),
+    ],
+)
+def test_colors_shifts_and_visual_randomization_are_fused(look, transforms):
+    made = [make(transforms=transforms, appearance=look, compiled=c) for c in (True, False)]
+    assert isinstance(made[0].fused, FusedEpisodes)
+    with set_exploration_type(DETERMINISTIC):
+        for count in (5, 3):
+            one, other = (collector.collect(count) for collector in made)
+            for key in other.keys(True, True):
+                if key != "logits":
+                    assert torch.equal(one[key], other[key]), key
 
 
 def test_kernel_ends_the_episode_of_a_lost_drone():

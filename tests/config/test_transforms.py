@@ -24,6 +24,7 @@ RGB, GRAY = Frame((25, 64, 3)), Frame((1, 25, 64), True)
         ("noise", {"strength": 0.1, "correlation_time": 0.0}, GRAY, GRAY),
         ("dead_rows", {"count": 23, "rows": (0, 24), "level": 0.0}, GRAY, GRAY),
         ("frozen_frames", {"share": 0.5}, GRAY, GRAY),
+        ("held_frames", {"every": 3}, GRAY, GRAY),
         ("late_frames", {"frames": 2}, GRAY, GRAY),
         ("shift", {"down": 1, "across": 2}, GRAY, GRAY),
     ],
@@ -34,7 +35,9 @@ def test_output_shapes(name, values, picture, after):
 
 def test_faults_are_those_by_chance_or_with_memory():
     faults = {v.name for v in Transform.registry.values() if issubclass(v, Fault)}
-    assert faults == {"noise", "bias", "dead_rows", "frozen_frames", "late_frames", "shift"}
+    assert faults == {
+        *("noise", "bias", "dead_rows", "frozen_frames", "held_frames", "late_frames", "shift")
+    }
     assert all(issubclass(variant.factory, CameraFault) for variant in Fault.__subclasses__())
 
 

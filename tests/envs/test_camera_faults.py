@@ -14,6 +14,7 @@ from drone_rl.envs import (
     DroneEnv,
     FrozenFrames,
     GrayPixels,
+    HeldFrames,
     LateFrames,
     Noise,
     Shift,
@@ -36,6 +37,7 @@ KINDS = {
     "correlated": lambda: [Noise(0.1, 5.0)],
     "dead": lambda: [DeadRows(2, rows=(0,), level=0.5)],
     "frozen": lambda: [FrozenFrames(0.5)],
+    "held": lambda: [HeldFrames(3)],
     "late": lambda: [LateFrames(2)],
     "all": lambda: [Blur(), Noise(), Noise(0.1, 3.0), DeadRows(), FrozenFrames(0.3), LateFrames()],
     "shift": lambda: [Shift()],
@@ -265,6 +267,13 @@ def test_late_frames_are_delayed_by_the_number_of_frames(frames):
     shown, clean = film(LateFrames(frames))
     assert torch.equal(shown, delayed(clean, frames))
     assert all(not torch.equal(clean[t], clean[t + 1]) for t in range(9))  # frames do change
+
+
+@pytest.mark.parametrize("every", [1, 2, 4])
+def test_held_frames_are_renewed_every_few_steps(every):
+    shown, clean = film(HeldFrames(every), episodes=2)
+    step = torch.arange(20)
+    assert torch.equal(shown, clean[step - step % 10 % every])  # ten steps an episode
 
 
 def test_fraction_of_frames_is_frozen():

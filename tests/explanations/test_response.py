@@ -112,7 +112,7 @@ def test_blindness_by_hand():
         oracle=np.array([1, 0]),
         stratum=np.array([0, 1]),
     )
-    rows = count_places(found, outcome, ("left", "ahead", "right"))
+    rows = count_places(found, outcome)
     assert [(r.height, r.side, r.blind, r.collected, r.places) for r in rows] == [
         (0.0, "left", 0.5, 0, 1),
         (0.0, "ahead", 0.0, 1, 1),

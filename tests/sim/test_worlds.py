@@ -5,7 +5,7 @@ import re
 import pytest
 import torch
 
-from drone_rl.config import AppearanceSettings, TaskSettings
+from drone_rl.config import ActionSettings, AppearanceSettings, TaskSettings
 from drone_rl.sim.actions import Move
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
@@ -62,3 +62,20 @@ def test_a_reward_whose_sums_may_overflow_is_named(monkeypatch, reward):
 def test_invalid_arguments_raise(given, message):
     with pytest.raises(InputError, match=message):
         Worlds(**{"num_envs": 1, **given})
+
+
+def test_images_of_a_mirrored_episode_are_mirrored():
+    """Cubes on the other side, and the mirrored moves and turns."""
+    worlds = Worlds(2, actions=ActionSettings(kind="moves_full", turn_step=20.0))
+    cubes = torch.tensor([[[8.0, 3.0, 2.5], [12.0, -2.0, 2.5], [20.0, 1.0, 2.5]]]).double()
+    worlds.state = worlds.start(torch.cat([cubes, cubes * torch.tensor([1.0, -1.0, 1.0])]))
+    actions, view = worlds.dynamics.actions, worlds.view(modality="segmentation")
+    seen = []
+    for name in ("turn left", "left", "forward", "turn left", "back", "turn right"):
+        action = actions.names.index(name)
+        worlds.step(torch.arange(2), torch.tensor([action, actions.mirrored[action]]))
+        one, other = worlds.render(worlds.state, view)
+        assert torch.equal(one, other.flip(1))
+        seen.append(one)
+    assert not torch.equal(seen[0], seen[1]) and not torch.equal(seen[0], seen[3])
+    worlds.close()

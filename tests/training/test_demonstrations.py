@@ -175,6 +175,11 @@ VELOCITIES = ActionSettings(kind="velocity")
             {"actions": VELOCITIES, "dynamics": DynamicsSettings(control_ticks=10)},
             "dynamics.control_ticks=33",
         ),
+        (
+            {"actions": ActionSettings(kind="moves_turning")},
+            {"actions": ActionSettings(kind="moves_turning", turn_step=30.0)},
+            "actions.turn_step=15.0",
+        ),
     ],
 )
 def test_flights_under_other_conditions_are_refused(recorded, needed, name):

@@ -153,7 +153,7 @@ def test_card():
     baselines = "best random or constant actions (forward) | oracle |"
     table = found[found.index(f"| | most probable actions | sampled actions | {baselines}") :]
     assert "| cubes collected | 80.0% (78.0% to 82.0%) | 70.0% (" in table[3]
-    assert table[4].startswith("| of those left | not offered | 40.0%")
+    assert table[4].startswith("| of those on its left | not offered | 40.0%")
     at = found.index("| fails first at | episodes | of | rate |")
     assert found[at + 2] == "| side: left | 150 | 300 | 50.0% (48.0% to 52.0%) |"
     assert found[at + 3].startswith("| end: step_limit | 40 | 400 |") and found[at + 4] == ""

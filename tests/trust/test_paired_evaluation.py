@@ -35,7 +35,10 @@ def test_with_nothing_different_flights_are_those_of_the_environment(make_bed):
     policy = drone_rl.load_policy("poor")
     network, described = policy.make_network().eval(), policy.description
     evaluator = make_bed(
-        EvaluatedPolicy(network, policy.task, described.camera, described.make_transforms()), 6
+        EvaluatedPolicy(
+            network, policy.task, described.camera, {"pixels": described.make_transforms()}
+        ),
+        6,
     )
     flown = evaluator.run(Condition()).episodes
     with policy.flying(6, stream=Stream.SHIFTED) as (env, actor):
@@ -135,8 +138,8 @@ def test_flights_in_another_body_are_those_of_the_environment(make_bed):
     gusty = DynamicsSettings(mode="simple_flight", wind=(1.0, 0.0, 0.0), gusts=1.0)
     policy = drone_rl.load_policy("good").in_dynamics(mode="simple_flight", wind=[1, 0, 0], gusts=1)
     network, described = policy.make_network().eval(), policy.description
-    pipeline = described.make_transforms()
-    told = EvaluatedPolicy(network, policy.task, described.camera, pipeline, dynamics=gusty)
+    seen = {"pixels": described.make_transforms()}
+    told = EvaluatedPolicy(network, policy.task, described.camera, seen, dynamics=gusty)
     flown = make_bed(told, 3).run(Condition()).episodes
     with policy.flying(3, stream=Stream.SHIFTED) as (env, actor):
         expected = rollout(actor, env, 3)

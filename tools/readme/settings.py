@@ -11,7 +11,7 @@ from drone_rl.cli.main import COMMANDS, find_command
 from drone_rl.config import TASKS, BaseTaskSettings
 from drone_rl.config.configuration import Changes
 from drone_rl.config.parts import Part
-from drone_rl.config.terms import ENDS, REWARDS, SUCCESSES
+from drone_rl.config.terms import ALL_TERMS
 from drone_rl.sim.tasks import shipped_terms_kernel as shipped
 from drone_rl.utils.schema import OneOf, Several, Span
 from drone_rl.utils.settings import (
@@ -52,7 +52,7 @@ def list_groups() -> str:
 def list_terms() -> str:
     """Return a table of the terms that any task can name."""
     rows = ["| kind | term | numbers, with their defaults | meaning |", "| --- | --- | --- | --- |"]
-    for terms in (REWARDS, ENDS, SUCCESSES):
+    for terms in ALL_TERMS.values():
         for name, term in terms.by_name.items():
             if getattr(term.function, "__module__", "") == shipped.__name__:
                 numbers = ", ".join(f"`{n}={value:g}`" for n, value in term.settings())

@@ -14,6 +14,7 @@ from drone_rl.cli.hydra.mistakes import choices, composed, flattened, similar
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.config import TASKS
 from drone_rl.config.configuration import Changes
+from drone_rl.config.inputs import InputsByName
 from drone_rl.config.parts import Named, Parts
 from drone_rl.config.terms import Terms
 from drone_rl.sweeps.manifest import path_argument
@@ -124,6 +125,8 @@ def _described(
     for name, hint in hints_of(cls).items():
         key, inside = prefix + name, values.get(name)
         yield key, texts.get(name, ""), unit_of(hint)
+        if inner_types(hint)[0] == Changes():
+            yield f"{key}.name", "Name of the task in which a baseline is judged.", ""
         for of, part, below in _inner(
             inner_types(hint)[0], inside if isinstance(inside, Mapping) else {}
         ):
@@ -136,10 +139,11 @@ def _inner(kind: Any, values: Mapping[str, Any]) -> Iterator[tuple[Any, str, Any
     if isinstance(kind, Changes):
         for of in (kind.of,) if kind.of else reversed(TASKS.values()):  # the default one wins
             yield of, "", {}
-    elif isinstance(kind, Parts | Terms):
-        for name, below in values.items():
-            if name in kind.registry:
-                yield kind.registry[name], f".{name}", below
+    elif isinstance(kind, Parts | Terms | InputsByName):
+        by_target = isinstance(kind, InputsByName)
+        of = kind.of.registry if by_target else kind.registry
+        names = {name: below["_target_"] if by_target else name for name, below in values.items()}
+        yield from ((of[n], f".{name}", values[name]) for name, n in names.items() if n in of)
     elif isinstance(kind, type) and issubclass(kind, Named):
         name = values.get("name", kind.default_name)
         yield from (

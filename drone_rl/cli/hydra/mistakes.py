@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
+import yaml
 from hydra import compose, initialize_config_dir
 from hydra.core.config_store import ConfigStore
 from hydra.core.global_hydra import GlobalHydra
@@ -95,9 +96,20 @@ def explain(error: Exception, name: str, words: Sequence[str]) -> InputError:
     for word in words:
         key = word.lstrip("~").partition("=")[0]
         if keys and key not in keys and not word.startswith(("-", "+")):
-            remedy = _meant(key, keys) or f"; {command} --help all lists the settings"
+            remedy = _meant(key, keys) or _chosen(key)
+            remedy = remedy or f"; {command} --help all lists the settings"
             return InputError(f"{word}: {command} has no setting {key}{remedy}")
     return InputError(" ".join(f"{error} {error.__cause__ or ''}".split()))
+
+
+def _chosen(key: str) -> str:
+    """Return a hint at the launcher or sweeper that has a setting of Hydra's; "" if none has."""
+    for group in _FOR_SWEEPS:
+        prefix = group.replace("/", ".") + "."
+        for path in (conf_dir() / group).glob("*.yaml") if key.startswith(prefix) else ():
+            if key.removeprefix(prefix) in yaml.safe_load(path.read_text(encoding="utf-8")):
+                return f"; add {group}={path.stem}, which has it"
+    return ""
 
 
 def _has_own_folders(words: Sequence[str]) -> bool:

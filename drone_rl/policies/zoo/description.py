@@ -21,6 +21,7 @@ from torchrl.envs import Transform as TorchrlTransform
 from drone_rl.config import (
     COMPUTER_VISION,
     MINIMAL,
+    TASKS,
     ActionSettings,
     AppearanceSettings,
     BaseTaskSettings,
@@ -40,6 +41,7 @@ from drone_rl.config.inputs import (
     require_name,
 )
 from drone_rl.config.networks import Lstm, Network
+from drone_rl.config.parts import load_entry_points
 from drone_rl.config.registry import own_place
 from drone_rl.config.training import TrainSettings
 from drone_rl.config.transforms import Fault, Frame, Stack, Transform
@@ -53,7 +55,7 @@ from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.models import Model
 from drone_rl.utils.plugins import described, errors_of
-from drone_rl.utils.schema import Text
+from drone_rl.utils.schema import Text, shown
 from drone_rl.utils.seeding import Stream, as_global_stream, plain_generator
 from drone_rl.utils.settings import Settings
 
@@ -107,6 +109,20 @@ class TaskDescription(Model):
             settings = settings.replace(reward=type(settings).model_fields["reward"].default)
         code = source_of(type(settings))
         return cls(name=settings.name, parameters=settings, rewards=weights, code=code)
+
+    @pydantic.model_validator(mode="before")
+    @classmethod
+    def _require_file(cls, values: Any) -> Any:
+        match values:
+            case {"name": str(name), "code": Mapping() as code} if name not in TASKS:
+                load_entry_points()
+                file = Source.read(code).name
+                if name not in TASKS:
+                    raise InputError(
+                        f"name={shown(name)} is a task of {shown(file)}, which is not imported; "
+                        "give plugins= with its path, or import it in Python"
+                    )
+        return values
 
     @pydantic.field_validator("parameters", mode="before")
     @classmethod

@@ -87,7 +87,7 @@ class Moves:
     At the start of a move, the target is at most the lead away from the drone, along each axis.
     """
 
-    MODES = (Mode.HEADING_POSITION, Mode.HEADING_POSITION, Mode.ANGLE, Mode.POSITION)
+    modes: Modes = (Mode.HEADING_POSITION, Mode.HEADING_POSITION, Mode.ANGLE, Mode.POSITION)
 
     def __init__(self, settings: ActionSettings, most_turn: float = math.inf) -> None:
         """Take settings, and the yaw rate that the drone can follow, radians a second."""
@@ -105,21 +105,21 @@ class Moves:
         place, wanted = body.position[:, self._places], body.reference.clone()
         away = (wanted[:, self._axes] - place).clamp(-self.lead, self.lead)
         wanted[:, self._axes] = place + away
-        return FlightGoals(self.MODES, wanted, self.drifts.to(action.device)[action])
+        return FlightGoals(self.modes, wanted, self.drifts.to(action.device)[action])
 
 
 class Velocities:
     """Speed forward, speed to the left and yaw rate; the height is kept if there is no climb."""
 
-    MODES = (Mode.HEADING_VELOCITY, Mode.HEADING_VELOCITY, Mode.RATE, Mode.POSITION)
+    modes: Modes = (Mode.HEADING_VELOCITY, Mode.HEADING_VELOCITY, Mode.RATE, Mode.POSITION)
 
     def __init__(self, settings: ActionSettings) -> None:
         self.actions = ContinuousActions.of(settings)
-        self._climbs = settings.climb_speed > 0
+        if settings.climb_speed > 0:
+            self.modes = (*self.modes[:3], Mode.VELOCITY)
 
     def goals(self, body: FlightState, action: Tensor) -> FlightGoals:
         """Return the goals until the next action. `action`: (num_envs, 3), or 4 with climb."""
         rates = self.actions.to_rates(action)
-        if self._climbs:
-            return FlightGoals((*self.MODES[:3], Mode.VELOCITY), rates)
-        return FlightGoals(self.MODES, torch.cat([rates, body.reference[:, 3:]], -1))
+        height = body.reference[:, rates.shape[-1] :]
+        return FlightGoals(self.modes, torch.cat([rates, height], -1))

@@ -11,15 +11,11 @@ from torch import Tensor
 
 from drone_rl.config import COMPUTER_VISION, MOVES_SETTINGS, ActionSettings, DynamicsSettings
 from drone_rl.sim.actions import MOVE_SETS, MOVES, Actions
-from drone_rl.sim.continuous_actions import ContinuousActions
+from drone_rl.sim.continuous_actions import YAW, ContinuousActions
+from drone_rl.sim.dynamics.moves_kernel import move_all
 from drone_rl.sim.dynamics.quadrotor import Quadrotor
-from drone_rl.sim.dynamics.state import (
-    BodyState,
-    Obstacles,
-    along_heading,
-    heading_of,
-    turned,
-)
+from drone_rl.sim.dynamics.state import BodyState, Obstacles
+from drone_rl.sim.dynamics.velocity_kernel import glide_all
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance, shown
 
@@ -71,17 +67,13 @@ class ComputerVision(Dynamics):
         """Metres, in the drone's frame. Shape: (number of actions, 3), float64."""
         self.turns = torch.stack([half.cos(), half.sin()], -1)
         """Cosine and sine of half the angle to the left. Shape: (number of actions, 2), float64."""
-        self._can_turn = bool(half.any())
 
     def step(
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
     ) -> BodyState:
         """Return the drones after a move."""
-        move = self.moves.to(action.device)[action]
-        position = body.position + along_heading(body.attitude, move)
-        if not self._can_turn:
-            return body.moved(position)
-        return body.moved(position, turned(body.attitude, self.turns.to(action.device)[action]))
+        moves, turns = self.moves.to(action.device), self.turns.to(action.device)
+        return body.moved(*move_all(body.position, body.attitude, action, moves, turns))
 
 
 class Kinematic(Dynamics):
@@ -97,18 +89,17 @@ class Kinematic(Dynamics):
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
     ) -> BodyState:
         """Return the drones a time step later; velocities are those of the step."""
-        forward, left, rate, *climb = self._continuous.to_rates(action).unbind(-1)
-        heading = heading_of(body.attitude)
-        cos, sin, zero = heading.cos(), heading.sin(), torch.zeros_like(heading)
-        level = [cos * forward - sin * left, sin * forward + cos * left]
-        velocity = torch.stack([*level, *(climb or [zero])], -1)
-        half = (heading + rate * self._seconds) / 2
+        rates = self._continuous.to_rates(action)
+        moved = glide_all(body.position, body.attitude, rates, self._seconds)
+        position, attitude, velocity = moved
+        turn = rates[..., YAW]
+        zero = torch.zeros_like(turn)
         return dataclasses.replace(
             body,
-            position=body.position + velocity * self._seconds,
-            attitude=torch.stack([half.cos(), zero, zero, half.sin()], -1),
+            position=position,
+            attitude=attitude,
             velocity=velocity,
-            angular_velocity=torch.stack([zero, zero, rate], -1),
+            angular_velocity=torch.stack([zero, zero, turn], -1),
         )
 
 

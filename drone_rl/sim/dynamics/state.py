@@ -27,31 +27,6 @@ def heading_of(attitude: Tensor) -> Tensor:
     return torch.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
-LEAST = 1e-300
-"""Least square of a length that is divided by."""
-
-
-def along_heading(attitude: Tensor, vector: Tensor) -> Tensor:
-    """Turn vectors, (*, 3), by the twist about z of attitudes, (*, 4).
-
-    As `turned`, it takes sums and products alone, so that kernels get the same bits.
-    """
-    w, z = attitude[..., 0], attitude[..., 3]
-    square = (w * w + z * z).clamp(min=LEAST)
-    cos, sin = (w * w - z * z) / square, 2 * w * z / square
-    x, y, up = vector.unbind(-1)
-    return torch.stack([cos * x - sin * y, sin * x + cos * y, up], -1)
-
-
-def turned(attitude: Tensor, turn: Tensor) -> Tensor:
-    """Return attitudes, (*, 4), after turns to the left about the world's z.
-
-    `turn` are the cosine and sine of half the angle, (*, 2).
-    """
-    (w, x, y, z), (c, s) = attitude.unbind(-1), turn.unbind(-1)
-    return torch.stack([c * w - s * z, c * x - s * y, s * x + c * y, s * w + c * z], -1)
-
-
 @dataclasses.dataclass
 class BodyState(Batch):
     """The bodies of `num_envs` drones. World frame (x forward, y left, z up), SI units."""

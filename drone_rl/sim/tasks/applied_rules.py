@@ -36,6 +36,7 @@ class AppliedRules:
         numbers: Sequence[float] = (),
         low: Sequence[float] = (-torch.inf,) * 3,
         high: Sequence[float] = (torch.inf,) * 3,
+        events: Sequence[int] = (),
     ) -> None:
         """Take rules and their numbers.
 
@@ -44,16 +45,20 @@ class AppliedRules:
             settings: Of the task, with `drone_size` and `step_limit`.
             objects: The P objects.
             rewards: Settings of their reward terms.
-            parameters: Of their ends and success, in order.
+            parameters: Of their ends, success and events, in order.
             numbers: Of their rules of contact and of what is ahead.
             low: Least coordinates within the task's bounds, metres.
             high: Largest ones.
+            events: See `World.events`.
         """
         self.compiled, self._settings, self._objects = rules, settings, objects
         own = [getattr(rewards[t.name], n) for t in rules.rewards for n in t.parameters]
         weights: list[Any] = [rewards[term.name] for term in rules.rewards]
         self._lists = [[float(of.weight) for of in weights], [*own, *parameters], [*numbers]]
         self._bounds = wp.vec3d(*low), wp.vec3d(*high)
+        self._events = events
+        self.written = (*WRITTEN, "places") if events else WRITTEN
+        """Fields of states that rules write, besides counts."""
         self._kept = dict[tuple[str, float | None], Any]()
 
     def begin(self, state: Any) -> None:
@@ -70,10 +75,10 @@ class AppliedRules:
             dynamics: What moved the drones; None for moves that are done at once.
 
         Raises:
-            InputError: A reward term is not finite.
+            InputError: A reward term or an event is not finite.
         """
         rewards = self._run(state, before, speeds, dynamics, is_start=False)
-        self.check(state.paid)
+        self.check(state)
         return rewards
 
     def _run(
@@ -95,7 +100,7 @@ class AppliedRules:
         thing = body.contact.thing if flown else torch.full_like(state.steps, NOTHING)
         timestep = getattr(dynamics, "timestep", None)
         inputs = [
-            self._constants(str(device), timestep),
+            self._constants(state, timestep),
             is_start,
             _ctype(state.places, wp.vec3d),
             *(_ctype(getattr(state, n), wp.vec4 if n == "action" else None) for n in WRITTEN),
@@ -112,15 +117,21 @@ class AppliedRules:
         state.steps[:], state.end_reason[:] = steps, end_reasons
         return rewards
 
-    def check(self, paid: Tensor) -> None:
-        """Raise an `InputError` that names the terms whose sums, (N, R), are not finite."""
-        if bool(paid.isfinite().all()):
+    def check(self, state: Any) -> None:
+        """Raise an `InputError` that names the terms whose sums in states are not finite."""
+        if self._events and not bool(state.places.isfinite().all()):
+            names = ", ".join(term.name for term in self.compiled.events)
+            raise InputError(
+                f"the events {names} return velocities that are not finite; correct them"
+            )
+        if bool(state.paid.isfinite().all()):
             return
-        unusable = zip(self.compiled.rewards, ~paid.isfinite().all(0), strict=True)
-        named = ", ".join(term.name for term, is_unusable in unusable if is_unusable)
+        unusable = zip(self.compiled.rewards, ~state.paid.isfinite().all(0), strict=True)
+        names = [term.name for term, is_unusable in unusable if is_unusable]
         raise InputError(
-            f"the reward terms {named} have values that are not finite; correct "
-            "their functions, such as a division by 0 or a logarithm of it"
+            f"the reward terms {', '.join(names)} have values that are not finite, also with a "
+            "weight of 0; correct their functions, such as a division by 0 or a logarithm of it, "
+            f"or leave them out: task.reward.{names[0]}=null"
         )
 
     def world(
@@ -132,6 +143,7 @@ class AppliedRules:
         """
         device, timestep = str(state.places.device), getattr(dynamics, "timestep", None)
         world = self._make_constants(device, timestep)
+        self._prepare_events(world, state)
         objects: Any = world.objects
         objects.places = _warp(state.places, wp.vec3d)
         objects.present, objects.touched = _warp(state.present), _warp(state.touched)
@@ -142,12 +154,26 @@ class AppliedRules:
         world.steps, world.end_reasons = _warp(steps), _warp(end_reasons)
         return world
 
-    def _constants(self, device: str, timestep: float | None) -> Any:
-        """Return the rules' constants, without states."""
-        key = device, timestep
+    def _constants(self, state: Any, timestep: float | None) -> Any:
+        """Return the rules' constants, with no more of states than events need."""
+        key = device, timestep = str(state.places.device), timestep
+        if self._events:
+            world = self._make_constants(device, timestep)
+            self._prepare_events(world, state)
+            return world
         if key not in self._kept:
             self._kept[key] = self._make_constants(device, timestep)
         return self._kept[key]
+
+    def _prepare_events(self, world: Any, state: Any) -> None:
+        """Give the phases of states, whose memory they share, and the room for displacements."""
+        if self._events:
+            events = torch.tensor(self._events, dtype=torch.int32, device=state.places.device)
+            world.events = _warp(events)
+            world.phases = wp.from_torch(state.sampled[:, -len(self._events) :])
+            objects: Any = world.objects
+            objects.moved = _warp(torch.zeros_like(state.places), wp.vec3d)
+            world.objects = objects
 
     def _make_constants(self, device: str, timestep: float | None) -> Any:
         start_warp(device)

@@ -36,6 +36,8 @@ class Objects:
     present: wp.array2d[wp.bool]
     touched: wp.array2d[wp.bool]
     """Whether the drone has touched it in this episode."""
+    moved: wp.array2d[wp.vec3d]
+    """By how much each has moved in this step; no array if objects stay."""
 
 
 @wp.struct
@@ -87,18 +89,28 @@ def nearest(objects: Objects, env: int, point: wp.vec3d, role: int) -> Nearest:
 
 
 @wp.func
+def moved_by(objects: Objects, env: int, thing: int) -> wp.vec3d:
+    """Return by how much an object has moved in this step."""
+    moved = wp.vec3d()
+    if objects.moved.shape[0] > 0:
+        moved = objects.moved[env, thing]
+    return moved
+
+
+@wp.func
 def sweep(
     objects: Objects, env: int, thing: int, before: wp.vec3d, now: wp.vec3d, radius: wp.float64
 ) -> wp.float64:
-    """Return the fraction of a straight path after which a ball touches an object; inf for never.
+    """Return the fraction of a step after which a ball touches an object; inf for never.
 
-    The distance to a convex body is convex along a line: search its least value, and from there
-    back for the place where it falls to the radius.
+    Both go straight. The distance to a convex body is convex along a line: search its least value,
+    and from there back for the place where it falls to the radius.
     """
     shape = objects.shapes[thing]
     size = objects.sizes[thing]
-    start = turned(objects, thing, before - objects.places[env, thing])
-    path = turned(objects, thing, now - before)
+    moved = moved_by(objects, env, thing)
+    start = turned(objects, thing, before - (objects.places[env, thing] - moved))
+    path = turned(objects, thing, now - before - moved)
     if distance_to(shape, size, start) <= radius:
         return wp.float64(0.0)
     low = wp.float64(0.0)

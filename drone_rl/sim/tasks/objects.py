@@ -12,7 +12,7 @@ from drone_rl.config.term_task import ROLES, ObjectSettings
 from drone_rl.sim.dynamics import BodyState, ComputerVision, Dynamics, Obstacles
 from drone_rl.sim.entities import VisualEntity
 from drone_rl.sim.rendering.scene import SemanticClass
-from drone_rl.sim.tasks.applied_rules import WRITTEN, AppliedRules
+from drone_rl.sim.tasks.applied_rules import AppliedRules
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH, SIDES
 from drone_rl.sim.tasks.geometry_kernel import NOTHING
 from drone_rl.sim.tasks.task import State, Task
@@ -148,7 +148,9 @@ class ObjectTask(Task[ObjectState]):
 
         `action`, (N, *), is what `dynamics` took, for terms that read it; None for none.
         """
-        copies = {name: getattr(state, name).clone(memory_format=_PLAIN) for name in WRITTEN}
+        copies = {
+            name: getattr(state, name).clone(memory_format=_PLAIN) for name in self.rules.written
+        }
         counts = {"steps": state.steps.clone(), "end_reason": state.end_reason.clone()}
         new = dataclasses.replace(state, body=body, **counts, **copies)
         speeds = torch.zeros_like(state.action)

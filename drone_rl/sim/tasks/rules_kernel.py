@@ -2,7 +2,6 @@
 
 import functools
 import re
-from collections.abc import Iterable
 from typing import Any
 
 import warp as wp
@@ -19,13 +18,15 @@ from drone_rl.sim.dynamics.moves_kernel import (
     turned,
 )
 from drone_rl.sim.dynamics.rigid_body_kernel import axes_of
-from drone_rl.sim.dynamics.state import ATTITUDE, VELOCITY
+from drone_rl.sim.dynamics.state import ATTITUDE, POSITION, THING, VELOCITY
+from drone_rl.sim.dynamics.velocity_kernel import Rates, fly_at, glide, rates_of, speeds_of
 from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, PoseArrays
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.tasks.geometry_kernel import NOTHING, Objects
 from drone_rl.sim.tasks.step_kernel import (
     Motion,
+    Mover,
     Step,
     World,
     choose_nearest,
@@ -50,10 +51,14 @@ class Episodes:
     world: World
     drones: wp.array[wp.vec3d]
     attitudes: wp.array[wp.vec4d]
-    """Of drones in computer-vision mode."""
+    """Of drones that do not fly, as what follows up to `rates`."""
     moves: wp.array[wp.vec3d]
     """See `ComputerVision.moves`."""
     turns: wp.array[wp.vec2d]
+    seconds: wp.float64
+    """Duration of a step at rates."""
+    rates: Rates
+    """Meaning of continuous actions."""
     speeds: wp.array[wp.vec4]
     """`Step.action` of each action."""
     fleet: Fleet
@@ -72,7 +77,7 @@ def _rounded(numbers: wp.array[wp.float64], i: int) -> float:
 
 
 def bound(term: Term, first: int) -> Any:  # noqa: C901 (functions that Warp compiles)
-    """Return a term as a Warp function of a step and all parameters; its own begin at `first`."""
+    """Return a term as a Warp function of what it reads and all parameters, from `first` on."""
     place = place_of(term.function) if term.function else term.name
     with errors_of(f"the term {term.name}", place):
         function = wp.func(term.function)
@@ -82,31 +87,31 @@ def bound(term: Term, first: int) -> Any:  # noqa: C901 (functions that Warp com
     if count == 0:
 
         @wp.func
-        def call(step: Step, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
+        def call(step: Any, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
             return function(step)
 
     elif count == 1:
 
         @wp.func
-        def call(step: Step, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
+        def call(step: Any, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
             return function(step, read(p, first))
 
     elif count == 2:
 
         @wp.func
-        def call(step: Step, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
+        def call(step: Any, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
             return function(step, read(p, first), read(p, first + 1))
 
     elif count == 3:
 
         @wp.func
-        def call(step: Step, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
+        def call(step: Any, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
             return function(step, read(p, first), read(p, first + 1), read(p, first + 2))
 
     else:
 
         @wp.func
-        def call(step: Step, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
+        def call(step: Any, p: wp.array[wp.float64]):  # noqa: ANN202 (a number or a truth value)
             return function(
                 step, read(p, first), read(p, first + 1), read(p, first + 2), read(p, first + 3)
             )
@@ -132,11 +137,29 @@ def _checked(before: Any, term: Any, number: int) -> Any:
     @wp.func
     def find(world: World, step: Step) -> int:
         found = int(before(world, step))
-        if found == 0 and term(step, world.parameters):
+        if found == 0 and bool(term(step, world.parameters)):  # a vector is an error of Warp
             found = number
         return found
 
     return find
+
+
+def _moving(before: Any, term: Any, number: int) -> Any:
+    """Return the velocity of the events before and a further one, which moves objects by number."""
+
+    @wp.func
+    def velocity(world: World, mover: Mover, event: int) -> wp.vec3:
+        found = before(world, mover, event)
+        if event == number:
+            found = found + term(mover, world.parameters)
+        return found
+
+    return velocity
+
+
+@wp.func
+def _no_velocity(world: World, mover: Mover, event: int) -> wp.vec3:
+    return wp.vec3()
 
 
 @wp.func
@@ -154,6 +177,7 @@ def make_rules(
     rewards: tuple[Term, ...],
     ends: tuple[Term, ...],
     success: Term,
+    events: tuple[tuple[int, Term], ...] = (),
     *,
     touch: Any = touch_solid,
     choose: Any = choose_nearest,
@@ -165,11 +189,12 @@ def make_rules(
         rewards: Terms of the reward.
         ends: Reasons to end an episode; earlier ones precede later ones, and success.
         success: The meaning of success.
+        events: What moves objects, with the number that `World.events` has for it.
         touch: Rule of contact, see `touch_solid`.
         choose: Rule of what is ahead, see `choose_nearest`.
         success_first: Whether success precedes the other ends.
     """
-    return Rules(rewards, ends, success, touch, choose, success_first)
+    return Rules(rewards, ends, success, events, touch, choose, success_first)
 
 
 class Rules:
@@ -180,13 +205,14 @@ class Rules:
         rewards: tuple[Term, ...],
         ends: tuple[Term, ...],
         success: Term,
+        events: tuple[tuple[int, Term], ...],
         touch: Any,
         choose: Any,
         success_first: bool,
     ) -> None:
         """Fold the terms into one function."""
-        self.terms = (*rewards, *ends, success)
-        self.rewards = rewards
+        self.terms = (*rewards, *ends, success, *(term for _, term in events))
+        self.rewards, self.events = rewards, tuple(term for _, term in events)
         first, pay, find = 0, _no_reward, _no_end
         for number, term in enumerate(rewards):
             pay = _added(pay, bound(term, first), number)
@@ -194,6 +220,10 @@ class Rules:
         checks = []
         for number, term in (*enumerate(ends, SUCCESS + 1), (SUCCESS, success)):
             checks.append((bound(term, first), number))
+            first += len(term.parameters)
+        velocity = _no_velocity
+        for number, term in events:
+            velocity = _moving(velocity, bound(term, first), number)
             first += len(term.parameters)
         if success_first:
             checks.insert(0, checks.pop())
@@ -203,8 +233,22 @@ class Rules:
         lost_control = step_limit + 1
 
         @wp.func
+        def move_objects(world: World, env: int, drone: wp.vec3d):  # noqa: ANN202 (none)
+            objects = world.objects
+            for i in range(world.events.shape[0]):
+                mover = Mover()
+                mover.place = wp.vec3(objects.places[env, i])
+                mover.drone = wp.vec3(drone)
+                mover.time = (float(world.steps[env]) + 0.5) * world.seconds
+                mover.phase = float(world.phases[env, i])
+                moved = wp.vec3d(world.seconds * velocity(world, mover, world.events[i]))
+                objects.moved[env, i] = moved
+                objects.places[env, i] = objects.places[env, i] + moved
+
+        @wp.func
         def advance(world: World, env: int, motion: Motion) -> wp.float64:
             """Apply all rules; write the end reason and return the reward."""
+            move_objects(world, env, motion.before)
             axes = axes_of(motion.attitude)
             step = see(
                 world,
@@ -250,7 +294,9 @@ class Rules:
             env = wp.tid()
             of = constants.objects
             world = World(
-                Objects(of.shapes, of.roles, of.sizes, of.turns, places, present, touched),
+                Objects(
+                    of.shapes, of.roles, of.sizes, of.turns, places, present, touched, of.moved
+                ),
                 constants.low,
                 constants.high,
                 constants.radius,
@@ -268,6 +314,8 @@ class Rules:
                 paid,
                 steps,
                 end_reasons,
+                constants.events,
+                constants.phases,
             )
             motion = Motion()
             motion.before = before[env]
@@ -286,23 +334,41 @@ class Rules:
         def move(envs: Episodes, env: int, action: int) -> float:
             """Move a drone by its dynamics and apply the rules. Returns the reward."""
             motion = Motion()
-            motion.before = envs.drones[env]
-            motion.action = envs.speeds[action]
-            motion.thing = NOTHING
             if is_flying(envs.fleet):
-                motion.now = fly_move(envs.fleet, env, action)
-                motion.is_lost = is_lost(envs.fleet, env)
-                motion.attitude = four(envs.fleet.numbers, env, ATTITUDE)
-                motion.velocity = three(envs.fleet.numbers, env, VELOCITY)
+                fly_move(envs.fleet, env, action)
+                motion = flown(envs, env)
             else:
                 attitude = envs.attitudes[env]
+                motion.before = envs.drones[env]
                 motion.now = motion.before + along_heading(attitude, envs.moves[action])
                 envs.attitudes[env] = turned(attitude, envs.turns[action])
                 motion.attitude = wp.vec4(envs.attitudes[env])
+                motion.thing = NOTHING
+            motion.action = envs.speeds[action]
             envs.drones[env] = motion.now
             return float(advance(envs.world, env, motion))
 
-        self.step_all, self.move = step_all, move
+        @wp.func
+        def steer(envs: Episodes, env: int, action: wp.array[float]) -> float:
+            """Do the same with a continuous action."""
+            motion = Motion()
+            rates = rates_of(envs.rates, action)
+            if is_flying(envs.fleet):
+                fly_at(envs.fleet, env, rates)
+                motion = flown(envs, env)
+            else:
+                motion.before = envs.drones[env]
+                after = glide(motion.before, envs.attitudes[env], rates, envs.seconds)
+                envs.attitudes[env] = after.attitude
+                motion.now = after.position
+                motion.attitude = wp.vec4(after.attitude)
+                motion.velocity = wp.vec3(after.velocity)
+                motion.thing = NOTHING
+            motion.action = speeds_of(envs.rates, action)
+            envs.drones[env] = motion.now
+            return float(advance(envs.world, env, motion))
+
+        self.step_all, self.move, self.steer = step_all, move, steer
 
     @functools.cache  # noqa: B019 (rules are kept for ever, see `make_rules`)
     def load(self) -> None:
@@ -315,18 +381,71 @@ class Rules:
         try:
             wp.load_module(self.step_all.module, device="cpu")
         except Exception as error:
-            raise InputError(_compile_error(str(error), self.terms)) from error
+            raise InputError(self._compile_error(str(error))) from error
+
+    def _compile_error(self, text: str) -> str:
+        """Return one line about the innermost line of code that Warp's message names."""
+        places = re.findall(r'parsing function "(.*?)" at (.*?):(\d+)', text)
+        reason = text.splitlines()[-1].lstrip(";") if text else "no reason given"
+        if places and places[-1][1] != __file__:
+            function, file, line = places[-1]
+            where = f"line {line} of {file}: {function}"
+            return f"{where} can't be compiled by Warp ({reason}); correct it"
+        for term in self.terms:  # what it returns is wrong
+            own = (self.rewards, self.events)
+            kind = next((i for i, terms in enumerate(own) if term in terms), len(own))
+            if not term.module.startswith("drone_rl.") and not _returns(term, kind):
+                what = _VALUES[kind]
+                return f"{place_of(term.function)}: no value to use ({reason}); return {what}"
+        return f"the terms can't be compiled by Warp ({reason}); correct them"
 
 
-def _compile_error(text: str, terms: Iterable[Term]) -> str:
-    """Return one line about the innermost line of code that Warp's message names."""
-    places = re.findall(r'parsing function "(.*?)" at (.*?):(\d+)', text)
-    reason = text.splitlines()[-1].lstrip(";") if text else "no reason given"
-    if not places or places[-1][1] == __file__:  # where it is called
-        names = ", ".join(term.name for term in terms if not term.module.startswith("drone_rl."))
-        return f"the terms {names} can't be compiled by Warp ({reason}); correct them"
-    function, file, line = places[-1]
-    return f"line {line} of {file}: {function} can't be compiled by Warp ({reason}); correct it"
+_VALUES = (
+    "a number, as in -> float",
+    "a velocity, as in -> wp.vec3",
+    "a truth value, as in -> bool",
+)
+
+
+def _returns(term: Term, kind: int) -> bool:
+    """Return whether Warp compiles a term alone, with one of `_VALUES`."""
+    call = bound(term, 0)
+
+    @wp.kernel(module="unique", module_options=_OPTIONS)
+    def pay(numbers: wp.array[wp.float64]) -> None:
+        numbers[0] = wp.float64(call(Step(), numbers))
+
+    @wp.kernel(module="unique", module_options=_OPTIONS)
+    def shift(numbers: wp.array[wp.float64]) -> None:
+        velocity = wp.vec3() + call(Mover(), numbers)
+        numbers[0] = wp.float64(velocity[0])
+
+    @wp.kernel(module="unique", module_options=_OPTIONS)
+    def check(numbers: wp.array[wp.float64]) -> None:
+        if bool(call(Step(), numbers)):
+            numbers[0] = wp.float64(1.0)
+
+    try:
+        wp.load_module((pay, shift, check)[kind].module, device="cpu")
+    except Exception:  # any of Warp's
+        return False
+    return True
+
+
+@wp.func
+def flown(envs: Episodes, env: int) -> Motion:
+    """Return the motion of a drone that has flown, without its action."""
+    numbers = envs.fleet.numbers
+    motion = Motion()
+    motion.before = envs.drones[env]
+    motion.now = wp.vec3d(
+        numbers[env, POSITION], numbers[env, POSITION + 1], numbers[env, POSITION + 2]
+    )
+    motion.is_lost = is_lost(envs.fleet, env)
+    motion.attitude = four(numbers, env, ATTITUDE)
+    motion.velocity = three(numbers, env, VELOCITY)
+    motion.thing = int(numbers[env, THING])
+    return motion
 
 
 @wp.func

@@ -2,8 +2,8 @@
 
 import warp as wp
 
-from drone_rl.config.terms import REWARDS, end, success
-from drone_rl.sim.tasks.step_kernel import Step
+from drone_rl.config.terms import REWARDS, end, event, success
+from drone_rl.sim.tasks.step_kernel import Mover, Step
 
 
 @REWARDS.implement("progress")
@@ -71,3 +71,23 @@ def is_out_of_bounds(step: Step) -> bool:
 def has_all_goals(step: Step) -> bool:
     """The drone has reached every goal."""
     return step.remaining == 0
+
+
+@event("orbit")
+def orbit(mover: Mover, radius: float = 2.0, period: float = 10.0) -> wp.vec3:
+    """Flies a circle of `radius` metres in `period` seconds, at first in a random direction."""
+    angle = wp.tau * (mover.time / period + mover.phase)
+    return wp.tau * radius / period * wp.vec3(wp.cos(angle), wp.sin(angle), 0.0)
+
+
+@event("shuttle")
+def shuttle(
+    mover: Mover, distance: float = 2.0, period: float = 10.0, heading: float = 90.0
+) -> wp.vec3:
+    """Goes to and fro in `period` seconds, at most `distance` metres to each side of its place.
+
+    The heading of its path is in degrees to the left of x; it begins anywhere in the period.
+    """
+    turn = mover.time / period + mover.phase
+    speed = wp.where(turn - wp.floor(turn) < 0.5, 2.0, -2.0) * distance / period
+    return speed * wp.vec3(wp.cos(wp.radians(heading)), wp.sin(wp.radians(heading)), 0.0)

@@ -4,7 +4,15 @@ import warp as wp
 
 from drone_rl.sim.dynamics.rigid_body_kernel import Axes
 from drone_rl.sim.rendering.raytrace.structs_kernel import struct
-from drone_rl.sim.tasks.geometry_kernel import GOAL, NOTHING, OBSTACLE, Objects, nearest, sweep
+from drone_rl.sim.tasks.geometry_kernel import (
+    GOAL,
+    NOTHING,
+    OBSTACLE,
+    Objects,
+    moved_by,
+    nearest,
+    sweep,
+)
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -52,6 +60,20 @@ class Step:
     """`distance_before` minus `distance` in double precision, or what the task counts instead."""
 
 
+@struct
+class Mover:
+    """An object that an event moves, and the time. SI units, world frame."""
+
+    place: wp.vec3
+    """Its centre before the step."""
+    drone: wp.vec3
+    """Where the drone is before the step."""
+    time: float
+    """Seconds from the start of the episode to the middle of the step."""
+    phase: float
+    """A random number in [0, 1), one for each object and episode."""
+
+
 @wp.struct
 class World:
     """Constants of a task, and states of N environments that its rules read and write."""
@@ -88,6 +110,10 @@ class World:
     steps: wp.array[int]
     """Taken in this episode. Shape: (N,), as of `end_reasons`."""
     end_reasons: wp.array[int]
+    events: wp.array[int]
+    """Number of what moves each object; -1 for nothing. Shape: (P,), or no array if all stay."""
+    phases: wp.array2d[wp.float64]
+    """See `Mover.phase`. Shape: (N, P), or no array."""
 
 
 @wp.struct
@@ -156,7 +182,7 @@ def approach(world: World, env: int, motion: Motion, step: Step) -> Step:
     if ahead != NOTHING:
         place = world.objects.places[env, ahead]
         now = wp.length(place - motion.now)
-        before = wp.length(place - motion.before)
+        before = wp.length(place - moved_by(world.objects, env, ahead) - motion.before)
         seen.distance = float(now)
         seen.distance_before = float(before)
         seen.exact_progress = before - now

@@ -11,23 +11,22 @@ import torch
 from torch import Tensor
 
 from drone_rl.config.term_task import ObjectSettings, TermTaskSettings
-from drone_rl.config.terms import ENDS, SUCCESSES
+from drone_rl.config.terms import ENDS, EVENTS, SUCCESSES
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import BodyState
 from drone_rl.sim.tasks.applied_rules import AppliedRules, reward_terms
 from drone_rl.sim.tasks.common import Side
 from drone_rl.sim.tasks.geometry_kernel import GOAL
 from drone_rl.sim.tasks.objects import ObjectState, ObjectTask
-from drone_rl.sim.tasks.rules_kernel import SUCCESS, make_rules
+from drone_rl.sim.tasks.rules_kernel import RUNNING, SUCCESS, make_rules
 from drone_rl.sim.tasks.scene_edits import Range, SceneEdits
+from drone_rl.sim.tasks.strata import PHRASES, START_AXES, Strata
 from drone_rl.sim.tasks.task import Goals, register_task
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.utils.errors import InputError
 
 _MOST_TRIES, _TRIES = 1000, 20
 """Most samples of all objects until none is too near to another one; samples of each object."""
-_START = ("x", "y", "z", "heading")
-_SIDES = {"left": "on its left", "ahead": "ahead", "right": "on its right"}
 _LAST_ENDS = ("STEP_LIMIT", "LOST_CONTROL")
 
 
@@ -88,29 +87,46 @@ class TermTask(ObjectTask):
         self.name = s.name
         ends = tuple(ENDS.by_name[name] for name in s.end)
         (success,) = (SUCCESSES.by_name[name] for name in s.success)
-        named = zip((*ends, success), (*s.end.values(), *s.success.values()), strict=True)
+        kinds = [*s.objects.values()]
+        events = tuple((i, EVENTS.by_name[name]) for i, of in enumerate(kinds) for name in of.event)
+        given = (
+            *s.end.values(),
+            *s.success.values(),
+            *(e for of in kinds for e in of.event.values()),
+        )
+        named = zip((*ends, success, *(term for _, term in events)), given, strict=True)
         objects = _named(s)
         rules = AppliedRules(
-            make_rules(reward_terms(s.reward), ends, success),
+            make_rules(reward_terms(s.reward), ends, success, events),
             s,
             [*objects.values()],
             rewards=s.reward,
             parameters=[getattr(of, name) for term, of in named for name in term.parameters],
             low=s.low,
             high=s.high,
+            events=[
+                i if of.event else -1
+                for i, of in enumerate(kinds)
+                for _ in range(of.count)
+                if events
+            ],
         )
         super().__init__(s, objects, rules)
-        self.num_sampled = 4 + 3 * len(objects)
+        self.num_sampled = 4 + (4 if events else 3) * len(objects)
         x, y, z = (sum(s.start.range_of(axis)) / 2 for axis in "xyz")
         self.origin = (x, y, z)
         own = [term.name.upper() for term in ends]
-        kinds: Any = enum.IntEnum("End", ["RUNNING", "SUCCESS", *own, *_LAST_ENDS], start=0)
-        self.ends = kinds
-        self.truncation = self.expected_end = kinds["STEP_LIMIT"]
+        reasons: Any = enum.IntEnum("End", ["RUNNING", "SUCCESS", *own, *_LAST_ENDS], start=0)
+        self.ends = reasons
+        self.truncation = self.expected_end = reasons["STEP_LIMIT"]
+        self._strata = Strata(s)
+        self.strata = tuple(self._strata.phrases)
         self.vocabulary = TaskVocabulary(
             tested=f"scenes of the task {s.name}",
-            sides=_SIDES,
-            places=_SIDES,
+            sides=self._strata.phrases,
+            places=PHRASES,
+            labels={"side": "bearing and distance at the start"},
+            **({} if success.name == "all_goals" else _own_success(success.name)),
         )
         self.edits = self._edits()
         self.curriculum = Curriculum(s) if s.curriculum else None
@@ -137,7 +153,9 @@ class TermTask(ObjectTask):
         }
 
     def sample(self, random_state: np.random.RandomState) -> Tensor:
-        """Sample x, y, z (m) and heading (rad) of the start, then the centres. Shape: (4 + 3 P,).
+        """Sample x, y, z (m) and heading (rad) of the start, then the centres. Shape: (K,).
+
+        With events, the last P numbers are the objects' phases, see `Mover`.
 
         Raises:
             InputError: A region has no room left for an object.
@@ -145,11 +163,14 @@ class TermTask(ObjectTask):
         s = self.settings if self.curriculum is None else self.curriculum.ranges
         crowded = ""
         for _ in range(_MOST_TRIES):
-            *start, heading = (random_state.uniform(*s.start.range_of(axis)) for axis in _START)
+            *start, heading = (random_state.uniform(*s.start.range_of(axis)) for axis in START_AXES)
             placed, crowded = self._placed(s, start, random_state)
             if not crowded:
-                places = np.concatenate([[*start, math.radians(heading)], *placed])
-                return torch.from_numpy(places)
+                phases = random_state.uniform(
+                    size=len(self.each) if self.rules.compiled.events else 0
+                )
+                numbers = np.concatenate([[*start, math.radians(heading)], *placed, phases])
+                return torch.from_numpy(numbers)
         raise InputError(
             f"task.objects: found no room for {crowded} in {_MOST_TRIES} tries that keeps "
             f"{s.objects[crowded].apart:g} m from other objects and {s.start.apart:g} m from the "
@@ -188,8 +209,12 @@ class TermTask(ObjectTask):
         half = 0.5 * sampled[:, 3]
         zero = torch.zeros_like(half)
         attitude = torch.stack([half.cos(), zero, zero, half.sin()], -1)
-        places = sampled[:, 4:].reshape(len(sampled), len(self.each), 3).clone()
+        places = self._sampled_places(sampled).clone()
         return self.begun(body.moved(sampled[:, :3].clone(), attitude), places, sampled.clone())
+
+    def _sampled_places(self, sampled: Tensor) -> Tensor:
+        """Return the sampled centres. Shape: (N, K) to (N, P, 3)."""
+        return sampled[:, 4 : 4 + 3 * len(self.each)].unflatten(1, (-1, 3))
 
     def info(self, state: ObjectState) -> dict[str, Tensor]:
         """See `entries`."""
@@ -207,12 +232,16 @@ class TermTask(ObjectTask):
         }
 
     def score(self, info: Mapping[str, Tensor]) -> Goals:
-        """Return the goals; their strata are the sides on which they came up.
+        """Return the goals; see `Strata`.
 
-        A success counts as all of them: its own meaning may need only some.
+        If success has another meaning, its episode's end counts for all of them.
         """
-        reached = info["reached"] | (info["end_reason"] == SUCCESS)
-        return Goals(reached, info["sides"], info["sampled"].double())
+        reached, sampled, end = (info[name] for name in ("reached", "sampled", "end_reason"))
+        if self.vocabulary.succeed:
+            reached = torch.where(end == RUNNING, reached, end == SUCCESS)
+        places = self._sampled_places(sampled)[:, self.goals.to(sampled.device)]
+        stratum = self._strata.of(sampled[:, :4], places).where(info["sides"] >= 0, -1)
+        return Goals(reached, stratum, sampled.double())
 
     def _edits(self) -> SceneEdits:
         """Return changes of its scenes; random goals are as far ahead as goals ever are."""
@@ -236,6 +265,11 @@ class TermTask(ObjectTask):
         heights = sorted({z - self.origin[2] for of in goals for z in of.range_of("z")})
         course = math.radians(first) if first == last else None
         return SceneEdits(self, reach, ahead, ahead, tuple(heights), course=course)
+
+
+def _own_success(name: str) -> dict[str, str]:
+    """Return the words of a task in which success is more than to reach every goal, or less."""
+    return {"reach": "succeed with", "reached": "with success", "succeed": f"succeed ({name})"}
 
 
 def define_task(name: str, **settings: Any) -> type[TermTaskSettings]:

@@ -30,6 +30,10 @@ def message(line):
         ("train seed", "seed: settings are typed name=value"),
         ("train sed=1", "has no setting sed; did you mean seed?"),
         ("train task.max_steps=9", "did you mean task.step_limit?"),
+        (
+            "train -m hydra.sweeper.metric=success seed=1,2",
+            "add hydra/sweeper=optuna, which has it",
+        ),
         ("train hydra.run.dri=x", "did you mean hydra.run.dir?"),
         ("train policy=mlp", "did you mean network?"),
         ("train task.num_cube=1", "did you mean task.num_cubes?"),

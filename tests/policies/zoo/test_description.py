@@ -368,6 +368,9 @@ def test_the_file_of_a_users_task_is_named_and_another_one_reported(caplog):
     stored = described.model_dump(mode="json")
     assert TaskDescription.read(stored) == described and not caplog.messages
     TaskDescription.read({**stored, "code": {"name": "older.py", "hash": "0" * 64}})
+    missing = {**stored, "name": "not_imported"}
+    with pytest.raises(InputError, match=r"'not_imported' is a task of 'second_task.py'.*plugins="):
+        TaskDescription.read(missing)
     assert "older.py" in caplog.text
     shipped = TaskDescription.of(TaskSettings())
     assert shipped.code is None and shipped.rewards == {"reached": 1.0}

@@ -194,7 +194,7 @@ def test_move_shifts_the_position_goal():
     goals = Moves(MOVES_SETTINGS).goals(
         drones(), torch.tensor([Move.FORWARD, Move.LEFT, Move.RIGHT])
     )
-    assert goals.modes == Moves.MODES
+    assert goals.modes == Moves.modes
     assert goals.values.tolist() == [[1.0, 2.0, 0.0, 2.5]] * 3
     assert goals.drifts.tolist() == [[4, 0, 0, 0], [0, 4, 0, 0], [0, -4, 0, 0]]
 

@@ -47,14 +47,16 @@ def test_random_episodes_follow_the_reference_rules(settings, ends):
     worlds.reset(torch.arange(WORLDS), [RandomState(i) for i in range(WORLDS)])
     fused = fused_rules(worlds.task, worlds.dynamics, worlds.state)
     fused.begin(worlds.state)
-    places = wp.to_torch(fused.poses.positions)
+    places, poses = torch.zeros(WORLDS, 2 + len(worlds.task.objects), 3), PoseArrays()
+    poses.positions = wp.from_torch(places, dtype=wp.vec3)
+    poses.attitudes = wp.zeros(WORLDS, dtype=wp.vec4, device="cpu")
     state, going, seen = worlds.state, torch.arange(WORLDS), set()
     rewards = torch.zeros(WORLDS)
     while len(going):
         chances = torch.tensor([0.7, 0.2, 0.1] if len(going) % 2 else [0.7, 0.1, 0.2])
         actions = chances.multinomial(WORLDS, replacement=True, generator=draws)
         inputs = [wp.from_torch(actions.int()), wp.from_torch(rewards)]
-        wp.launch(step, WORLDS, inputs=[fused.arrays, fused.poses, *inputs], device="cpu")
+        wp.launch(step, WORLDS, inputs=[fused.arrays, poses, *inputs], device="cpu")
         before, moved = state, worlds.dynamics.step(state.body, actions[going])
         state, reward = worlds.advance(state, actions[going])
         expected, earned = reference_step(task, before, moved)
@@ -137,14 +139,14 @@ FLIGHT, VELOCITIES = DynamicsSettings(mode="simple_flight"), ActionSettings(kind
         (CollectCubes, ComputerVision(), True),
         (CollectCubes, Quadrotor(FLIGHT), True),
         (CollectCubes, Windy(), False),
-        (CollectCubes, Quadrotor(FLIGHT, VELOCITIES), False),
+        (CollectCubes, Quadrotor(FLIGHT, VELOCITIES), True),
         (Strict, ComputerVision(), False),
         (Raised, ComputerVision(), False),
         (Solid, Quadrotor(FLIGHT), False),
         (Pillars, ComputerVision(), True),
-        (Pillars, Quadrotor(FLIGHT), False),
+        (Pillars, Quadrotor(FLIGHT), True),
     ],
 )
-def test_only_unchanged_rules_and_moves_are_fused(task, dynamics, is_supported):
+def test_only_unchanged_rules_are_fused(task, dynamics, is_supported):
     worlds = Worlds(1, task(), dynamics=dynamics)
-    assert (fused_rules(worlds.task, dynamics, worlds.state) is not None) == is_supported
+    assert isinstance(fused_rules(worlds.task, dynamics, worlds.state), str) != is_supported

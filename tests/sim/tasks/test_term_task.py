@@ -7,14 +7,16 @@ import warp as wp
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 import drone_rl
-from drone_rl import InputError, Step, define_task, reward
+from drone_rl import InputError, Mover, Step, define_task, reward
 from drone_rl.acceleration import FusedEpisodes
 from drone_rl.config import ActionSettings
 from drone_rl.config.appearance import AppearanceSettings, check_appearance
 from drone_rl.config.camera import CameraSettings
 from drone_rl.config.task import TASKS, BaseTaskSettings
+from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.dynamics.state import heading_of
 from drone_rl.sim.tasks import as_task
+from drone_rl.sim.tasks.fused import fused_rules
 from drone_rl.sim.tasks.task import MAKERS
 from drone_rl.sim.worlds import Worlds
 from drone_rl.training.metrics import batch_metrics
@@ -244,6 +246,85 @@ def sideways(step: Step) -> float:
     return step.velocity[1]
 
 
+@drone_rl.event("test_drift")
+def drift(mover: Mover, speed: float = 10.0) -> wp.vec3:
+    """Flies to the left, and up as fast as it is away from the drone."""
+    return wp.vec3(0.0, speed, mover.place[0] - mover.drone[0])
+
+
+@drone_rl.event("test_lost")
+def lost(mover: Mover) -> wp.vec3:
+    """Not finite."""
+    return wp.vec3(wp.log(-mover.time), 0.0, 0.0)
+
+
+def test_events_move_objects_and_the_distance_to_goals():
+    made = worlds(objects={"ball": {**BALL, "event": {"test_drift": {"speed": 5.0}}}})
+    (paid,), _ = fly(made, FORWARD)
+    assert made.state.places[0, 0].tolist() == pytest.approx([6.0, 0.5, 2.5 + 0.6])
+    assert paid == pytest.approx(0.5 * (6.0 - np.hypot(5.0, np.hypot(0.5, 0.6))))
+    moved = made.task.edits.next_moved(made.state, 1.0)  # goes on from where it was put
+    after = made.task.step(moved, moved.body)[0]
+    assert after.places[0, 0].tolist() == pytest.approx([6.0, 2.0, 2.5 + 0.6 + 0.5])
+    assert moved.places[0, 0, 1] == 1.5  # states before a step stay as they are
+
+
+@pytest.mark.parametrize(("x", "end"), [(0.0, "CONTACT"), (-1.0, "RUNNING")])
+def test_a_fast_object_does_not_pass_through_the_drone(x, end):
+    fast = {"test_drift": {"speed": 100.0}}  # 10 m a step: from the drone's right to its left
+    made = worlds(objects={"ball": BALL, "post": {**POST, "x": x, "y": -5.0, "event": fast}})
+    # at half of the step the drone is at x = 0.5; surfaces touch 0.9 m apart
+    assert fly(made, FORWARD)[1] == end
+
+
+@pytest.mark.parametrize("event", ["orbit", "shuttle"])
+def test_shipped_events_return_after_their_period(event):
+    made = worlds(objects={"ball": {**BALL, "event": {event: {"period": 2.0}}}}, step_limit=99)
+    places = [made.state.places[0, 0].clone()]
+    for _ in range(20):  # of 0.1 s
+        made.state = made.task.step(made.state, made.state.body)[0]
+        places.append(made.state.places[0, 0].clone())
+    assert places[-1].tolist() == pytest.approx(places[0].tolist(), abs=1e-5)
+    ranges = torch.stack(places).amax(0) - torch.stack(places).amin(0)
+    if event == "orbit":  # 2 m around a centre that depends on the phase
+        assert ranges.tolist() == pytest.approx([4.0, 4.0, 0.0], abs=0.05)
+    else:  # 2 m along y, in half of the period
+        assert ranges.tolist() == pytest.approx([0.0, 2.0, 0.0], abs=0.21)
+    assert len({float(made.task.sample(np.random.RandomState(i))[-1]) for i in range(9)}) == 9
+
+
+def test_dm_control_shows_moved_objects():
+    settings = {"name": "test_reach", "objects": {"ball": {**BALL, "event": ["test_drift"]}}}
+    env = make_environment(BaseTaskSettings.read(settings), pixels=False, random_state=0)
+    env.reset()
+    env.step(FORWARD)
+    ball = env.physics.bind(env.task._model.frames[0]).mocap_pos
+    assert ball.tolist() == pytest.approx([6.0, 1.0, 3.1])
+
+
+@drone_rl.event("test_number")
+def number(mover: Mover) -> float:
+    """No velocity."""
+    return mover.time
+
+
+@pytest.mark.parametrize(
+    ("event", "message"), [("test_lost", "test_lost"), ("test_number", "wp.vec3")]
+)
+def test_unusable_events_are_named(event, message):
+    with pytest.raises(InputError, match=message):
+        fly(worlds(objects={"ball": {**BALL, "event": [event]}}), FORWARD)
+
+
+def test_moving_obstacles_of_a_quadrotor_are_not_fused():
+    objects = {"ball": BALL, "post": {**POST, "event": ["shuttle"]}}
+    task = BaseTaskSettings.read({"name": "test_reach", "objects": objects})
+    made = Worlds(1, task, dynamics=drone_rl.DynamicsSettings(mode="simple_flight"))
+    assert "events" in fused_rules(made.task, made.dynamics, made.state)
+    made = Worlds(1, task)
+    assert not isinstance(fused_rules(made.task, made.dynamics, made.state), str)
+
+
 @reward("test_undefined")
 def undefined(step: Step) -> float:
     """Not finite."""
@@ -256,15 +337,21 @@ def uncompiled(step: Step) -> float:
     return len([step.time])
 
 
-@pytest.mark.parametrize("term", ["test_undefined", "test_uncompiled"])
+@reward("test_nothing")
+def nothing(step: Step):
+    """Not a value."""
+
+
+@pytest.mark.parametrize("term", ["test_undefined", "test_uncompiled", "test_nothing"])
 def test_unusable_terms_are_named(term):
     with pytest.raises(InputError, match=term.removeprefix("test_")):
-        fly(worlds(reward={term: 1.0}), FORWARD)
+        fly(worlds(reward={"test_near": 1.0, term: 0.0}), FORWARD)
 
 
 @pytest.mark.parametrize("start", [{}, {"y": [-3.0, 3.0], "heading": [-90.0, 90.0]}])
-def test_fused_episodes_are_the_stepped_ones(start):
-    objects = {"ball": {**BALL, "y": [-3.0, 3.0]}, "post": POST}
+@pytest.mark.parametrize("event", [{}, {"orbit": {}, "shuttle": {"period": 0.7}}])
+def test_fused_episodes_are_the_stepped_ones(start, event):
+    objects = {"ball": {**BALL, "y": [-3.0, 3.0], "event": event}, "post": POST}
     rewards = {"progress": 0.5, "contact": -1.0, "test_velocity": 0.1}
     changes = {"objects": objects, "reward": rewards, "start": start}
     task = BaseTaskSettings.read({"name": "test_reach", **changes})
@@ -387,9 +474,24 @@ def any_goal(step: Step) -> bool:
     return step.remaining <= 1
 
 
-@pytest.mark.parametrize(("success", "reached"), [("test_any_goal", 2), ("all_goals", 1)])
-def test_a_success_counts_as_all_goals(success, reached):
+@drone_rl.success("test_late_goals")
+def late_goals(step: Step) -> bool:
+    """Every goal is reached, and a minute is over."""
+    return step.remaining == 0 and step.time > 60.0
+
+
+@pytest.mark.parametrize(
+    ("success", "reached", "finally_reached"),
+    [("test_any_goal", 2, 2), ("test_late_goals", 1, 0), ("all_goals", 1, 1)],
+)
+def test_goals_count_by_the_success_of_the_episode(success, reached, finally_reached):
     far = {**BALL, "x": 30.0}
     made = worlds(objects={"ball": BALL, "far": far}, success=[success])
     fly(made, *[FORWARD] * 5)  # at x = 5 the drone touches the nearer ball of radius 1 at x = 6
     assert int(made.task.score(made.info()).reached.sum()) == reached
+    fly(made, *[FORWARD] * 7)  # to the step limit
+    assert int(made.task.score(made.info()).reached.sum()) == finally_reached
+    words = made.task.vocabulary
+    assert words.succeeds == (
+        "reaches every goal" if success == "all_goals" else f"succeeds ({success})"
+    )

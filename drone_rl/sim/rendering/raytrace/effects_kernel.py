@@ -33,19 +33,40 @@ def render_images_with_effects(
     effects: structs.Effects,
 ) -> None:
     """Render images one after the other, as one worker; see `plain_kernel.render_images`."""
-    count = view.height * view.width
     for row in range(first, last):
         env = row // view.count
-        job = start_job(view, poses, scratch, row, row % view.cameras.shape[0], env, buffer)
-        find_visible(job, geoms, poses)
-        fill(job.dark, 0, count, 0)
-        if effects.shadows[env % effects.shadows.shape[0]] != 0:
-            _cast_shadows(job, materials.direction[env % materials.direction.shape[0], 0])
-        start = int(0)
-        while start < count:
-            end = span_end(job.owner, start, count)
-            shade_span_with_effects(job, materials, effects, images, start, end)
-            start = end
+        camera = row % view.cameras.shape[0]
+        render_image_with_effects(
+            view, camera, geoms, poses, env, materials, scratch, buffer, images, row, effects
+        )
+
+
+@wp.func
+def render_image_with_effects(
+    view: structs.ViewArrays,
+    camera: int,
+    geoms: structs.Geoms,
+    poses: structs.PoseArrays,
+    env: int,
+    materials: structs.Materials,
+    scratch: structs.Scratch,
+    buffer: int,
+    images: structs.Images,
+    row: int,
+    effects: structs.Effects,
+) -> None:
+    """Render the image `row` of one camera of one environment."""
+    count = view.height * view.width
+    job = start_job(view, poses, scratch, row, camera, env, buffer)
+    find_visible(job, geoms, poses)
+    fill(job.dark, 0, count, 0)
+    if effects.shadows[env % effects.shadows.shape[0]] != 0:
+        _cast_shadows(job, materials.direction[env % materials.direction.shape[0], 0])
+    start = int(0)
+    while start < count:
+        end = span_end(job.owner, start, count)
+        shade_span_with_effects(job, materials, effects, images, start, end)
+        start = end
 
 
 @wp.func

@@ -35,7 +35,8 @@ class Launch(NamedTuple):
     geoms: structs.Geoms
     poses: structs.PoseArrays
     materials: structs.Materials
-    images: structs.Images
+    images: Any = None
+    """`structs.Images`, which kernels write."""
     effects: "structs.Effects | None" = None
     """Chooses the kernels with effects, if given."""
 
@@ -75,29 +76,25 @@ class Raytracer:
         self, view: View, poses: Poses, appearance: Appearance | None = None
     ) -> dict[Modality, Tensor]:
         """Render environments; see `Renderer.render`."""
-        self.prepare(view)
-        cameras, geoms = self._views[view]
         images = view.new_images(len(poses), self.device)
-        look = appearance or Appearance()
         with on_torch_stream(self.device):
-            materials, effects = self._materials.encode(appearance, len(poses))
-            encoded = cameras.encode(look.camera, len(poses))
-            frames = self._poses.write(poses, look.distractors)
-            count, out = len(poses) * len(view.cameras), _images(images)
-            launch = Launch(count, encoded, geoms, frames, materials, out, effects)
-            self._launcher.launch(launch)
+            launch = self.encode(view, poses, appearance)
+            self._launcher.launch(launch._replace(images=as_images(images)))
         return images
 
-    def kernel_inputs(
-        self, view: View, num_workers: int
-    ) -> tuple[structs.ViewArrays, structs.Geoms, structs.Materials, structs.Scratch]:
-        """Return the arguments with which another kernel calls `plain_kernel.render_image`.
+    def encode(self, view: View, poses: Poses, appearance: Appearance | None = None) -> Launch:
+        """Return all arguments of kernels that render environments but the images.
 
-        The appearance is the model's own; `num_workers` images are rendered at the same time.
+        The next call overwrites the poses.
         """
-        encoded, geoms = self._encode(view)
-        scratch = make_scratch(num_workers, view.height * view.width, len(geoms.kind))
-        return encoded, geoms, self._materials.encode(None, 1)[0], scratch
+        self.prepare(view)
+        cameras, geoms = self._views[view]
+        look = appearance or Appearance()
+        materials, effects = self._materials.encode(appearance, len(poses))
+        encoded = cameras.encode(look.camera, len(poses))
+        frames = self._poses.write(poses, look.distractors)
+        count = len(poses) * len(view.cameras)
+        return Launch(count, encoded, geoms, frames, materials, effects=effects)
 
     def close(self) -> None:
         """Stop the threads."""
@@ -177,7 +174,8 @@ def make_scratch(count: int, pixels: int, geoms: int, device: str = "cpu") -> st
     return scratch
 
 
-def _images(images: Mapping[Modality, Tensor]) -> structs.Images:
+def as_images(images: Mapping[Modality, Tensor]) -> structs.Images:
+    """Return images by modality, (num_envs, num_cameras, H, W, *), for kernels to write."""
     encoded: Any = structs.Images()
     for modality, values in images.items():
         rows = values.flatten(2, 3).flatten(0, 1)
