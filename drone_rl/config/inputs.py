@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import pydantic
-from annotated_types import MaxLen, MinLen
+from annotated_types import MaxLen
 
 from drone_rl.config.camera import CameraSettings
 from drone_rl.config.parts import Part, Parts
@@ -377,6 +377,8 @@ def _named(inputs: Any) -> Any:
 
 
 def _check_names(inputs: dict[str, Input]) -> dict[str, Input]:
+    if not inputs:
+        raise InputError("the policy would see nothing; give inputs, such as inputs=[gray]")
     for name in inputs:
         if not re.fullmatch("[a-z][a-z0-9_]*", name) or name in RESERVED:
             raise InputError(
@@ -406,7 +408,6 @@ class InputsByName(Annotation):
         return Annotated[
             dict[Annotated[str, Text(40)], self.of],
             pydantic.BeforeValidator(_named),
-            MinLen(1),
             MaxLen(MOST_INPUTS),
             pydantic.AfterValidator(_check_names),
         ]

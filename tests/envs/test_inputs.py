@@ -112,7 +112,7 @@ def test_images_of_a_stack_begin_with_the_first_frame(see):
 @pytest.mark.parametrize(
     ("inputs", "message"),
     [
-        ([], "inputs=.*: it must have at least 1"),
+        ([], "inputs: the policy would see nothing"),
         (["gray", "gray"], "inputs: .* names an input twice"),
         (["gray", "foo"], "inputs.foo='foo': it must be one of"),
         ({"gray": {"name": "gray", "stack": 0}}, "inputs.gray.stack=0: it must be a whole"),
