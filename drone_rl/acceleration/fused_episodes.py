@@ -59,8 +59,12 @@ class FusedEpisodes:
         network: PackedNetwork,
         rules: Any,
         num_threads: int,
+        num_steps: int | None = None,
     ) -> None:
-        """Build the kernel; see `try_create`."""
+        """Build the kernel; see `try_create`.
+
+        A launch has `num_steps`, and observations after the last ones, or as many as fit.
+        """
         self._env, self._actor, self._keeps_inputs = env, actor, keeps_inputs
         self._network, self._rules = network, rules
         worlds, view = env.worlds, env.observer.image.view
@@ -77,7 +81,8 @@ class FusedEpisodes:
         self._workspaces = wp.empty(shape, dtype=float, device="cpu")
         channels = transforms.num_frames * transforms.num_channels
         size_of_frames = channels * view.height * view.width
-        self._length = max(1, min(_MAX_STEPS, _MAX_PIXELS // (count * size_of_frames)))
+        fitting = max(1, min(_MAX_STEPS, _MAX_PIXELS // (count * size_of_frames)))
+        self._length = fitting if num_steps is None else num_steps
         self._num_rows = rows = count * self._length
         actions = worlds.dynamics.actions
         self._is_continuous = _is_continuous(env)
@@ -92,8 +97,9 @@ class FusedEpisodes:
                 "end_reason": torch.empty(rows, dtype=torch.int32),
             }
         )
-        self._last_observations = torch.empty(count if self._num_frames > 1 else 0, size_of_frames)
+        self.last_observations = torch.empty(count if self._num_frames > 1 else 0, size_of_frames)
         launches = _MAX_ACTIVATIONS // (rows * size)
+        """Of each environment, if observations have several frames."""
         self.activations = ActivationRecorder(launches * rows, size)
         """Of the last batch, for a `FusedNetwork` that learns from it."""
         self._owner = getattr(self._actor.network, "owner", "the policy")
@@ -102,12 +108,18 @@ class FusedEpisodes:
             *rules.functions,
             rollout_kernel.decide_numbers if self._is_continuous else rollout_kernel.decide_move,
             rollout_kernel.show_plain if is_plain else rollout_kernel.show_any,
+            looks_ahead=num_steps is not None,
         )
         load_kernels(self._kernel.module)
 
     @classmethod
     def try_create(
-        cls, env: DroneEnv, actor: Any, keeps_inputs: bool, num_threads: int
+        cls,
+        env: DroneEnv,
+        actor: Any,
+        keeps_inputs: bool,
+        num_threads: int,
+        num_steps: int | None = None,
     ) -> Self | Reasons:
         """Return the kernel for an actor, or the reasons why it is not supported.
 
@@ -116,6 +128,7 @@ class FusedEpisodes:
             actor: The policy.
             keeps_inputs: Whether batches have what the actor reads and writes.
             num_threads: Threads of the kernel; no result depends on it.
+            num_steps: Of each environment in a batch, of `FusedRollouts`.
         """
         reasons = [*_not_fused(env), *_not_fused_policy(env, actor)]
         worlds = env.worlds
@@ -127,7 +140,7 @@ class FusedEpisodes:
         lines, view = Transforms(env.observer).visible, env.observer.image.view
         hidden = view.height - (lines.stop - lines.start)
         network = PackedNetwork(actor.network, lines.start * view.width, hidden * view.width)
-        return cls(env, actor, keeps_inputs, network, rules, num_threads)
+        return cls(env, actor, keeps_inputs, network, rules, num_threads, num_steps)
 
     def run(self, started: State) -> Entries | None:
         """Run episodes to their ends, from states of k environments at their starts.
@@ -137,13 +150,11 @@ class FusedEpisodes:
             `PAID` of several terms, the action, and what the actor reads and writes if it is
             kept, (T_total, *). None if actions are chosen otherwise than by sampling or greedily.
         """
-        if self._actor.exploration not in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC):
+        if not self.can_act:
             return None
-        load_kernels(self._kernel.module).result()
-        self._rules.begin(started)
-        self._look(started)
+        self._prepare(started)
+        self._transforms.begin(torch.arange(len(started)))
         self.activations.recording = None
-        self._network.pack()
         count, names = len(started), ["action", "reward", "end_reason"]
         if self._keeps_inputs:
             names += ["pixels", "logits"]
@@ -151,11 +162,15 @@ class FusedEpisodes:
         parts: list[tuple[Tensor, Tensor]] = []
         while not bool(end_reasons.all()):
             before, first = taken.clone(), len(parts) * self._num_rows
-            logits = self._launch(count, len(parts), names)
+            rollout, opened = self._open(count, len(parts), names)
+            self._launch(rollout, count)
+            if self._num_frames > 1:
+                last_rows = opened["pixels"][self._length - 1 :: self._length][:count]
+                self.last_observations[:count] = last_rows.flatten(1)
             is_step = torch.arange(self._length) < (taken - before)[:, None]
             envs, times = is_step.nonzero(as_tuple=True)
             rows = envs * self._length + times
-            require_finite(logits[rows], self._owner)
+            require_finite(opened["logits"][rows], self._owner)
             parts.append((envs, first + rows))
         envs, rows = (torch.cat(column) for column in zip(*parts, strict=True))
         order = envs.argsort(stable=True)
@@ -166,8 +181,7 @@ class FusedEpisodes:
             terms[PAID][envs.bincount().cumsum(0) - 1] = paid
         logged = self._buffer.read(rows, names)
         if self._keeps_inputs:
-            if self._visible != slice(0, self._env.observer.image.view.height):
-                logged["pixels"] = logged["pixels"][..., self._visible, :].contiguous()
+            logged["pixels"] = self._seen(logged["pixels"])
             self.activations.record(rows, self._network.weights, logged["pixels"])
         return {
             EPISODE: envs,
@@ -178,25 +192,45 @@ class FusedEpisodes:
             "action": logged["action"] if self._is_continuous else logged["action"].long(),
         }
 
+    @property
+    def can_act(self) -> bool:
+        """Whether actions are now chosen by sampling or greedily."""
+        return self._actor.exploration in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC)
+
+    def _prepare(self, state: State) -> None:
+        """Take the states of the first environments, their appearance and the weights."""
+        load_kernels(self._kernel.module).result()
+        self._rules.begin(state)
+        self._look(state)
+        self._network.pack()
+
+    def _seen(self, pixels: Tensor) -> Tensor:
+        """Return the rows of frames that the policy sees."""
+        if self._visible == slice(0, self._env.observer.image.view.height):
+            return pixels
+        return pixels[..., self._visible, :].contiguous()
+
     def _look(self, started: State) -> None:
-        """Encode the appearance and the poses of environments that start, and their shifts."""
+        """Encode the appearance and the poses of the first environments."""
         env, camera = self._env, self._camera
-        worlds, rows = env.worlds, torch.arange(len(started))
-        look = worlds.combine(env.appearances.current(rows))
+        worlds = env.worlds
+        look = worlds.combine(env.appearances.current(torch.arange(len(started))))
         raytracer: Any = worlds.renderer
         launch = raytracer.encode(env.observer.image.view, worlds.poses(started, look), look)
         camera.view, camera.geoms, camera.poses = launch.view, launch.geoms, launch.poses
         camera.materials, camera.has_effects = launch.materials, launch.effects is not None
         if launch.effects is not None:
             camera.effects = launch.effects
-        self._transforms.begin(rows)
 
     def close(self) -> None:
         """End the threads."""
         self._workers.close()
 
-    def _launch(self, num_envs: int, part: int, kept: Iterable[str]) -> Tensor:
-        """Run up to `_length` steps; return the logits. `kept` are kept beyond the next launch."""
+    def _open(self, num_envs: int, part: int, kept: Iterable[str]) -> tuple[Any, dict[str, Tensor]]:
+        """Return a launch of up to `_length` steps, and what it writes.
+
+        `kept` are kept beyond the next launch.
+        """
         greedy = 0.0 if self._is_continuous else -1.0  # the most probable action
         draws = torch.full((num_envs, self._length * self._num_draws), greedy)
         if self._actor.exploration == ExplorationType.RANDOM:
@@ -212,7 +246,8 @@ class FusedEpisodes:
         rollout.workspaces, rollout.draws = self._workspaces, wp.from_torch(draws)
         rollout.frames, rollout.num_frames = frames, self._num_frames
         rollout.observations = wp.from_torch(pixels.flatten(1))
-        rollout.last_observations = wp.from_torch(self._last_observations)
+        rollout.last_observations = wp.from_torch(self.last_observations)
+        rollout.begins = wp.zeros(num_envs, dtype=int, device="cpu")
         rollout.logits = wp.from_torch(opened["logits"])
         rollout.num_steps = self._length
         if self._is_continuous:
@@ -223,16 +258,16 @@ class FusedEpisodes:
         rollout.end_reasons = wp.from_torch(opened["end_reason"])
         first, last = part * self._num_rows, (part + 1) * self._num_rows
         rollout.outputs = wp.from_torch(self.activations.outputs[first:last])
+        return rollout, opened
+
+    def _launch(self, rollout: Any, num_envs: int) -> None:
+        """Run the kernel."""
 
         def run_span(member: int, first: int, last: int) -> None:
             inputs = [first, last, member, rollout, self._rules.arrays]
             wp.launch(self._kernel, 1, inputs=inputs, device="cpu")
 
         self._workers.map_spans(0, num_envs, run_span)
-        if len(self._last_observations):
-            last_rows = pixels[self._length - 1 :: self._length][:num_envs]
-            self._last_observations[:num_envs] = last_rows.flatten(1)
-        return opened["logits"]
 
 
 def _is_continuous(env: DroneEnv) -> bool:
@@ -290,9 +325,10 @@ class Transforms:
         shift: Any = self._by_type.get(Shift)
         for stage in self._pipeline.stages:
             if shift is not None and stage.model is shift.model:
-                stage(torch.zeros(len(rows), 1, 1, 1), rows, True)
+                if len(rows):
+                    stage(torch.zeros(len(rows), 1, 1, 1), rows, True)
                 assert stage.memory is not None
-                self._shifts[: len(rows)] = stage.memory[: len(rows)].int()
+                self._shifts[: len(stage.memory)] = stage.memory.int()
 
 
 def unfused_transforms(observer: Observer) -> list[str]:

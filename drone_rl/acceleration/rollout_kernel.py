@@ -59,13 +59,15 @@ class CameraView:
 
 @wp.struct
 class Rollout:
-    """Inputs and outputs of one launch; environment i writes rows i * steps + t."""
+    """Inputs and outputs of one launch; environment i writes rows i * num_steps + t."""
 
     camera: CameraView
     layers: Layers
     workspaces: wp.array2d[float]
     """Outputs of all layers for `TOGETHER` frames, one a worker."""
     num_steps: int
+    begins: wp.array[int]
+    """The first step t of each environment; `num_steps` to leave it as it is."""
     draws: wp.array2d[float]
     """Samples for actions, see `choose` and `squash`. Shape: (num_envs, steps * numbers)."""
     frames: Images
@@ -74,7 +76,10 @@ class Rollout:
     observations: wp.array2d[float]
     """The same memory, a row an observation."""
     last_observations: wp.array2d[float]
-    """Of each environment, before the first step of the launch."""
+    """Of each environment, before step 0."""
+    next_frames: Images
+    next_observations: wp.array2d[float]
+    """Observations after the last steps of episodes and of environments, if they are kept."""
     logits: wp.array2d[float]
     actions: wp.array[int]
     numbers: wp.array2d[float]
@@ -157,8 +162,18 @@ def develop_rgb(
 
 
 @wp.func
-def show_plain(rollout: Rollout, env: int, row: int, worker: int) -> None:
-    """Render gray without effects, and standardize: the newest frame of observation `row`."""
+def show_plain(
+    rollout: Rollout,
+    frames: Images,
+    observations: wp.array2d[float],
+    env: int,
+    row: int,
+    worker: int,
+) -> None:
+    """Render gray without effects, and standardize: the newest frame of observation `row`.
+
+    `frames` and `observations` are views of the same memory, see `Rollout`.
+    """
     camera = rollout.camera
     newest = (row + 1) * rollout.num_frames - 1
     render_image(
@@ -170,15 +185,22 @@ def show_plain(rollout: Rollout, env: int, row: int, worker: int) -> None:
         camera.materials,
         camera.scratch,
         worker,
-        rollout.frames,
+        frames,
         newest,
     )
-    frame = rollout.frames.gray[newest]
+    frame = frames.gray[newest]
     standardise(frame, frame.shape[0], camera.mean, camera.deviation)
 
 
 @wp.func
-def show_any(rollout: Rollout, env: int, row: int, worker: int) -> None:
+def show_any(
+    rollout: Rollout,
+    frames: Images,
+    observations: wp.array2d[float],
+    env: int,
+    row: int,
+    worker: int,
+) -> None:
     """Do the same with all effects, mountings and transforms."""
     camera = rollout.camera
     view = camera.view
@@ -210,7 +232,7 @@ def show_any(rollout: Rollout, env: int, row: int, worker: int) -> None:
             camera.rendered,
             worker,
         )
-    target = rollout.observations[row]
+    target = observations[row]
     first = (rollout.num_frames - 1) * camera.num_channels * view.height * view.width
     down = camera.shifts[env, 0]
     right = camera.shifts[env, 1]
@@ -314,7 +336,9 @@ def stack(rollout: Rollout, env: int, step: int, row: int, is_start: bool) -> No
 
 
 @functools.cache
-def make_kernel(states: Any, place: Any, move: Any, decide: Any, show: Any) -> Any:  # noqa: C901 (functions that Warp compiles)
+def make_kernel(  # noqa: C901 (functions that Warp compiles)
+    states: Any, place: Any, move: Any, decide: Any, show: Any, *, looks_ahead: bool = False
+) -> Any:
     """Return the kernel for the rules of a task; see `drone_rl.sim.tasks.fused.fused_rules`.
 
     Args:
@@ -323,7 +347,13 @@ def make_kernel(states: Any, place: Any, move: Any, decide: Any, show: Any) -> A
         move: Steps an environment: (states, env, action). Returns the reward.
         decide: `decide_move` or `decide_numbers`.
         show: `show_plain` or `show_any`.
+        looks_ahead: Whether to write `Rollout.next_observations`.
     """
+
+    @wp.func
+    def is_running(rollout: Rollout, envs: states, env: int, step: int) -> bool:
+        """Return whether an environment takes the launch's step number `step`."""
+        return envs.end_reasons[env] == 0 and rollout.begins[env] + step < rollout.num_steps
 
     @wp.func
     def observe(
@@ -332,16 +362,32 @@ def make_kernel(states: Any, place: Any, move: Any, decide: Any, show: Any) -> A
         """Render running environments, compute the convolutions; return how many are running."""
         running = int(0)
         for env in range(first, last):
-            if envs.end_reasons[env] == 0:
-                row = env * rollout.num_steps + step
+            if is_running(rollout, envs, env, step):
+                now = rollout.begins[env] + step
+                row = env * rollout.num_steps + now
                 place(envs, env, rollout.camera.poses)
-                show(rollout, env, row, worker)
+                show(rollout, rollout.frames, rollout.observations, env, row, worker)
                 if rollout.num_frames > 1:
-                    stack(rollout, env, step, row, envs.steps[env] == 0)
+                    stack(rollout, env, now, row, envs.steps[env] == 0)
                 seen = rollout.observations[row]
                 run_convolutions(rollout.layers, seen, rollout.workspaces[worker], running)
                 running += 1
         return running
+
+    @wp.func
+    def look_ahead(rollout: Rollout, env: int, row: int, worker: int, envs: states) -> None:
+        """Observe an environment after its last step."""
+        place(envs, env, rollout.camera.poses)
+        show(rollout, rollout.next_frames, rollout.next_observations, env, row, worker)
+        seen = rollout.next_observations[row]
+        size = seen.shape[0] // rollout.num_frames
+        copy(rollout.observations[row], size, seen, 0, seen.shape[0] - size)
+
+    @wp.func
+    def look_nowhere(rollout: Rollout, env: int, row: int, worker: int, envs: states) -> None:
+        return
+
+    conclude = look_ahead if looks_ahead else look_nowhere
 
     @wp.func
     def act(first: int, last: int, step: int, worker: int, rollout: Rollout, envs: states) -> None:
@@ -353,21 +399,24 @@ def make_kernel(states: Any, place: Any, move: Any, decide: Any, show: Any) -> A
         logits_offset = layers.output_offsets[layers.geometries.shape[0] - 1]
         running = int(0)
         for env in range(first, last):
-            if envs.end_reasons[env] == 0:
-                row = env * rollout.num_steps + step
+            if is_running(rollout, envs, env, step):
+                now = rollout.begins[env] + step
+                row = env * rollout.num_steps + now
                 at = running * size + logits_offset
                 for i in range(num_actions):
                     rollout.logits[row, i] = workspace[at + i]
-                action = decide(rollout, workspace, at, env, step, row)
+                action = decide(rollout, workspace, at, env, now, row)
                 rollout.rewards[row] = move(envs, env, action)
                 rollout.end_reasons[row] = envs.end_reasons[env]
                 if rollout.outputs.shape[0] > 0:
                     copy(workspace, running * size, rollout.outputs[row], 0, size)
+                if envs.end_reasons[env] != 0 or now + 1 == rollout.num_steps:
+                    conclude(rollout, env, row, worker, envs)
                 running += 1
 
     @wp.kernel(module="unique", module_options=_OPTIONS)
     def run_episodes(first: int, last: int, worker: int, rollout: Rollout, envs: states) -> None:
-        """Run environments `first` to `last` - 1 until their episodes or their random samples end.
+        """Run environments `first` to `last` - 1 until their episodes end, or all steps are taken.
 
         `worker` selects the buffers: launch with a dimension of 1.
         """
@@ -375,7 +424,7 @@ def make_kernel(states: Any, place: Any, move: Any, decide: Any, show: Any) -> A
             end = wp.min(group + TOGETHER, last)
             step = int(0)
             running = int(1)
-            while step < rollout.num_steps and running > 0:
+            while running > 0:
                 running = observe(group, end, step, worker, rollout, envs)
                 run_linear(rollout.layers, rollout.workspaces[worker], 0, running)
                 act(group, end, step, worker, rollout, envs)

@@ -13,6 +13,7 @@ from torch import nn
 from torchrl.collectors import BaseCollector
 from torchrl.envs import EnvBase
 
+from drone_rl.acceleration import FusedEpisodes, Reasons
 from drone_rl.acceleration.fused_episodes import PAID
 from drone_rl.envs import base_env
 from drone_rl.envs.drone_env import Entries
@@ -20,6 +21,11 @@ from drone_rl.envs.rollout import Agent, Step, as_agent
 from drone_rl.sim.tasks import ObjectState
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.threads import set_torch_threads
+
+
+def name_of(fused: FusedEpisodes | Reasons) -> str:
+    """Return how a collector runs episodes, for the log."""
+    return f"stepping collector: {fused}" if isinstance(fused, Reasons) else "fused collector"
 
 
 class BatchOptions(TypedDict, total=False):

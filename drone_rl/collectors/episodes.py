@@ -12,7 +12,7 @@ from torchrl.envs import EnvBase
 
 from drone_rl.acceleration import FusedEpisodes, Reasons
 from drone_rl.acceleration.fused_episodes import END_REASON, EPISODE, REWARD
-from drone_rl.collectors.collector import BatchedCollector, BatchOptions
+from drone_rl.collectors.collector import BatchedCollector, BatchOptions, name_of
 from drone_rl.envs.drone_env import Entries
 from drone_rl.envs.rollout import Act, Agent, StepContext, steps
 from drone_rl.sim.tasks import State
@@ -67,8 +67,7 @@ class EpisodeCollector(BatchedCollector):
     @property
     def name(self) -> str:
         """How episodes are run, for the log."""
-        is_stepped = isinstance(self.fused, Reasons)
-        return f"stepping collector: {self.fused}" if is_stepped else "fused collector"
+        return name_of(self.fused)
 
     @torch.no_grad()
     def collect(self, num_envs: int | None = None) -> TensorDictBase:

@@ -89,12 +89,16 @@ class Collector(Part):
         return {}
 
 
-class Episodes(Collector, target="episodes"):
-    """Batches of complete episodes from threads of this process."""
+class Compiled(Collector):
+    """Settings of collectors that have the fused kernel."""
 
     compiled: bool = True
     """Run whole episodes in one fused kernel if it supports task, camera and network, which is much
     faster on a CPU. It samples actions in a different order, so results for a seed depend on it."""
+
+
+class Episodes(Compiled, target="episodes"):
+    """Batches of complete episodes from threads of this process."""
 
 
 class Ray(Episodes, target="ray"):
@@ -111,7 +115,7 @@ class Ray(Episodes, target="ray"):
     """Workers that may be lost, and replaced, before training stops."""
 
 
-class Rollouts(Collector, target="rollouts"):
+class Rollouts(Compiled, target="rollouts"):
     """Batches of a fixed number of steps of each environment, from threads.
 
     The objective sets the number of steps. Episodes continue in the next batch.

@@ -268,24 +268,24 @@ class ImageSource:
     ) -> None:
         """Take the input's name, its worlds, what it is, and the random streams of its faults."""
         self.worlds, self.seen, self.faults = worlds, seen, Pipeline()
-        self._modality = "rgb"
+        self.modality = "rgb"
         self._to_rgb = RgbPixels()
         transforms, view = seen, worlds.policy_view
         if isinstance(seen, ImageInput):
             camera, (height, width) = seen.settings, seen.size
-            self._modality = seen.modality
+            self.modality = seen.modality
             transforms = [transform.make() for transform in seen.transforms]
             view = worlds.view(CAMERAS[seen.camera.name], seen.modality, height, width)
             view = dataclasses.replace(view, horizontal_fov=camera.horizontal_fov)
         assert not isinstance(transforms, ImageInput)
         self.transforms: tuple[Transform, ...] = tuple(t for t in transforms if is_of_pixels(t))
         first, rest, self.view = next(iter(self.transforms), None), self.transforms, view
-        self._has_bytes = self._modality == "rgb" and type(first) not in (GrayPixels, RgbPixels)
-        if self._modality == "rgb" and type(first) is GrayPixels:
+        self._has_bytes = self.modality == "rgb" and type(first) not in (GrayPixels, RgbPixels)
+        if self.modality == "rgb" and type(first) is GrayPixels:
             self.view = dataclasses.replace(view, modalities=("gray",))
             frame = torch.zeros(1, view.height, view.width, 3, dtype=torch.uint8)
             rest = without_identities(self.transforms, frame)[1:]
-        elif self._modality == "rgb" and type(first) is RgbPixels:
+        elif self.modality == "rgb" and type(first) is RgbPixels:
             rest = self.transforms[1:]
         self.pipeline = Pipeline(rest, streams, worlds.num_envs, key=key_of(name))
         """Transforms after gray or rgb, if those are the first."""
@@ -297,22 +297,27 @@ class ImageSource:
     ) -> Tensor:
         """See `Observer.observe`. Shape: (k, *)."""
         images = self.worlds.render(state, self.view, appearance)
-        if self._modality == "rgb":
+        if self.modality == "rgb":
             if self.view.modalities == ("gray",):
                 images = images[:, None]
             elif self.faults.stages or not self._has_bytes:
                 images = self._to_rgb._apply_transform(images)
-        elif isinstance(self.seen, ImageInput):
-            images = frames_of(self.seen, self._reading(images))
+        else:
+            images = self.measured(images)
         images = self.faults(images, rows, starts)
         if self.faults.stages and self._has_bytes:
             images = (images * 255).round().to(torch.uint8).movedim(-3, -1)
         self.last = images
         return self.pipeline(images, rows, starts)
 
-    def _reading(self, images: Tensor) -> Tensor:
+    def measured(self, images: Tensor) -> Tensor:
+        """Return rendered images as transforms take them: colors, or else (k, C, H, W)."""
+        readings = self._readings(images)
+        return frames_of(self.seen, readings) if isinstance(self.seen, ImageInput) else readings
+
+    def _readings(self, images: Tensor) -> Tensor:
         """Return rendered images as a camera's readings, see `drone_rl.envs.readings`."""
-        if self._modality != "segmentation":
+        if self.modality != "segmentation":
             return images
         kinds = [*self.worlds.scene.semantic_classes, SemanticClass.SKY]
         numbers = [_CLASS_CHANNELS[kind] for kind in kinds]
@@ -322,8 +327,8 @@ class ImageSource:
     def read(self, state: State, seen: Tensor, appearance: Appearance | None) -> Tensor:
         """Return what the camera gives in states, without errors; see `drone_rl.envs.readings`."""
         del seen
-        view = dataclasses.replace(self.view, modalities=(self._modality,))
-        return self._reading(self.worlds.render(state, view, appearance))
+        view = dataclasses.replace(self.view, modalities=(self.modality,))
+        return self._readings(self.worlds.render(state, view, appearance))
 
     def example(self) -> Tensor:
         """Return the input of one environment for images of zeros."""

@@ -31,6 +31,7 @@ from drone_rl.training.learners import (
     descend,
 )
 from drone_rl.training.train import Components, group_sizes, make_groups
+from drone_rl.utils.provenance import num_cores
 from drone_rl.utils.seeding import Stream, torch_generator
 
 ADVANTAGE, TARGET, ENTROPY = "advantage", "value_target", "entropy"
@@ -47,9 +48,15 @@ def rollout_collector(
     The learner's `estimate` is the collector's `postproc`, see `_actor_critic_learner`.
     """
     objective = settings.objective
-    assert isinstance(objective, WithCritic)
+    chosen = settings.collector
+    assert isinstance(objective, WithCritic) and isinstance(chosen, Rollouts)
     groups = make_groups(settings, group_sizes(settings), replay)
-    collectors = [RolloutCollector(env, actor, objective.num_steps) for env, actor in groups]
+    cores = max(1, num_cores() // len(groups))
+    steps, compiled = objective.num_steps, chosen.compiled
+    collectors = [
+        RolloutCollector(env, actor, steps, compiled=compiled, num_threads=cores)
+        for env, actor in groups
+    ]
     _log.info("%s", collectors[0].name)
     return Components.of(ThreadedCollector(collectors), groups)
 

@@ -157,7 +157,9 @@ def refused(trained, folder, state, message):
 @pytest.mark.parametrize("is_ours", [True, False])
 def test_advantages_equal_torchrls_gae(is_ours):
     """TorchRL evaluates every next observation as well; batches of its collector are accepted."""
-    made = make_collector(TINY.replace(collector=Rollouts(num_envs=5, num_threads=1)))
+    objective = TINY.objective.replace(num_steps=80)
+    collecting = {"collector": Rollouts(num_envs=5, num_threads=1), "objective": objective}
+    made = make_collector(TINY.replace(**collecting))
     learner, (ours,) = TINY.objective.make(TINY, made), made.collector.collectors
     torch.nn.init.normal_(learner.model.critic.module.weight)
     collector = Collector(
@@ -167,8 +169,6 @@ def test_advantages_equal_torchrls_gae(is_ours):
         total_frames=-1,
         auto_register_policy_transforms=False,
     )
-    if is_ours:
-        ours.num_steps = 80
     batch = ours.collect() if is_ours else next(iter(collector))
     assert batch["next", "terminated"].any() and batch["next", "truncated"].any()
     both = TensorDictSequential(learner.model.trunk, learner.model.critic)

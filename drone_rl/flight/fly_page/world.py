@@ -13,7 +13,6 @@ from drone_rl.config import DynamicsSettings
 from drone_rl.config.inputs import recorded_inputs
 from drone_rl.envs import Observer, base_env
 from drone_rl.envs.rollout import ActorAgent, StepContext
-from drone_rl.explanations.hooks import memory_in
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.policies.actor import Exploring
 from drone_rl.policies.policy import Policy
@@ -45,8 +44,8 @@ class Seen(NamedTuple):
     """Of each part of its actions."""
     action: Tensor
     """The action that it takes. Shape: (1,), then that of an action."""
-    memory: Tensor | None
-    """What a recurrent policy remembers, see `drone_rl.explanations.hooks`."""
+    rest: Tensor | None
+    """What else the policy reads, see `drone_rl.explanations.hooks`."""
 
     @property
     def frame(self) -> Tensor:
@@ -182,8 +181,8 @@ class World:
                 self._observer.load_state_dict(seen)
             context = StepContext(self._observer, self.worlds.state, self._every, starts)
             shares = probabilities(act := self._agent.act(context), self.actions)
-            memory, shares = memory_in(act.entries), tuple(shares.tolist())
-            self._seen = Seen(context.readings, context.inputs, shares, act.action, memory)
+            rest, shares = self.scenes.rest_of(act.entries), tuple(shares.tolist())
+            self._seen = Seen(context.readings, context.inputs, shares, act.action, rest)
         return self._seen
 
     def step(self, action: Tensor) -> float:

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.dynamics import (
+    BodyState,
     ComputerVision,
     Dynamics,
     FlightState,
@@ -33,6 +34,10 @@ def fused_rules(task: Task[Any], dynamics: Dynamics, state: State) -> "FusedObje
     ):
         return "flight among obstacles that events move is not fused"
     return FusedObjects(task, dynamics, state)
+
+
+_COUNTED = ("body", "steps", "end_reason")
+"""Fields of states that have arrays of their own."""
 
 
 class FusedObjects:
@@ -85,17 +90,29 @@ class FusedObjects:
         self._rules.check(state)
         return state.paid.float()
 
-    def begin(self, state: Any) -> None:
-        """Copy states at the start of episodes."""
-        count = len(state)
+    def begin(self, state: Any, rows: Tensor | None = None) -> None:
+        """Copy states of running episodes to environments, (k,), by default the first."""
+        where = slice(len(state)) if rows is None else rows
         for name, values in vars(self._state).items():
-            if name not in ("body", "steps", "end_reason"):
-                values[:count] = getattr(state, name)
-        self._drones[:count] = state.drone
-        self._attitudes[:count] = state.body.attitude
+            if name not in _COUNTED:
+                values[where] = getattr(state, name)
+        self._drones[where] = state.drone
+        self._attitudes[where] = state.body.attitude
         if isinstance(state.body, FlightState):
-            self._numbers[:count] = state.body.numbers
+            self._numbers[where] = state.body.numbers
         if len(self._centers):  # which rules leave where they are
-            self._centers[:count] = self._task.obstacles(state).centers
-        for values in (self.steps, self.end_reasons):
-            values[:count] = 0
+            self._centers[where] = self._task.obstacles(state).centers
+        self.steps[where] = state.steps.int()
+        self.end_reasons[where] = 0
+
+    def current(self) -> Any:
+        """Return the states of all environments; those of drones that don't fly have no speed."""
+        numbers, fields = self._numbers.clone(), vars(self._state)
+        body = (
+            FlightState(numbers)
+            if len(numbers)
+            else BodyState.at_rest(self._drones.clone(), self._attitudes.clone())
+        )
+        counts = {"steps": self.steps.long(), "end_reason": self.end_reasons.long()}
+        kept = {name: values.clone() for name, values in fields.items() if name not in _COUNTED}
+        return dataclasses.replace(self._state, body=body, **counts, **kept)

@@ -1,0 +1,77 @@
+"""Runs a fixed number of steps of each environment in the fused kernel."""
+
+from typing import Any
+
+import torch
+import warp as wp
+from torch import Tensor
+
+from drone_rl.acceleration.fused_episodes import END_REASON, PAID, REWARD, FusedEpisodes
+from drone_rl.envs.drone_env import Entries
+from drone_rl.policies.networks import require_finite
+from drone_rl.sim.rendering.raytrace.structs_kernel import Images
+from drone_rl.sim.tasks import State
+
+
+class FusedRollouts(FusedEpisodes):
+    """Run T steps of each of N environments; new episodes start where old ones end.
+
+    A launch stops in each environment at the end of its episode. New states are sampled in Python,
+    from the environments' random streams, and the next launch goes on from there.
+    """
+
+    def advance(self, state: State, starts: Tensor) -> tuple[Entries, State]:
+        """Step all environments.
+
+        Args:
+            state: Their states, in running episodes.
+            starts: Those whose episodes start, indices (k,).
+
+        Returns:
+            The entries of the steps, (N, T, *): `REWARD`, `END_REASON`, `PAID` of several terms,
+            "pixels", ("next", "pixels"), "logits" and the action; and the states after them.
+        """
+        env, rules, count, length = self._env, self._rules, len(state), self._length
+        self._prepare(state)
+        self._transforms.begin(starts)
+        rollout, opened = self._open(count, 0, ())
+        pixels = opened["pixels"]
+        after = torch.empty_like(pixels)
+        frames: Any = Images()
+        frames.gray = wp.from_torch(after.flatten(2).flatten(0, 1))
+        rollout.next_frames, rollout.next_observations = frames, wp.from_torch(after.flatten(1))
+        begins = torch.zeros(count, dtype=torch.int32)
+        rollout.begins = wp.from_torch(begins)
+        paid = torch.zeros(count, length, rules.paid(count).shape[1])
+        while bool((begins < length).any()):
+            before = rules.steps.clone()
+            self._launch(rollout, count)
+            begins += rules.steps - before
+            ended = (rules.end_reasons != 0).nonzero()[:, 0]
+            if len(ended):
+                paid[ended, begins[ended].long() - 1] = rules.paid(count)[ended]
+                rules.begin(env.start(ended), ended)
+                self._transforms.begin(ended)
+                if env.appearances.varies:
+                    self._look(env.worlds.state)
+                    rollout.camera = self._camera
+        require_finite(opened["logits"], self._owner)
+        by_env = {name: values.unflatten(0, (count, length)) for name, values in opened.items()}
+        end_reason, seen = by_env["end_reason"].long(), by_env["pixels"]
+        if self._num_frames > 1:
+            self.last_observations[:] = seen[:, -1].flatten(1)
+        after = after.unflatten(0, (count, length))
+        following = torch.cat([seen[:, 1:], after[:, -1:]], 1)
+        following[end_reason != 0] = after[end_reason != 0]
+        action = by_env["action"]
+        entries: Entries = {
+            REWARD: by_env["reward"].clone(),
+            END_REASON: end_reason,
+            "pixels": self._seen(seen).clone(),
+            ("next", "pixels"): self._seen(following),
+            "logits": by_env["logits"].clone(),
+            "action": action.clone() if self._is_continuous else action.long(),
+        }
+        if paid.shape[-1] > 1:
+            entries[PAID] = paid
+        return entries, rules.current()
