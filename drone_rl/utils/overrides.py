@@ -37,6 +37,8 @@ _TAKEN_OVER = (
     rf"inputs=\[{_NAME}(, ?{_NAME})*\]",
     rf"\+{{0,2}}inputs@inputs\.{_NAME}={_NAME}",
     rf"~transforms\.{_NAME}",
+    rf"inputs=\[({_NAME}(, ?{_NAME})*)?\]",
+    rf"\+{{0,2}}inputs@inputs\.{_NAME}={_NAME}",
     rf"collector\.(num_envs|num_threads|num_cpus|max_lost_workers|compiled)={_SCALAR}",
 )
 """Overrides that a resumed run takes from the file: choices by name and plain values."""
