@@ -4,6 +4,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from drone_rl.config import ActionSettings, CameraSettings, DynamicsSettings
 from drone_rl.config.camera import DeviceSettings, RendererSettings
+from drone_rl.config.inputs import Inputs
 from drone_rl.config.parts import Parts
 from drone_rl.config.transforms import MOST_TRANSFORMS, Transform
 from drone_rl.config.values import Fraction, NumEnvs, NumEpisodes, OpenFraction, Seed
@@ -139,6 +140,8 @@ class GymnasiumSettings(DeviceSettings):
     """Camera of the policy."""
     transforms: Annotated[tuple[Transform, ...], Parts(Transform, MOST_TRANSFORMS)] = ()
     """From the camera's image to the observation; by default it stays as it is."""
+    inputs: Inputs | None = None
+    """Inputs by name, instead of camera and transforms: observations are a dictionary of them."""
     dynamics: DynamicsSettings = DynamicsSettings()
     """Vehicle dynamics."""
     actions: ActionSettings = ActionSettings()

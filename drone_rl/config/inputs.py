@@ -10,11 +10,12 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import pydantic
-from annotated_types import MaxLen, MinLen
+from annotated_types import MaxLen
 
 from drone_rl.config.camera import CameraSettings
 from drone_rl.config.parts import Part, Parts
 from drone_rl.config.transforms import (
+    DEFAULT_TRANSFORMS,
     MOST_TRANSFORMS,
     Bias,
     Fault,
@@ -122,6 +123,10 @@ class ImageInput(Model):
             else Frame((channels, *self.size), True)
         )
 
+    def reading(self) -> Self:
+        """Return what the camera gives, without what is done with it."""
+        return self.replace(transforms=(), maximum=None if self.maximum is None else 1.0)
+
     def without_errors(self) -> Self:
         """Return the same without camera faults."""
         return self.replace(
@@ -159,6 +164,10 @@ class VectorInput(Model):
     def size(self) -> int:
         """Number of its numbers."""
         return SIZES[self.quantity]
+
+    def reading(self) -> Self:
+        """Return what the sensor gives, without what is done with it."""
+        return self.without_errors().replace(scale=1.0)
 
     def without_errors(self) -> Self:
         """Return the same without noise, bias, delay and loss."""
@@ -355,6 +364,7 @@ class LastAction(Vector, target="last_action"):
 
 def _named(inputs: Any) -> Any:
     """Return inputs by name, given a list of variants: an input is called as its variant."""
+    inputs = [inputs] if isinstance(inputs, str) else inputs
     if not isinstance(inputs, list | tuple):
         return inputs
     names = [getattr(one, "name", one) for one in inputs]
@@ -367,6 +377,8 @@ def _named(inputs: Any) -> Any:
 
 
 def _check_names(inputs: dict[str, Input]) -> dict[str, Input]:
+    if not inputs:
+        raise InputError("the policy would see nothing; give inputs, such as inputs=[gray]")
     for name in inputs:
         if not re.fullmatch("[a-z][a-z0-9_]*", name) or name in RESERVED:
             raise InputError(
@@ -379,7 +391,7 @@ def _check_names(inputs: dict[str, Input]) -> dict[str, Input]:
 RESERVED = {
     *("action", "reward", "done", "terminated", "truncated", "info", "next", "collector", "logits"),
     *("features", "vectors", "is_init", "step_count", "episode_reward", "state_value", "advantage"),
-    *("value_target", "entropy"),
+    *("value_target", "entropy", "probabilities"),
 }
 """Names of other entries of a batch."""
 
@@ -396,22 +408,45 @@ class InputsByName(Annotation):
         return Annotated[
             dict[Annotated[str, Text(40)], self.of],
             pydantic.BeforeValidator(_named),
-            MinLen(1),
             MaxLen(MOST_INPUTS),
             pydantic.AfterValidator(_check_names),
         ]
 
 
 Inputs = Annotated[Mapping[str, Input], InputsByName()]
+_CAMERA = CameraSettings()
 DEFAULT_INPUTS: dict[str, Input] = {PIXELS: CameraPixels()}
 
 
 def describe_inputs(
-    inputs: Mapping[str, Input], camera: CameraSettings, transforms: Sequence[Transform]
-) -> dict[str, Any]:
+    inputs: Mapping[str, Input],
+    camera: CameraSettings = _CAMERA,
+    transforms: Sequence[Transform] = DEFAULT_TRANSFORMS,
+) -> dict[str, ImageInput | VectorInput]:
     """Return the description of each input; an `InputError` names one that is invalid."""
     made = {}
     for name, settings in inputs.items():
         with prefixed_errors(f"inputs.{name}"):
             made[name] = settings.described(camera, transforms)
     return made
+
+
+def is_plain(inputs: Mapping[str, ImageInput | VectorInput]) -> bool:
+    """Return whether the only input is the image that `camera` and `transforms` describe."""
+    seen = inputs.get(PIXELS)
+    if len(inputs) > 1 or not isinstance(seen, ImageInput):
+        return False
+    return (seen.modality, seen.camera.name) == ("rgb", "front")
+
+
+def recorded_inputs(
+    inputs: Mapping[str, ImageInput | VectorInput],
+) -> dict[str, ImageInput | VectorInput]:
+    """Return what demonstrations for a policy record by name; nothing for the plain image."""
+    return {} if is_plain(inputs) else {name: seen.reading() for name, seen in inputs.items()}
+
+
+def first_camera(inputs: Mapping[str, ImageInput | VectorInput]) -> CameraSettings:
+    """Return the camera of the first image; the default one without images."""
+    images = (seen.settings for seen in inputs.values() if isinstance(seen, ImageInput))
+    return next(images, _CAMERA)

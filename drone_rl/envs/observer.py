@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 from torchrl.envs import CatFrames, Transform
 
-from drone_rl.config.inputs import CAMERAS, PIXELS, ImageInput, VectorInput
+from drone_rl.config.inputs import CAMERAS, CLASSES, PIXELS, ImageInput, VectorInput
 from drone_rl.envs.camera_faults import CameraFault
 from drone_rl.envs.fault_models import FaultModel, Sample, stacked_frames
 from drone_rl.envs.transforms import GrayPixels, RgbPixels, is_of_pixels, without_identities
@@ -235,6 +235,19 @@ _CLASS_CHANNELS = {
 """See `drone_rl.config.inputs.CLASSES`."""
 
 
+def frames_of(seen: ImageInput, readings: Tensor) -> Tensor:
+    """Return a camera's readings, see `drone_rl.envs.readings`, as the first transform's input."""
+    if seen.modality == "depth":
+        assert seen.maximum is not None
+        far = torch.where(readings == 0, seen.maximum, readings)
+        return (far / seen.maximum).clamp(max=1.0)[:, None]
+    if seen.modality == "segmentation":
+        return torch.stack([readings == i for i in range(len(CLASSES))], 1).float()
+    if seen.modality == "normals":
+        return ((readings + 1.0) / 2.0).movedim(-1, -3).contiguous()
+    return readings
+
+
 def key_of(name: str) -> tuple[int, ...]:
     """Return the key of the random streams of an input."""
     return () if name == PIXELS else (zlib.crc32(name.encode()),)
@@ -255,24 +268,24 @@ class ImageSource:
     ) -> None:
         """Take the input's name, its worlds, what it is, and the random streams of its faults."""
         self.worlds, self.seen, self.faults = worlds, seen, Pipeline()
-        self._modality, self._maximum = "rgb", 1.0
+        self.modality = "rgb"
         self._to_rgb = RgbPixels()
         transforms, view = seen, worlds.policy_view
         if isinstance(seen, ImageInput):
             camera, (height, width) = seen.settings, seen.size
-            self._modality, self._maximum = seen.modality, seen.maximum or 1.0
+            self.modality = seen.modality
             transforms = [transform.make() for transform in seen.transforms]
             view = worlds.view(CAMERAS[seen.camera.name], seen.modality, height, width)
             view = dataclasses.replace(view, horizontal_fov=camera.horizontal_fov)
         assert not isinstance(transforms, ImageInput)
         self.transforms: tuple[Transform, ...] = tuple(t for t in transforms if is_of_pixels(t))
         first, rest, self.view = next(iter(self.transforms), None), self.transforms, view
-        self._has_bytes = self._modality == "rgb" and type(first) not in (GrayPixels, RgbPixels)
-        if self._modality == "rgb" and type(first) is GrayPixels:
+        self._has_bytes = self.modality == "rgb" and type(first) not in (GrayPixels, RgbPixels)
+        if self.modality == "rgb" and type(first) is GrayPixels:
             self.view = dataclasses.replace(view, modalities=("gray",))
             frame = torch.zeros(1, view.height, view.width, 3, dtype=torch.uint8)
             rest = without_identities(self.transforms, frame)[1:]
-        elif self._modality == "rgb" and type(first) is RgbPixels:
+        elif self.modality == "rgb" and type(first) is RgbPixels:
             rest = self.transforms[1:]
         self.pipeline = Pipeline(rest, streams, worlds.num_envs, key=key_of(name))
         """Transforms after gray or rgb, if those are the first."""
@@ -284,30 +297,38 @@ class ImageSource:
     ) -> Tensor:
         """See `Observer.observe`. Shape: (k, *)."""
         images = self.worlds.render(state, self.view, appearance)
-        if self._modality == "rgb":
+        if self.modality == "rgb":
             if self.view.modalities == ("gray",):
                 images = images[:, None]
             elif self.faults.stages or not self._has_bytes:
                 images = self._to_rgb._apply_transform(images)
         else:
-            images = self._measured(images)
+            images = self.measured(images)
         images = self.faults(images, rows, starts)
         if self.faults.stages and self._has_bytes:
             images = (images * 255).round().to(torch.uint8).movedim(-3, -1)
         self.last = images
         return self.pipeline(images, rows, starts)
 
-    def _measured(self, images: Tensor) -> Tensor:
-        """Return rendered images of other modalities than colors as floats. Shape: (k, C, H, W)."""
-        if self._modality == "depth":  # 0 where nothing is hit
-            far = torch.where(images == 0, self._maximum, images)
-            return (far / self._maximum).clamp(max=1.0)[:, None]
-        if self._modality == "normals":
-            return ((images + 1.0) / 2.0).movedim(-1, -3).contiguous()
+    def measured(self, images: Tensor) -> Tensor:
+        """Return rendered images as transforms take them: colors, or else (k, C, H, W)."""
+        readings = self._readings(images)
+        return frames_of(self.seen, readings) if isinstance(self.seen, ImageInput) else readings
+
+    def _readings(self, images: Tensor) -> Tensor:
+        """Return rendered images as a camera's readings, see `drone_rl.envs.readings`."""
+        if self.modality != "segmentation":
+            return images
         kinds = [*self.worlds.scene.semantic_classes, SemanticClass.SKY]
-        channels = torch.tensor([_CLASS_CHANNELS[kind] for kind in kinds], device=images.device)
-        of = channels[images.long()]  # -1, the sky, is the last one
-        return torch.stack([of == i for i in range(5)], 1).float()
+        numbers = [_CLASS_CHANNELS[kind] for kind in kinds]
+        numbers = torch.tensor(numbers, dtype=torch.uint8, device=images.device)
+        return numbers[images.long()]  # -1, the sky, is the last one
+
+    def read(self, state: State, seen: Tensor, appearance: Appearance | None) -> Tensor:
+        """Return what the camera gives in states, without errors; see `drone_rl.envs.readings`."""
+        del seen
+        view = dataclasses.replace(self.view, modalities=(self.modality,))
+        return self._readings(self.worlds.render(state, view, appearance))
 
     def example(self) -> Tensor:
         """Return the input of one environment for images of zeros."""
@@ -349,6 +370,11 @@ class VectorSource:
         values = measure(self.seen.quantity, self.worlds, state)[..., None, None]
         self.last = self.faults(values, rows, starts)
         return self.pipeline(self.last, rows, starts)[..., 0, 0] / self.seen.scale
+
+    def read(self, state: State, seen: Tensor, appearance: Appearance | None) -> Tensor:
+        """Return what the sensor gave, as it was observed. Shape: (k, n)."""
+        del state, appearance
+        return seen * self.seen.scale
 
     def example(self) -> Tensor:
         """Return zeros. Shape: (1, n)."""

@@ -47,6 +47,12 @@ class StepContext:
         """The inputs of policies, by name."""
         return self.observer.observe(self.state, self.rows, self.starts, self.appearance)
 
+    @functools.cached_property
+    def readings(self) -> dict[str, Tensor]:
+        """What sensors and, without errors, cameras give; see `drone_rl.envs.readings`."""
+        sources, look = self.observer.sources, self.appearance
+        return {name: s.read(self.state, self.inputs[name], look) for name, s in sources.items()}
+
     def part(self, which: Tensor, inputs: Mapping[str, Tensor] | None = None) -> "StepContext":
         """Return the context of some of these environments, by their position, (j,).
 
@@ -257,18 +263,28 @@ class DelayedAgent:
 class Recording:
     """An agent whose acts have the inputs and ground truth among their entries, too."""
 
-    def __init__(self, agent: Agent, info: Iterable[str] = (), *, states: bool = False) -> None:
+    def __init__(
+        self,
+        agent: Agent,
+        info: Iterable[str] = (),
+        *,
+        states: bool = False,
+        readings: bool = False,
+    ) -> None:
         """Take the agent and the names of the ground truth; see `Worlds.entries`.
+
+        With `readings`, what cameras and sensors give is recorded instead of the inputs.
 
         With `states`, the fields of the environments' states are recorded, too, such as
         ("state", "body/position").
         """
         self._agent, self._info, self._states = agent, tuple(info), states
+        self._seen = "readings" if readings else "inputs"
 
     def act(self, context: StepContext) -> Act:
         """See `Agent`."""
         act = self._agent.act(context)
-        entries = {**act.entries, **context.inputs}
+        entries = {**act.entries, **getattr(context, self._seen)}
         entries |= {("info", name): context.info[name] for name in self._info}
         if self._states:
             state = TensorDict(context.state.tensors(), [len(context.rows)]).flatten_keys("/")

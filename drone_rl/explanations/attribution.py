@@ -8,7 +8,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.explanations.context import FILMED, Context
+from drone_rl.explanations.context import FILMED, Context, image, needs
 from drone_rl.explanations.results import Attribution, KeyStep
 from drone_rl.explanations.rollouts import RolloutDataset
 from drone_rl.sim.tasks import Task
@@ -19,11 +19,12 @@ INSTEAD = ("saliency", "occlusion")  # without Grad-CAM, the first one that the 
 COUNT = 6  # key frames of an episode, as in Figs. 13 to 15.
 
 
+@needs(image)
 def section(context: Context) -> Attribution:
     """Compute the heat maps of the film."""
     flights, explainer, film = context.flights, context.explainer, context.film
     first = int(np.flatnonzero(flights.episode == FILMED)[0])
-    inputs = film.tensor("observations"), film.tensor("actions"), film.memory
+    inputs = film.tensor("observations"), film.tensor("actions"), film.rest
     maps = {n: context.scenes.to_frame(of(*inputs)) for n, of in explainer.methods().items()}
     methods = shown_methods(maps)
     frames = key_frames(flights, FILMED, context.scenes.task, len(film))

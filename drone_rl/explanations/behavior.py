@@ -1,5 +1,8 @@
 """Sections "verdict", "shifts" (robustness), "dataset" (rollout statistics) and "flaws"."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
@@ -64,12 +67,13 @@ def without_excuse(context: Context) -> str | None:
 def flaws_section(context: Context) -> Flaws:
     """Find contradictions (Fig. 9) of the analysed frames, and loops of whole episodes."""
     data, flights, scenes = context.dataset, context.flights, context.scenes
-    alike = median_frame_change(flights)
+    alike = median_change(flights.observations, flights.episode)
     loops = find_loops(flights, scenes.actions)
     looping = len({int(flights.episode[loop.first]) for loop in loops})
     offset = data.offset(scenes.worlds) * (np.nan if context.remembers else 1.0)
+    others = {n: median_change(of.numpy(), flights.episode) for n, of in flights.others.items()}
     return Flaws(
-        pairs=tuple(find_pairs(data, alike, scenes.actions, offset)),
+        pairs=tuple(find_pairs(data, alike, scenes.actions, offset, others)),
         alike_metres=ALIKE_METRES,
         loops=tuple(loops),
         looping_steps=sum(loop.length for loop in loops) / len(flights),
@@ -77,33 +81,39 @@ def flaws_section(context: Context) -> Flaws:
     )
 
 
-def median_frame_change(flights: RolloutDataset) -> float:
-    """Return the median root mean square difference of successive observations.
+def median_change(seen: NDArray, episode: NDArray) -> float:
+    """Return the median root mean square difference of successive values of an input.
 
-    Observations that differ by no more count as similar.
+    Those that differ by no more count as similar. Shapes: (T, *) and (T,).
     """
-    seen = flights.observations
-    follows = np.flatnonzero(flights.episode[1:] == flights.episode[:-1])
+    follows = np.flatnonzero(episode[1:] == episode[:-1])
     changes = [float(np.sqrt(np.mean((seen[t + 1] - seen[t]) ** 2))) for t in follows]
     return float(np.median(changes or [0.0]))
 
 
 def find_pairs(
-    dataset: RolloutDataset, alike: float, actions: Actions, offset: NDArray
+    dataset: RolloutDataset,
+    alike: float,
+    actions: Actions,
+    offset: NDArray,
+    others: Mapping[str, float] = MappingProxyType({}),
 ) -> list[Pair]:
     """Find similar frames with opposite actions, most opposed first; a frame is in one pair only.
 
-    Observations are similar up to a root mean square difference of `alike`. `offset` has the metres
-    ahead and to the left of the next target, NaN without one. Shape: (T, 2).
+    Observations are similar up to a root mean square difference of `alike`, and other inputs up to
+    that in `others`. `offset` has the metres ahead and to the left of the next target, NaN without
+    one. Shape: (T, 2).
     """
-    flat = dataset.observations.reshape(len(dataset), -1).astype(np.float64)
     probs = dataset.probabilities
     every = []
-    for start in range(0, len(flat), 500):
+    for start in range(0, len(dataset), 500):
         rows = slice(start, start + 500)
-        distance = cdist(flat[rows], flat) / np.sqrt(flat.shape[1])
+        distance = _differences(dataset.observations, rows)
         swing = actions.opposition(probs[rows, None], probs[None])
-        for i, j in zip(*np.nonzero((distance <= alike) & (swing >= MIN_OPPOSITION)), strict=True):
+        is_pair = (distance <= alike) & (swing >= MIN_OPPOSITION)
+        for name, limit in others.items():
+            is_pair &= _differences(dataset.others[name].numpy(), rows) <= limit
+        for i, j in zip(*np.nonzero(is_pair), strict=True):
             every.append((-float(swing[i, j]), float(distance[i, j]), start + int(i), int(j)))
     used: set[int] = set()
     pairs = []
@@ -118,6 +128,12 @@ def find_pairs(
             Pair(left=left, right=right, distance=distance, opposition=-negative, kind=kind)
         )
     return pairs
+
+
+def _differences(seen: NDArray, rows: slice) -> NDArray:
+    """Return root mean square differences of some inputs to all. Shape: (T, *) to (N, T)."""
+    flat = seen.reshape(len(seen), -1).astype(np.float64)
+    return cdist(flat[rows], flat) / np.sqrt(flat.shape[1])
 
 
 def find_loops(flights: RolloutDataset, actions: Actions) -> list[Loop]:

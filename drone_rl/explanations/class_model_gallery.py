@@ -11,6 +11,7 @@ from PIL import Image
 
 from drone_rl.config.configuration import from_arguments
 from drone_rl.explanations.class_models import NO_GRADIENTS, best_models, image_statistics
+from drone_rl.explanations.hooks import of_input, rest_in
 from drone_rl.explanations.results import BestModels, ImageStatistics
 from drone_rl.explanations.rollouts import collect
 from drone_rl.explanations.scenes import Scenes
@@ -168,12 +169,18 @@ def class_models(
     steps = len(tried) + 1
     progress(f"{settings.episodes} episodes", 0, steps)
     with subject.flying(min(settings.episodes, _BATCH), seed=seed.value) as (env, actor):
-        seen = collect(env, actor, num_episodes=settings.episodes).tensor("observations")
-        channels = Scenes(env).channels
-    statistics = image_statistics(seen)
+        scenes = Scenes(env, settings.image)
+        if scenes.image is None:
+            raise InputError(f"class models are images, and {scenes.name} is none; see image")
+        network = of_input(network, scenes.name)
+        data = collect(env, actor, num_episodes=settings.episodes, observations=scenes.name)
+    statistics = image_statistics(data.tensor("observations"))
     found = {}
     for number, (title, one) in enumerate(tried.items(), start=1):
         progress(title, number, steps)
-        found[title] = one, best_models(network, statistics, [one], seed=seed.value)
+        found[title] = (
+            one,
+            best_models(network, statistics, [one], seed=seed.value, rest=rest_in(data.others)),
+        )
     progress("optimized", steps, steps)
-    return ClassModels(subject, found, statistics, network.actions.shown, channels, seed)
+    return ClassModels(subject, found, statistics, network.actions.shown, scenes.channels, seed)

@@ -10,7 +10,8 @@ from torch import Tensor
 from torch.nn import functional
 
 from drone_rl.acceleration import with_fused_passes
-from drone_rl.explanations.context import Context, needs
+from drone_rl.explanations.context import Context, image, needs
+from drone_rl.explanations.hooks import evaluate, rest_in
 from drone_rl.explanations.results import BestModels, ClassModel, ImageStatistics
 from drone_rl.explanations.settings import ClassModelSettings
 from drone_rl.policies import ImageNetwork
@@ -29,10 +30,11 @@ def gradients(context: Context) -> str | None:
     return None if context.network.is_differentiable else NO_GRADIENTS
 
 
-@needs(gradients)
+@needs(gradients, image)
 def section(context: Context) -> ClassModel:
     """Search the best observation of each action, by probability and by logit."""
-    statistics = image_statistics(context.dataset.tensor("observations"))
+    data = context.dataset
+    statistics, rest = image_statistics(data.tensor("observations")), rest_in(data.others)
     network = copy.deepcopy(context.network)  # it accumulates gradients
 
     def best(objective: str) -> BestModels:
@@ -40,7 +42,7 @@ def section(context: Context) -> ClassModel:
             ClassModelSettings(maximize=objective, parameterisation=kind, blur=blur)
             for kind, blur in itertools.product(("pixel", "fourier"), (0.5, 0.9, 1.4))
         ]
-        return best_models(network, statistics, tried, seed=context.seed.value)
+        return best_models(network, statistics, tried, seed=context.seed.value, rest=rest)
 
     return ClassModel(
         statistics=statistics,
@@ -56,12 +58,21 @@ def best_models(
     tried: Sequence[ClassModelSettings],
     *,
     seed: int = 0,
+    rest: Tensor | None = None,
 ) -> BestModels:
-    """Optimize observations for each action with each of the settings; return the best."""
-    images = torch.cat([optimize(network, statistics, one, seed=seed) for one in tried], 1)
+    """Optimize observations for each action with each of the settings; return the best.
+
+    Each start has the other inputs of one of the frames in `rest`, see `hooks`, evenly spread.
+    """
+    made = [optimize(network, statistics, one, seed=seed, rest=rest) for one in tried]
+    images = torch.cat(made, 1)
     actions, flat = range(len(images)), images.flatten(0, 1)
+    if rest is not None:
+        spread = torch.cat([_spread(rest, one.starts) for one in tried])
+        rest = spread.repeat(len(images), 1)
     with torch.no_grad():
-        every = network.actions.probabilities(network(flat)).unflatten(0, images.shape[:2])
+        outputs = evaluate(network, flat, rest)
+        every = network.actions.probabilities(outputs).unflatten(0, images.shape[:2])
     probabilities = torch.stack([every[action, :, action] for action in actions])
     best = most_probable(probabilities, _differences(flat).view_as(probabilities))
     return BestModels(
@@ -98,8 +109,11 @@ def optimize(
     settings: ClassModelSettings,
     *,
     seed: int = 0,
+    rest: Tensor | None = None,
 ) -> Tensor:
     """Optimize observations for each action from random starts; the network is not changed.
+
+    For `rest` see `best_models`.
 
     Returns:
         Shape: (num_actions, starts, C, h, w).
@@ -111,12 +125,19 @@ def optimize(
         start = torch.full_like(start, statistics.mean)
     action = torch.arange(num_actions).repeat_interleave(settings.starts)
     quick = with_fused_passes(network, wrt="pixels")
-    ascent = _Ascent(quick, action, statistics, settings, generator)
+    if rest is not None:
+        rest = _spread(rest, settings.starts).repeat(num_actions, 1)
+    ascent = _Ascent(quick, action, statistics, settings, generator, rest)
     climb = ascent.pixels if settings.parameterisation == "pixel" else ascent.fourier
     reached = climb(start.repeat(num_actions, 1, 1, 1))
     if not bool(reached.isfinite().all()):
         raise InputError(f"with lr={settings.lr:g} the images diverge; give less, or clamp=true")
     return reached.unflatten(0, (num_actions, settings.starts))
+
+
+def _spread(rest: Tensor, count: int) -> Tensor:
+    """Return `count` rows, evenly spread. Shape: (count, R)."""
+    return rest[torch.linspace(0, len(rest) - 1, count).long()]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,10 +149,12 @@ class _Ascent:
     statistics: ImageStatistics
     settings: ClassModelSettings
     generator: torch.Generator
+    rest: Tensor | None = None
 
     def value(self, images: Tensor) -> Tensor:
         """Return the quantity to maximize, on images shifted at random. Shape: (N,)."""
-        actions, outputs = self.network.actions, self.network(self.jitter(images))
+        outputs = evaluate(self.network, self.jitter(images), self.rest)
+        actions = self.network.actions
         if self.settings.maximize == "probability":
             scores = actions.probabilities(outputs)
         else:

@@ -12,7 +12,7 @@ from torchrl.envs import EnvBase
 
 from drone_rl.envs import base_env
 from drone_rl.explanations.heat_maps import Explainer
-from drone_rl.explanations.hooks import feature_layer, features
+from drone_rl.explanations.hooks import feature_layer, find_layer, of_input, spatial_layers
 from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frames, select_frames
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.explanations.settings import ExplainSettings
@@ -50,24 +50,32 @@ class Context:
         measured: SavedShifts | None = None,
         unlike: Mapping[str, Any] | None = None,
         seed: RootSeed | None = None,
+        observations: str | None = None,
     ) -> None:
         """Prepare the analysis of a policy; raise InputError if a setting does not fit it.
 
         The environments are held out, have not been stepped, and have the policy's transforms; the
         network is on the CPU. The verdict quotes `claim`, `measured` and `unlike`. The seed is the
-        settings' by default.
+        settings' by default. `observations` names the input that is explained, by default the first
+        image, if any; the others keep each frame's own values.
         """
-        self.env, self.network, self.claim = env, network, claim
+        self.scenes = Scenes(env, observations)
+        self.env, self.claim = env, claim
+        self.network: ImageNetwork = of_input(network, self.scenes.name)
+        """The policy as a function of its observations."""
         self.remembers = network.is_recurrent
         """Whether the policy remembers earlier frames."""
         self.settings, self.seed = with_seed(settings, seed)
         self.measured, self.unlike = measured, unlike
-        self.scenes = Scenes(env)
-        self.layer = settings.layer or feature_layer(network)
+        self.layer = settings.layer or feature_layer(self.network)
         """Layer whose features are embedded; None if the policy's layers are unknown."""
-        self.explainer = Explainer(network, self.scenes.absent, settings.grad_cam_layer)
+        layer = settings.grad_cam_layer
+        views = [of_input(network, name) for name in self.scenes.others]
+        if layer is not None and any(layer in spatial_layers(view) for view in views):
+            layer = None  # it is one of another image
+        self.explainer = Explainer(self.network, self.scenes.absent, layer)
         if self.layer is not None:
-            features(network, self.scenes.absent[None], self.layer)  # refuse an unknown layer now
+            find_layer(self.network, self.layer)  # refuse an unknown layer now
         self._start = base_env(env).state_dict()
 
     def restart(self) -> TensorDictModuleBase:
@@ -96,6 +104,7 @@ class Context:
             self.restart(),
             num_episodes=self.settings.data_episodes,
             num_frames=self.settings.frames,
+            observations=self.scenes.name,
         )
 
     @functools.cached_property
@@ -108,8 +117,8 @@ class Context:
     @functools.cached_property
     def film(self) -> RolloutDataset:
         """The steps of the episode shown as a film, as many as a report shows."""
-        camera = self.scenes.worlds.camera
-        most = min(FILM_STEPS, FILM_BYTES // (3 * camera.height * camera.width))
+        view = self.scenes.view
+        most = min(FILM_STEPS, FILM_BYTES // (3 * view.height * view.width))
         rows = np.flatnonzero(self.flights.episode == FILMED)[:most]
         return render_frames(self.flights, rows, self.scenes, self.network)
 
@@ -129,10 +138,15 @@ def find_lacking(sections: Mapping[str, Any], context: Context) -> dict[str, str
     lacking: dict[str, str] = {}
     for title, section in sections.items():
         for part, need in getattr(section, "needs", ()):
-            why = need(context)
-            if why and title not in lacking:
+            if title not in lacking and (why := need(context)):
                 lacking[part or title] = why
     return lacking
+
+
+def image(context: Context) -> str | None:
+    """Need an image among the policy's inputs."""
+    scenes = context.scenes
+    return None if scenes.image else f"The policy sees no image, only {scenes.seen}."
 
 
 def objects(context: Context) -> str | None:

@@ -7,7 +7,7 @@ import openTSNE
 from numpy.typing import NDArray
 from sklearn.decomposition import PCA
 
-from drone_rl.explanations.context import Context, needs
+from drone_rl.explanations.context import Context, image, needs
 from drone_rl.explanations.results import Embedding, Faithfulness, Tsne
 from drone_rl.explanations.settings import check_perplexity
 from drone_rl.utils.errors import InputError
@@ -33,7 +33,7 @@ def layers(context: Context) -> str | None:
     )
 
 
-@needs(layers)
+@needs(layers, image)
 def section(context: Context) -> Tsne:
     """Embed the analysed frames by the policy's features, and by their pixels."""
     layer = context.layer

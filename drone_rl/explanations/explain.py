@@ -11,7 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from drone_rl.config.configuration import from_arguments
-from drone_rl.explanations import attribution, behavior, class_models, embedding, response, truth
+from drone_rl.envs import base_env
+from drone_rl.explanations import (
+    attribution,
+    behavior,
+    class_models,
+    embedding,
+    importance,
+    response,
+    truth,
+)
 from drone_rl.explanations.context import Context, LeftOutError, find_lacking
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.results import Explanation
@@ -45,6 +54,7 @@ SECTIONS: dict[str, Section] = {
     "tsne": embedding.section,
     "verdict": behavior.verdict_section,
     "flaws": behavior.flaws_section,
+    "importance": importance.section,
     "response": response.section,
     "asymmetry": response.asymmetry_section,
     "shifts": behavior.shifts_section,
@@ -52,6 +62,8 @@ SECTIONS: dict[str, Section] = {
 }
 """Sections by the names of their results in `Explanation`; `drone_rl.explain` adds "places".
 `report.page.PARTS` displays them."""
+OF_EACH_IMAGE = frozenset({"attribution", "class_model", "tsne", "truth"})
+"""Sections that are computed for each image among a policy's inputs, the others once."""
 THREADED = frozenset({"attribution", "class_model", "flaws", "tsne"})
 """Sections that run in a second thread: they step no environment and use a copy of the network."""
 
@@ -61,11 +73,11 @@ class Explanations(Result):
     """Explanations of one or several policies, and the report that shows them."""
 
     folder: Path
-    """Holds a folder for each policy and the report."""
+    """Holds a folder for each policy, and for each further image that it sees, and the report."""
     report: Path
     """One self-contained HTML file."""
     policies: dict[str, Explanation]
-    """Results by the policies' names."""
+    """Results by the policies' names; those of further images, such as "NAME, depth", after."""
     seed: RootSeed
     """Root of all random streams."""
 
@@ -117,27 +129,40 @@ def explain(
     progress = as_progress(progress)
     folder = new_run_folder("explain", outputs) if folder is None else as_path(folder, "folder")
     sections = {**SECTIONS, **(more_sections or {})}
+    of_image = {title: one for title, one in sections.items() if title in OF_EACH_IMAGE}
     done, steps = itertools.count(), len(by_name) * len(sections) + 1
-    folders = {n: folder / f"{i}_{to_file_name(n)}" for i, n in enumerate(by_name)}
+    explained: dict[str, Explanation] = {}
+    folders: dict[str, Path] = {}
 
-    def explain_one(policy: BasePolicy, folder: Path) -> Explanation:
+    def explain_one(title: str, policy: BasePolicy) -> None:
+        nonlocal steps
         require_repeatable(policy, seed=seed.value, renderer=settings.renderer)
         env = policy.make_env(num_envs, seed=seed.value, renderer=settings.renderer)
         with closing(env):
             claim = None if find_claim is None else find_claim(policy, seed=seed)
             measured = find_domain(policy, None, outputs)
             network, unlike = policy.make_network(), policy.unlike
-            return explain_policy(
-                Context(env, network, settings, claim, measured, unlike, seed),
-                folder,
-                name=policy.name,
-                provenance={"policy": policy.source, "trained": policy.trained, **provenance()},
-                progress=lambda title: progress(f"{policy.name}: {title}", next(done), steps),
-                sections=sections,
-            )
+            images = [*base_env(env).observer.images]
+            steps += len(of_image) * len(images[1:])
+            for image in images or [None]:
+                added = f", {image}" if image in images[1:] else ""
+                folders[title + added] = (
+                    folder / f"{len(folders)}_{to_file_name(policy.name + added)}"
+                )
+                explained[title + added] = explain_policy(
+                    Context(env, network, settings, claim, measured, unlike, seed, image),
+                    folders[title + added],
+                    name=policy.name + added,
+                    provenance={"policy": policy.source, "trained": policy.trained, **provenance()},
+                    progress=lambda section: progress(
+                        f"{policy.name}: {section}", next(done), steps
+                    ),
+                    sections=of_image if added else sections,
+                )
 
     with torch_threads(1):  # same results for any number of cores; more would gain nothing
-        explained = {name: explain_one(one, folders[name]) for name, one in by_name.items()}
+        for name, one in by_name.items():
+            explain_one(name, one)
     for name, one in by_name.items():
         if verdict := explained[name].verdict:
             record_verdict(folders[name], one, verdict)

@@ -27,7 +27,7 @@ Objective = Literal["probability", "logit"]
 BATCH = 256  # observations in one call, which bounds memory
 INTEGRATION_STEPS = 64  # with 16, errors of up to 0.7 occur on a steep softmax
 MapMethod = Callable[..., Tensor]
-"""Observations, actions (T,) and memory, see `hooks`, to maps (T, H, W)."""
+"""Observations, actions (T,) and the rest of the inputs, see `hooks`, to maps (T, H, W)."""
 
 
 @dataclasses.dataclass
@@ -65,7 +65,7 @@ class Explainer:
         self,
         observations: Tensor,
         actions: Tensor,
-        memory: Tensor | None = None,
+        rest: Tensor | None = None,
         objective: Objective = "probability",
     ) -> Tensor:
         """Return Grad-CAM in the observation's size (T, H, W); raise InputError without a layer."""
@@ -73,45 +73,43 @@ class Explainer:
             raise InputError("Grad-CAM needs a convolution with gradients, which this policy lacks")
         method = LayerGradCam(self._forward(objective), find_layer(self.network, self.layer))
 
-        def attribute(x: Tensor, a: Tensor, m: Tensor | None) -> Tensor:
-            coarse = method.attribute(x, a, m, relu_attributions=True)
+        def attribute(x: Tensor, a: Tensor, r: Tensor | None) -> Tensor:
+            coarse = method.attribute(x, a, r, relu_attributions=True)
             assert isinstance(coarse, Tensor)  # a tuple only if x is one
             return functional.interpolate(coarse, x.shape[-2:], mode="bilinear")
 
-        return _in_batches(attribute, observations, actions, memory).sum(1)
+        return _in_batches(attribute, observations, actions, rest).sum(1)
 
-    def saliency(
-        self, observations: Tensor, actions: Tensor, memory: Tensor | None = None
-    ) -> Tensor:
+    def saliency(self, observations: Tensor, actions: Tensor, rest: Tensor | None = None) -> Tensor:
         """Return the absolute gradient of the probability, summed over channels. (T, H, W)."""
         method = Saliency(self._forward("probability"))
         maps = _in_batches(
-            lambda x, a, m: method.attribute(x, a, True, m), observations, actions, memory
+            lambda x, a, r: method.attribute(x, a, True, r), observations, actions, rest
         )
         return maps.abs().sum(1)
 
     def integrated_gradients(
-        self, observations: Tensor, actions: Tensor, memory: Tensor | None = None
+        self, observations: Tensor, actions: Tensor, rest: Tensor | None = None
     ) -> Tensor:
         """Return the absolute path integral from the baseline. Shape: (T, H, W)."""
         quick = with_fused_passes(self.network, wrt="pixels")
         method = IntegratedGradients(self._forward("probability", quick))
 
-        def attribute(x: Tensor, a: Tensor, m: Tensor | None) -> Tensor:
+        def attribute(x: Tensor, a: Tensor, r: Tensor | None) -> Tensor:
             return method.attribute(
                 x,
                 self.absent[None],
                 a,
-                m,
+                r,
                 method="riemann_middle",
                 n_steps=INTEGRATION_STEPS,
                 internal_batch_size=BATCH,
             )
 
-        return _in_batches(attribute, observations, actions, memory).sum(1).abs()
+        return _in_batches(attribute, observations, actions, rest).sum(1).abs()
 
     def occlusion(
-        self, observations: Tensor, actions: Tensor, memory: Tensor | None = None
+        self, observations: Tensor, actions: Tensor, rest: Tensor | None = None
     ) -> Tensor:
         """Return the change of the probability if a patch is replaced by the baseline. (T, H, W).
 
@@ -120,11 +118,11 @@ class Explainer:
         """
         height, width = observations.shape[-2:]
         windows = _windows(height, width)
-        base = probabilities(self.network, observations, memory)
+        base = probabilities(self.network, observations, rest)
         before = base.gather(1, actions[:, None])[:, 0]
         change = before.new_zeros(len(before), len(windows))
         absent = self.absent[None].expand_as(observations)
-        parts = replaced(self.network, observations, absent, windows, memory)
+        parts = replaced(self.network, observations, absent, windows, rest)
         for frames, patches, after in parts:
             change[frames, patches] = before[frames] - after[range(len(frames)), actions[frames]]
         covered = windows.flatten(1).float()
@@ -141,11 +139,11 @@ class Explainer:
 
 
 def _in_batches(
-    attribute: Callable[..., Tensor], observations: Tensor, actions: Tensor, memory: Tensor | None
+    attribute: Callable[..., Tensor], observations: Tensor, actions: Tensor, rest: Tensor | None
 ) -> Tensor:
     """Return attributions of all observations. Shape: (T, ...), that of `attribute`."""
-    parts = batches(BATCH, observations, actions, memory)
-    maps = [attribute(x.detach().clone().requires_grad_(), a, m).detach() for x, a, m in parts]
+    parts = batches(BATCH, observations, actions, rest)
+    maps = [attribute(x.detach().clone().requires_grad_(), a, r).detach() for x, a, r in parts]
     return torch.cat(maps).float()
 
 

@@ -81,7 +81,7 @@ def replaced(
     observations: Tensor,
     other: Tensor,
     masks: Tensor,
-    memory: Tensor | None = None,
+    rest: Tensor | None = None,
 ) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
     """Evaluate the policy with one part of an observation replaced, for all parts that differ.
 
@@ -93,7 +93,7 @@ def replaced(
     for batch in (pixels @ masks.flatten(1).float().T > 0).nonzero().split(BATCH):
         frames, parts = batch.unbind(1)
         changed = torch.where(masks[parts, None], other[frames], observations[frames])
-        kept = None if memory is None else memory[frames]
+        kept = None if rest is None else rest[frames]
         yield frames, parts, network.actions.probabilities(evaluate(network, changed, kept))
 
 
@@ -102,18 +102,18 @@ def patch_effects(
     observations: Tensor,
     others: Iterable[Tensor],
     grid: PatchGrid,
-    memory: Tensor | None = None,
+    rest: Tensor | None = None,
 ) -> NDArray:
     """Return the effect on the policy of replacing each patch by alternatives (T, C, h, w).
 
     It is the mean distance of the action probabilities. Shape: (T, count).
     """
-    base = probabilities(network, observations, memory)
+    base = probabilities(network, observations, rest)
     masks, effects = grid.masks(observations.shape[-2:]), []
     distance = network.actions.distance
     for other in others:
         effect = base.new_zeros(len(base), grid.count)
-        for frames, patches, after in replaced(network, observations, other, masks, memory):
+        for frames, patches, after in replaced(network, observations, other, masks, rest):
             effect[frames, patches] = distance(after, base[frames])
         effects.append(effect)
     return torch.stack(effects).mean(0).double().cpu().numpy()
@@ -221,7 +221,7 @@ def shuffled_networks(
     observations: Tensor,
     count: int,
     seed: int = 0,
-    memory: Tensor | None = None,
+    rest: Tensor | None = None,
 ) -> Iterator[ImageNetwork]:
     """Yield copies of a policy with weights and biases shuffled within each layer.
 
@@ -231,7 +231,7 @@ def shuffled_networks(
     """
     generator = plain_generator(seed)
     with torch.no_grad():
-        wanted = evaluate(network, observations, memory)
+        wanted = evaluate(network, observations, rest)
         wanted_deviation, wanted_mean = torch.std_mean(wanted, 0, correction=0)
     for _ in range(count):
         other = copy.deepcopy(network)
@@ -239,7 +239,7 @@ def shuffled_networks(
             for parameter in other.parameters():
                 order = torch.randperm(parameter.numel(), generator=generator)
                 parameter.copy_(parameter.flatten()[order].view(parameter.shape))
-            outputs = evaluate(other, observations, memory)
+            outputs = evaluate(other, observations, rest)
             deviation, mean = torch.std_mean(outputs, 0, correction=0)
             factor = torch.where(deviation > NO_CHANGE, wanted_deviation / deviation, 1.0)
             other.rescale(factor, wanted_mean - factor * mean)

@@ -21,7 +21,7 @@ from drone_rl.envs import base_env
 from drone_rl.envs.rollout import Act, StepContext
 from drone_rl.explanations.attribution import first_heat, shown_methods
 from drone_rl.explanations.heat_maps import Explainer
-from drone_rl.explanations.hooks import memory_in
+from drone_rl.explanations.hooks import of_input
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.policy import BasePolicy
@@ -164,8 +164,8 @@ class EpisodeLog:
         self._observed: list[Tensor] = []
         self._parts: list[int] = []
         """The parts of the actions taken."""
-        self._memory: list[Tensor] = []
-        """Memory of a recurrent policy before them."""
+        self._rest: list[Tensor] = []
+        """What else the policy read, see `hooks`."""
         self._return = 0.0
         stream.send_blueprint(_layout(rerun, self._timestep))
         half = self._worlds.task.drone_size / 2
@@ -183,7 +183,7 @@ class EpisodeLog:
         self._set_step(len(self._path))
         self._log_images()
         self._log_poses()
-        self._observed.append(context.observe()[0].cpu())
+        self._observed.append(context.observe(self._scenes.name)[0].cpu())
         if len(self._path) > 1:
             self._log("reward/step", self._rr.Scalars(reward))
         self._log("reward/return", self._rr.Scalars(self._return))
@@ -195,14 +195,19 @@ class EpisodeLog:
         """Log the action that the policy takes now, and the probabilities of all."""
         part = int(self._actions.part(act.action[0]))
         self._parts.append(part)
-        if (memory := memory_in(act.entries)) is not None:
-            self._memory.append(memory)
+        if (rest := self._scenes.rest_of(act.entries)) is not None:
+            self._rest.append(rest)
         probs = probabilities(act, self._actions).cpu().numpy()
         self._log("action/probabilities", self._rr.Scalars(probs))
         self._log("action/taken", self._rr.TextLog(self._actions.names[part]))
 
     def observations(self, network: ImageNetwork) -> None:
-        """Log all observations, and heat maps of the actions taken laid over them."""
+        """Log all observations, and heat maps of the actions taken laid over them.
+
+        Policies without images have none.
+        """
+        if self._scenes.image is None:
+            return
         observed = torch.stack(self._observed)
         low, high, channels = float(observed.min()), float(observed.max()), self._scenes.channels
         images = [shown_picture(one.numpy(), low, high, channels) for one in observed]
@@ -212,10 +217,11 @@ class EpisodeLog:
         if not network.is_differentiable:
             return
         # the methods that are shown for a policy with gradients do not read the baseline
-        maps = Explainer(network, absent=observed[0]).methods()
+        view = of_input(network, self._scenes.name)
+        maps = Explainer(view, absent=observed[0]).methods()
         device = self._base.device
-        memory = torch.cat(self._memory) if self._memory else None
-        inputs = observed[:-1].to(device), torch.tensor(self._parts, device=device), memory
+        rest = torch.cat(self._rest) if self._rest else None
+        inputs = observed[:-1].to(device), torch.tensor(self._parts, device=device), rest
         heat, by = first_heat({name: maps[name](*inputs) for name in shown_methods(maps)})
         for step, (one, method) in enumerate(zip(heat.cpu().numpy(), by, strict=True)):
             self._set_step(step)

@@ -1,14 +1,15 @@
 """Sections "response" (maps over the place of one target) and "asymmetry"."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from drone_rl.config.inputs import ImageInput
 from drone_rl.explanations.context import Context, needs, objects
-from drone_rl.explanations.hooks import probabilities
+from drone_rl.explanations.hooks import probabilities, rest_in
 from drone_rl.explanations.results import (
     Asymmetry,
     Mirrored,
@@ -48,11 +49,27 @@ def section(context: Context) -> Response:
     )
 
 
+def mirror_images(context: Context) -> str | None:
+    """Need inputs with known mirror images."""
+    for name, seen in context.scenes.inputs.items():
+        is_image = isinstance(seen, ImageInput)
+        if is_image and (seen.modality == "normals" or seen.camera.name.startswith("front_")):
+            return f"The mirror image of {name} is not known."
+    return None
+
+
+@needs(mirror_images)
 def asymmetry_section(context: Context) -> Asymmetry:
     """Compare the policy with its mirror image on the analysed frames."""
-    data = context.dataset
-    observations = data.tensor("observations")
-    return asymmetry(context.network, observations, data.episode, context.scenes.actions)
+    data, network, scenes = context.dataset, context.network, context.scenes
+    inputs = {scenes.name: data.tensor("observations"), **data.others}
+
+    def evaluate(inputs: Mapping[str, Tensor]) -> Tensor:
+        others = {name: inputs[name] for name in scenes.others}
+        return probabilities(network, inputs[scenes.name], rest_in(others))
+
+    mirrored = {name: scenes.mirror(name, values) for name, values in inputs.items()}
+    return asymmetry(evaluate(inputs), evaluate(mirrored), data.episode, scenes.actions)
 
 
 def response_map(
@@ -68,9 +85,11 @@ def response_map(
         scenes,
         (num_forward, num_lateral),
         (seed, _RESPONSE),
-        lambda state: probabilities(network, scenes.observe(state)),
+        lambda state: probabilities(network, scenes.observe(state), scenes.rest(state)),
     )
-    alone = probabilities(network, scenes.absent[None])[0]
+    one = place_target(scenes, torch.ones(1), torch.zeros(1))
+    rest = scenes.rest(scenes.task.edits.without_next(one))
+    alone = probabilities(network, scenes.absent[None], rest)[0]
     needed = torch.from_numpy(fields["oracle"]).to(probs.device)
     return ResponseMap(
         **fields,
@@ -176,12 +195,9 @@ def count_places(response: ResponseMap, outcome: OutcomeMap) -> tuple[ResponseRo
     return tuple(rows)
 
 
-def asymmetry(
-    network: ImageNetwork, observations: Tensor, episode: NDArray, actions: Actions
-) -> Asymmetry:
-    """Compare the policy with its mirror image on observations (T, C, H, W)."""
-    here = probabilities(network, observations)
-    there = actions.mirror(probabilities(network, observations.flip(-1)))
+def asymmetry(here: Tensor, mirrored: Tensor, episode: NDArray, actions: Actions) -> Asymmetry:
+    """Compare action probabilities (T, A) on frames and on their mirror images."""
+    there = actions.mirror(mirrored)
     signed = (actions.prob_left(here) - actions.prob_left(there)).double().cpu().numpy()
     distance = actions.distance(here, there).double().cpu().numpy()
     worst = np.argsort(-distance, kind="stable")[:SHOWN]

@@ -183,6 +183,29 @@ class Median(Model):
     upper: float | None
 
 
+class InputEffect(Model):
+    """How far the action probabilities depend on one input; bounds hold with 1 - level each."""
+
+    effect: Median
+    """Their distance if the input is that of another episode."""
+    placebo: Median
+    """Their distance if it is measured twice in the same states."""
+    excess: Median
+    """Effect minus placebo."""
+    matters: bool
+    """Whether the lower bound of the excess is more than `Importance.least`."""
+
+
+class Importance(Model):
+    """Effects of replacing each input of a policy that has several."""
+
+    inputs: dict[str, InputEffect]
+    least: float
+    """Excess up to which an input does not matter."""
+    level: float
+    """Error rate of each lower bound."""
+
+
 class Pointing(Median):
     """How much more often than chance a map's hottest patch has one of the largest effects."""
 
@@ -437,6 +460,7 @@ class Explanation(Seeded):
     flaws: Flaws | None = None
     class_model: ClassModel | None = None
     attribution: Attribution | None = None
+    importance: Importance | None = None
     truth: Truth | None = None
     response: Response | None = None
     places: ExactMap | None = None

@@ -18,9 +18,8 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.collectors.complete_episodes import rollout
-from drone_rl.envs import worlds_of
 from drone_rl.envs.rollout import ActorAgent, Recording, Step, steps
-from drone_rl.explanations.hooks import entries_of, features, memory_in, probabilities
+from drone_rl.explanations.hooks import entries_of, features, memory_in, probabilities, rest_in
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.policies import ImageNetwork, RecurrentNetwork, greedy_agent
 from drone_rl.sim.rendering import Appearance
@@ -28,6 +27,8 @@ from drone_rl.sim.tasks import Goals, State, Task
 from drone_rl.sim.worlds import Worlds
 
 _POSE = ("drone", "attitude")
+_INPUT = "inputs/"
+"""Begin of the names of the arrays that hold the policy's inputs but the observations."""
 _STATE = "state/"
 """Begin of the names of the arrays that hold the environments' states."""
 _SAME = 1e-9  # poses (metres, quaternion) that differ by less are equal up to rounding
@@ -59,6 +60,17 @@ class RolloutDataset:
         """Memory of a recurrent policy before each step, see `hooks`; None of others."""
         return self.tensor("memory") if "memory" in self.arrays else None
 
+    @property
+    def rest(self) -> Tensor | None:
+        """What else the policy reads besides the observations, see `hooks`; None if nothing."""
+        return self.memory if self.memory is not None else rest_in(self.others)
+
+    @property
+    def others(self) -> dict[str, Tensor]:
+        """The policy's other inputs by name, in order. Shapes: (T, *)."""
+        names = [name for name in self.arrays if name.startswith(_INPUT)]
+        return {name.removeprefix(_INPUT): self.tensor(name) for name in names}
+
     def offset(self, worlds: Worlds) -> NDArray:
         """Return how far ahead of the drone and to its left the next target stands. (T, 2).
 
@@ -78,7 +90,8 @@ class RolloutDataset:
         """Write the file, with all steps of the episodes as "flights/..."."""
         arrays: dict[str, Any] = dict(self.arrays)  # Any: numpy's allow_pickle
         whole = flights.arrays.items()
-        arrays |= {f"flights/{name}": value for name, value in whole if name != "observations"}
+        left_out = ("observations", _INPUT)  # they are large
+        arrays |= {f"flights/{n}": value for n, value in whole if not n.startswith(left_out)}
         np.savez_compressed(path, **arrays)
 
 
@@ -88,12 +101,15 @@ def collect(
     *,
     num_episodes: int,
     num_frames: int = 1,
+    observations: str | None = None,
 ) -> RolloutDataset:
     """Collect at least so many whole episodes and steps of a policy, with sampled actions.
 
-    Only observations are rendered.
+    Only inputs of the policy are rendered. `observations` names the one that is explained, by
+    default the first image, if any.
     """
-    worlds = worlds_of(env)
+    scenes = Scenes(env, observations)
+    worlds = scenes.worlds
     task, actions = worlds.task, worlds.dynamics.actions
     truth = (*task.scored, "end_reason", *_POSE)
     agent = Recording(ActorAgent(actor), truth, states=True)
@@ -109,7 +125,8 @@ def collect(
     batch: Any = episodes.steps
     info, after = batch["info"], batch["next", "info"]
     arrays = {
-        "observations": batch["pixels"],
+        "observations": batch[scenes.name],
+        **{f"{_INPUT}{name}": batch[name] for name in scenes.others},
         **actions.kept(batch["action"]),
         "rewards": batch["next", "reward"][:, 0],
         **{name: info[name] for name in _POSE},
@@ -196,9 +213,9 @@ def render_frames(
     arrays["frames"] = scenes.frames(state).cpu().numpy()
     arrays["regions"] = scenes.regions(state).cpu().numpy()
     arrays["depth"] = scenes.depth(state).cpu().numpy().astype(np.float16)
-    arrays["probabilities"] = probabilities(network, observations, dataset.memory).cpu().numpy()
+    arrays["probabilities"] = probabilities(network, observations, dataset.rest).cpu().numpy()
     for layer in layers:
-        outputs = features(network, observations, layer, dataset.memory)
+        outputs = features(network, observations, layer, dataset.rest)
         arrays[f"features/{layer}"] = outputs.cpu().numpy()
     return dataset
 
@@ -228,17 +245,19 @@ def run_from(
 def run_to_end(scenes: Scenes, network: ImageNetwork, state: State) -> State:
     """Step until the episode ends, no target is left, or the policy is in a loop.
 
-    A policy without memory is in a loop if it is back at its pose of two steps before. Such
-    episodes end with the task's truncation. `end_reason` is 0 where no target was left.
+    A policy that sees no more than one image is in a loop if it is back at its pose of two steps
+    before. Such episodes end with the task's truncation. `end_reason` is 0 where no target was
+    left.
     """
     task = scenes.task
     previous: Tensor | None = None
+    remembers = scenes.memory or scenes.others or isinstance(network, RecurrentNetwork)
     is_new = torch.ones(len(state), dtype=torch.bool, device=state.body.position.device)
 
     def goes_on(step: Step) -> Tensor:
         nonlocal previous, is_new
         after = step.after
-        if previous is not None and not (scenes.memory or isinstance(network, RecurrentNetwork)):
+        if previous is not None and not remembers:
             is_back = ((_pose(after) - previous).abs() < _SAME).all(-1)
             after.end_reason[is_back & ~is_new] = task.truncation
         active = (after.end_reason == 0) & ~task.edits.next_offset(after)[:, 0].isnan()

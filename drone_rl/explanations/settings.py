@@ -88,6 +88,9 @@ class ClassModelsSettings(ClassModelSettings):
 
     gallery: bool = False
     """Whether to show the chapter's refinements one after the other instead of these settings."""
+    image: str | None = None
+    """The policy's input to optimize, an image; null for its first image. Its other inputs have the
+    values of frames of the episodes."""
     episodes: Annotated[int, Whole(1, 10_000, "episodes")] = 30
     """Episodes with sampled actions whose observations are the training set."""
     seed: Seed | None = None

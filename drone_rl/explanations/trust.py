@@ -46,8 +46,8 @@ from drone_rl.policies import ImageNetwork
 from drone_rl.utils.intervals import Mean, episode_means, mean_interval, median_bounds
 
 MapOf = Callable[..., Tensor]
-"""A method: network, observations (T, C, h, w), actions (T,), and of recurrent policies memory, see
-`hooks`, to maps (T, h, w), 0 or more."""
+"""A method: network, observations (T, C, h, w), actions (T,), and the rest of the inputs, see
+`hooks`, if there is one, to maps (T, h, w), 0 or more."""
 ERROR_RATE = 0.05  # probability that any method is trusted whose maps do not depend on the policy
 FRAMES_AN_EPISODE = 10  # frames of an episode that are tested, evenly spaced
 WEIGHT_SEEDS = 5  # shuffled policies whose maps are compared with the policy's, pixel by pixel
@@ -67,7 +67,7 @@ class Trial:
     placebos: dict[str, Tensor]  # (T, h, w) each
     episode: NDArray  # (T,)
     grid: PatchGrid
-    memory: Tensor | None = None  # see `hooks`
+    rest: Tensor | None = None  # see `hooks`
     frames_without_effect: int = 0  # left out, as no patch affects the policy
     seed: int = 0  # of shuffled weights
 
@@ -81,19 +81,17 @@ class Trial:
             effects=self.effects[rows],
             placebos={name: maps[index] for name, maps in self.placebos.items()},
             episode=self.episode[rows],
-            memory=None if self.memory is None else self.memory[index],
+            rest=None if self.rest is None else self.rest[index],
         )
 
     def maps(self, method: MapOf, network: ImageNetwork | None = None) -> Tensor:
         """Return a method's maps of the trial's frames. Shape: (T, h, w)."""
-        memory = () if self.memory is None else (self.memory,)
-        return method(network or self.network, self.observations, self.actions, *memory)
+        rest = () if self.rest is None else (self.rest,)
+        return method(network or self.network, self.observations, self.actions, *rest)
 
     def shuffled(self, count: int) -> Iterator[ImageNetwork]:
         """Yield policies with shuffled weights, see `shuffled_networks`."""
-        return shuffled_networks(
-            self.network, self.observations, count, self.seed, memory=self.memory
-        )
+        return shuffled_networks(self.network, self.observations, count, self.seed, rest=self.rest)
 
     def scores(self, maps: Tensor) -> NDArray:
         """Return the score of each map. Shape: (T, h, w) to (T,)."""
@@ -117,9 +115,10 @@ def make_trial(context: Context) -> Trial:
     state = data.state(scenes.worlds)[index]
     others = list(alternatives(scenes, state, seed).values())
     actions, seen = data.tensor("actions")[index], scenes.observe(state)
-    memory = None if data.memory is None else data.memory[index]
+    rest = data.rest
+    rest = None if rest is None else rest[index]
     episode, network = data.episode[rows], context.network
-    return measure(network, actions, seen, others, scenes.absent, episode, seed, memory)
+    return measure(network, actions, seen, others, scenes.absent, episode, seed, rest)
 
 
 def measure(
@@ -130,7 +129,7 @@ def measure(
     absent: Tensor,
     episode: NDArray,
     seed: int = 0,
-    memory: Tensor | None = None,
+    rest: Tensor | None = None,
 ) -> Trial:
     """Return a trial on the frames in which some patch affects a policy.
 
@@ -142,10 +141,10 @@ def measure(
         absent: Observation of the scene without objects. Shape: (C, h, w).
         episode: Number of each frame's episode. Shape: (T,).
         seed: Of noise and shuffled weights.
-        memory: That of a recurrent policy before each step, see `hooks`.
+        rest: What else the policy reads, see `hooks`.
     """
     grid = make_grid(*observations.shape[-2:])
-    effects = patches.patch_effects(network, observations, others, grid, memory)
+    effects = patches.patch_effects(network, observations, others, grid, rest)
     moved = patches.has_effect(effects)
     trial = Trial(
         network=network,
@@ -155,7 +154,7 @@ def measure(
         placebos=placebo_maps(observations, absent, others, seed),
         episode=episode,
         grid=grid,
-        memory=memory,
+        rest=rest,
         frames_without_effect=int((~moved).sum()),
         seed=seed,
     )

@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+from collections.abc import Callable
 
 import numpy as np
 import torch
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.explanations import trust
-from drone_rl.explanations.context import Context, needs, objects
+from drone_rl.explanations.context import Context, image, needs, objects
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.results import Outcomes, Truth
 from drone_rl.explanations.rollouts import Step, run_from, spread_frames
@@ -23,7 +24,7 @@ from drone_rl.sim.tasks.scene_edits import turned
 from drone_rl.utils.intervals import mean_interval
 
 
-@needs(interventions=objects)
+@needs(image, interventions=objects)
 def section(context: Context) -> Truth:
     """Test the heat maps, none if the weights are unknown; measure effects of changes."""
     data, scenes, network = context.dataset, context.scenes, context.network
@@ -33,7 +34,7 @@ def section(context: Context) -> Truth:
     changes, outcomes = [], None
     if scenes.task.edits is not None:
         regions = data.tensor("regions")
-        changes = intervene(scenes, network, state, regions, seed, data.memory)
+        changes = intervene(scenes, network, state, regions, seed, data.rest)
         outcomes = measure_outcomes(scenes, network, state, episode, data.memory)
     shown_frame = clear_frame(changes[0]) if changes else 0
     methods = trust.method_maps(context.explainer) if network.has_weights else {}
@@ -72,28 +73,33 @@ def intervene(
     state: State,
     regions: Tensor,
     seed: int = 0,
-    memory: Tensor | None = None,
+    rest: Tensor | None = None,
 ) -> list[Intervention]:
     """Remove, move and recolor the next target; as a control, change a patch of ground.
 
-    `regions` has the `Region` of each pixel (T, H, W). For `memory` see `hooks`.
+    `regions` has the `Region` of each pixel (T, H, W). For `rest`, which stays as it is, see
+    `hooks`. In images without colors, nothing is recolored.
     """
     before = scenes.frames(state)
-    base = probabilities(network, scenes.transform(before), memory)
+    base = probabilities(network, scenes.observe(state), rest)
     visible = regions == Region.NEXT_TARGET
-    ground = _patches(regions == Region.GROUND, visible.sum((1, 2)), seed)
-    recolored = scenes.frames(state, OTHER_TARGETS)
-    repainted = scenes.frames(state, DARK_GROUND)
-    moved = scenes.frames(to_the_middle(scenes, state))
-    changes = {
-        "target taken away": (scenes.frames(scenes.task.edits.without_next(state)), visible),
-        "target moved": (moved, (moved != before).any(-1)),
-        "target recolored": (torch.where(visible[..., None], recolored, before), visible),
-        "ground patch changed": (torch.where(ground[..., None], repainted, before), ground),
+    away, aside = scenes.task.edits.without_next(state), to_the_middle(scenes, state)
+    moved = scenes.frames(aside)
+    changes: dict[str, tuple[Tensor, Tensor, Callable[[Tensor], Tensor]]] = {
+        "target taken away": (scenes.frames(away), visible, lambda _: scenes.observe(away)),
+        "target moved": (moved, (moved != before).any(-1), lambda _: scenes.observe(aside)),
     }
+    if scenes.shows_colors:
+        ground = _patches(regions == Region.GROUND, visible.sum((1, 2)), seed)
+        recolored = scenes.frames(state, OTHER_TARGETS)
+        repainted = scenes.frames(state, DARK_GROUND)
+        recolored = torch.where(visible[..., None], recolored, before)
+        repainted = torch.where(ground[..., None], repainted, before)
+        changes["target recolored"] = (recolored, visible, scenes.transform)
+        changes["ground patch changed"] = (repainted, ground, scenes.transform)
     interventions = []
-    for name, (frames, area) in changes.items():
-        after = probabilities(network, scenes.transform(frames), memory)
+    for name, (frames, area, seen) in changes.items():
+        after = probabilities(network, seen(frames), rest)
         effect = scenes.actions.distance(after, base)
         effect = torch.where(area.flatten(1).any(1), effect, torch.nan).double().cpu().numpy()
         interventions.append(Intervention(name, area, effect, frames))

@@ -1,7 +1,7 @@
 """Environments for training, with the transforms of policies."""
 
 import inspect
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypedDict, Unpack
 
 from torchrl.envs import EnvBase
@@ -14,6 +14,7 @@ from drone_rl.config import (
     CameraSettings,
     DynamicsSettings,
 )
+from drone_rl.config.inputs import Input, Inputs, describe_inputs, first_camera
 from drone_rl.config.transforms import DEFAULT_TRANSFORMS, Transform, as_transforms
 from drone_rl.sim.dynamics import Dynamics
 from drone_rl.sim.rendering.renderer import RendererFactory
@@ -58,6 +59,7 @@ def make_env(
     task: BaseTaskSettings | Task[Any] | str | None = None,
     camera: CameraSettings | None = None,
     transforms: Transform | Sequence[Transform] = DEFAULT_TRANSFORMS,
+    inputs: Mapping[str, Input | str] | Sequence[Input | str] | None = None,
     seed: int = 0,
     stream: Stream = Stream.WORLDS,
     device: str = "cpu",
@@ -70,6 +72,8 @@ def make_env(
         task: Settings of the task, or its name for the defaults.
         camera: The policy's camera.
         transforms: Transform of the image, or several in this order.
+        inputs: Inputs by name instead of "pixels", such as `{"depth": DepthImage(camera="down")}`,
+            or a list of names such as `["gray", "goal"]`.
         seed: Root of the environments' random streams.
         stream: Purpose of the environments.
         device: Device of the renderer: "cpu", "cuda" or "cuda:N".
@@ -88,8 +92,25 @@ def make_env(
         dynamics.check_air()
     appearance = Instance(AppearanceSettings | None).read(options.get("appearance"), "appearance")
     others: Any = {**options, "actions": actions, "appearance": appearance}
+    described = None
+    if inputs is not None:
+        if camera is not None or transforms is not DEFAULT_TRANSFORMS:
+            raise InputError(
+                "camera= and transforms= describe the default input; leave them out, or describe "
+                "all inputs in inputs="
+            )
+        described = describe_inputs(Instance(Inputs).read(inputs, "inputs"))
+        camera, transforms = first_camera(described), ()
     made = [step.make() for step in as_transforms(transforms)] if others.get("pixels", True) else ()
     base = envs.DroneEnv(
-        num_envs, task, camera, transforms=made, seed=seed, stream=stream, device=device, **others
+        num_envs,
+        task,
+        camera,
+        transforms=made,
+        inputs=described,
+        seed=seed,
+        stream=stream,
+        device=device,
+        **others,
     )
     return envs.with_others(base, made)

@@ -22,6 +22,7 @@ from drone_rl.config import (
     TaskSettings,
 )
 from drone_rl.config.configuration import Changes, as_changes
+from drone_rl.config.inputs import Input, Inputs, describe_inputs, first_camera
 from drone_rl.config.transforms import (
     Fault,
     Frame,
@@ -36,7 +37,7 @@ from drone_rl.policies.environment import EnvOptions, make_env
 from drone_rl.policies.external_network import Function, Logits
 from drone_rl.policies.policy import BasePolicy, load_policy
 from drone_rl.policies.self_check import check_on_episodes
-from drone_rl.policies.zoo.description import output_of
+from drone_rl.policies.zoo.description import output_of, shapes_of
 from drone_rl.sim.dynamics import make_dynamics
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.display import table
@@ -61,6 +62,8 @@ class ExternalPolicy(BasePolicy):
     camera: CameraSettings
     transforms: tuple[Transform, ...]
     """If empty, the callable gets the camera's RGB bytes."""
+    inputs: Mapping[str, Input] | None = None
+    """Several inputs by name instead, of which the callable gets a dictionary."""
     actions: ActionSettings = MOVES_SETTINGS  # pyright: ignore[reportIncompatibleMethodOverride]
     """One action for each logit."""
     own_dynamics: DynamicsSettings = COMPUTER_VISION  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -121,11 +124,13 @@ class ExternalPolicy(BasePolicy):
         options.setdefault("appearance", self.appearance)
         if isinstance(dynamics, DynamicsSettings):
             options.setdefault("actions", self.actions)
+        seen: dict[str, Any] = {"inputs": self.inputs}
+        if self.inputs is None:
+            seen = {"camera": self.camera, "transforms": self.transforms or (Rgb(),)}
         return make_env(
             num_envs,
             task=self.task,
-            camera=self.camera,
-            transforms=self.transforms or (Rgb(),),
+            **seen,
             seed=seed,
             stream=stream,
             device=device,
@@ -134,14 +139,19 @@ class ExternalPolicy(BasePolicy):
 
     def make_network(self, device: str | torch.device = "cpu") -> ExternalNetwork:
         """Return its network; raise an `InputError` as `ExternalNetwork` does."""
-        frame = Frame((self.camera.height, self.camera.width, 3))
-        for transform in self.transforms or (Rgb(),):
-            frame = output_of(transform, frame)
+        shapes: Any = None
+        if self.inputs is None:
+            frame = Frame((self.camera.height, self.camera.width, 3))
+            for transform in self.transforms or (Rgb(),):
+                frame = output_of(transform, frame)
+            shapes = frame.shape
+        else:
+            shapes = shapes_of(describe_inputs(self.inputs))
         network = ExternalNetwork(
             self.logits,
-            frame.shape,
+            shapes,
             make_dynamics(as_task(self.task).make_dynamics, self.dynamics, self.actions).actions,
-            takes_bytes=not self.transforms,
+            takes_bytes=not self.transforms and self.inputs is None,
             device=device,
         )
         network.owner = f"policy={self.name}"
@@ -150,6 +160,7 @@ class ExternalPolicy(BasePolicy):
     def _repr_html_(self) -> str:
         """Return a table for notebooks."""
         sees = " > ".join(transform.name for transform in self.transforms) or "RGB bytes"
+        sees = sees if self.inputs is None else ", ".join(self.inputs)
         rows = [["network", type(self.logits).__name__], ["sees", sees], ["file", "none"]]
         return table(["policy", self.name], rows)
 
@@ -163,6 +174,7 @@ def policy_from(
     actions: ActionSettings = MOVES_SETTINGS,
     appearance: AppearanceSettings | str = MINIMAL,
     transforms: Transform | Sequence[Transform] | None = None,
+    inputs: Mapping[str, Input | str] | Sequence[Input | str] | None = None,
     env: Any = None,
     name: str | None = None,
 ) -> ExternalPolicy:
@@ -191,6 +203,8 @@ def policy_from(
             bytes (N, H, W, 3). By default `Gray` and `Standardize`, or `Rgb` if `logits` was
             trained on color frames. Those of a model of Stable-Baselines3 come before the wrappers
             of its environment.
+        inputs: Several inputs instead of camera and transforms, as in `drone_rl.make_env`; the
+            callable gets a dictionary of floats (N, *) by their names.
         env: Environment of Stable-Baselines3 in which the model was trained, with its wrappers
             (`VecNormalize`, `VecFrameStack`, observation wrappers of Gymnasium); that of the model
             by default. Task, camera, dynamics and actions default to those of the environment.
@@ -201,6 +215,14 @@ def policy_from(
             acts otherwise than its library.
     """
     network = _checked_logits(logits, env)
+    of_env: Mapping[str, Any] = getattr(network, "conditions", {})
+    observations: Any = getattr(network, "observations", None)
+    given = of_env.get("inputs") if inputs is None else inputs
+    made: Any = Instance(Inputs | None).read(given, "inputs")
+    if made is not None:
+        if camera is not None or transforms is not None:
+            raise InputError("camera= and transforms= have no effect with inputs=; leave them out")
+        camera, transforms = first_camera(describe_inputs(made)), ()
     if camera is not None:
         camera = Instance(CameraSettings).read(camera, "camera")
     dynamics = Instance(DynamicsSettings).read(dynamics, "dynamics")
@@ -209,8 +231,6 @@ def policy_from(
     if isinstance(task, str):
         task = BaseTaskSettings.read(task, "task")
     before_wrappers = None if transforms is None else as_transforms(transforms)
-    of_env: Mapping[str, Any] = getattr(network, "conditions", {})
-    observations: Any = getattr(network, "observations", None)
     dynamics = of_env.get("dynamics", dynamics) if dynamics is COMPUTER_VISION else dynamics
     trained_in: AppearanceSettings = Instance(AppearanceSettings).read(appearance, "appearance")
     policy = ExternalPolicy(
@@ -220,9 +240,10 @@ def policy_from(
         camera=camera or of_env.get("camera") or _camera_of(network),
         transforms=(
             _transforms_of(network, before_wrappers)
-            if observations is None
+            if observations is None or made is not None
             else observations.all_transforms(before_wrappers)
         ),
+        inputs=made,
         actions=of_env.get("actions", actions) if actions is MOVES_SETTINGS else actions,
         own_dynamics=dynamics,
         dynamics=dynamics,

@@ -22,7 +22,8 @@ from drone_rl.config import (
     DynamicsSettings,
 )
 from drone_rl.config.configuration import Changes, as_changes
-from drone_rl.envs import Pipeline
+from drone_rl.config.inputs import PIXELS, ImageInput, VectorInput
+from drone_rl.envs.readings import Readings
 from drone_rl.policies import ImageNetwork, RecurrentNetwork, make_actor
 from drone_rl.policies.environment import EnvOptions
 from drone_rl.policies.recurrent import Memory
@@ -289,11 +290,14 @@ class Policy(BasePolicy):
         network.owner = f"policy={self.name}"
         return network
 
-    def act(self, image: np.ndarray | Tensor) -> int | np.ndarray:
-        """Return the greedy action for one image of its camera, see `act_batch`.
+    def act(
+        self, image: np.ndarray | Tensor | None = None, /, **inputs: np.ndarray | Tensor
+    ) -> int | np.ndarray:
+        """Return the greedy action for one reading of each camera and sensor, see `act_batch`.
 
         Args:
-            image: RGB, uint8. Shape: (H, W, 3).
+            image: The input of a policy that has a single one. Shape: (H, W, 3).
+            inputs: The inputs by name, as in `act_batch`, without the first dimension.
 
         Returns:
             The index of the action, or the values of a continuous one.
@@ -301,63 +305,64 @@ class Policy(BasePolicy):
         Raises:
             InputError: See `act_batch`.
         """
-        image = _copied(image)
-        if image.ndim != 3:
-            raise InputError(
-                f"an image of shape {tuple(image.shape)} is not one of shape (H, W, 3); give one "
-                "image, or several to act_batch"
-            )
-        action = self.act_batch(image[None])[0].numpy()
+        action = self._act(image, inputs, single=True)[0].numpy()
         return action if action.ndim else int(action)
 
-    @torch.no_grad()
-    def act_batch(self, images: np.ndarray | Tensor) -> Tensor:
-        """Return the greedy actions for images of several drones.
+    def act_batch(
+        self, images: np.ndarray | Tensor | None = None, /, **inputs: np.ndarray | Tensor
+    ) -> Tensor:
+        """Return the greedy actions of several drones.
 
-        The images pass through its transforms, without simulated camera faults. If it stacks
-        frames or is recurrent, it remembers the images of earlier calls, until `reset`.
+        Images pass through the policy's transforms, without simulated errors. If it stacks frames
+        or is recurrent, it remembers the images of earlier calls, until `reset`.
 
         Args:
-            images: RGB, uint8. Shape: (N, H, W, 3).
+            images: The input of a policy that has a single one. Shape: (N, H, W, 3).
+            inputs: The inputs by name, as cameras and sensors give them: RGB, uint8
+                (N, H, W, 3), depth in metres (N, H, W), vectors in SI units (N, n); see
+                `drone_rl.envs.readings`.
 
         Returns:
             The index of each action, or the values of continuous ones. Shape: (N, ...).
 
         Raises:
-            InputError: They are no images, or do not fit the camera or the images of the last call.
+            InputError: An input is missing or unknown, or does not fit the policy or the last call.
         """
-        images, camera = _copied(images), self.description.camera
-        size = (camera.height, camera.width, 3)
-        if images.dtype != torch.uint8 or images.ndim != 4 or images.shape[1:] != size:
-            raise InputError(
-                f"images of shape {tuple(images.shape)} and type {images.dtype} do not fit the "
-                f"policy's camera; give uint8 of shape (N, {camera.height}, {camera.width}, 3)"
-            )
-        network, pipeline = self._network_and_pipeline
-        memories = [stage.memory for stage in pipeline.stages if stage.memory is not None]
+        return self._act(images, inputs, single=False)
+
+    @torch.no_grad()
+    def _act(self, image: Any, inputs: Mapping[str, Any], *, single: bool) -> Tensor:
+        network, reader = self._network_and_readings
+        if image is not None:
+            if len(reader.inputs) > 1:
+                raise InputError(f"the policy reads {', '.join(reader.inputs)}; give them by name")
+            inputs = {**dict.fromkeys(reader.inputs, image), **inputs}
+        readings = reader.read(inputs, single=single)
+        count = len(next(iter(readings.values())))
+        memories = reader.memories
         remembered = [*memories, *(memory.hidden for memory in self._memory)]
-        if remembered and len(remembered[0]) != len(images):
+        if remembered and len(remembered[0]) != count:
             raise InputError(
-                f"{len(images)} images follow {len(remembered[0])}; call reset() before images of "
+                f"{count} images follow {len(remembered[0])}; call reset() before images of "
                 "another number of drones"
             )
-        observation = pipeline(images, starts=not memories)
+        seen = reader(readings, starts=not memories)
         if isinstance(network, RecurrentNetwork):
-            memory = self._memory[0] if self._memory else network.start(len(images))
-            outputs, memory = network.step(observation, memory)
+            memory = self._memory[0] if self._memory else network.start(count)
+            outputs, memory = network.step(seen[PIXELS], memory)
             self._memory[:] = [memory]
         else:
-            outputs = network(observation)
+            outputs = network(*(seen[name] for name in network.in_keys))
         return network.actions.greedy(outputs)
 
     def reset(self) -> None:
         """Forget the images of earlier calls of `act` and `act_batch`, before a new episode."""
         self._memory.clear()
-        self._network_and_pipeline[1].forget()
+        self._network_and_readings[1].forget()
 
     @functools.cached_property
-    def _network_and_pipeline(self) -> tuple[ImageNetwork, Pipeline]:
-        return self.make_network(), Pipeline(self.description.without_faults().make_transforms())
+    def _network_and_readings(self) -> tuple[ImageNetwork, Readings]:
+        return self.make_network(), Readings(self.description.inputs)
 
     def _repr_html_(self) -> str:
         progress, described = self.state.progress, self.description
@@ -369,21 +374,20 @@ class Policy(BasePolicy):
                 name: ", ".join(f"{k}={v}" for k, v in part.model_dump().items())
                 for name, part in parts.items()
             },
-            "sees": " > ".join(transform.name for transform in described.transforms),
+            "sees": _text_of(described.inputs),
             "trained": f"{progress.frames:,} frames, {progress.episodes:,} episodes",
             "file": str(self.path),
         }
         return table(["policy", self.name], [[name, text] for name, text in rows.items()])
 
 
-def _copied(images: np.ndarray | Tensor) -> Tensor:
-    """Return a copy as a tensor: cameras reuse buffers, and torch has no negative strides."""
-    if isinstance(images, Tensor):
-        return images.detach().cpu().clone()
-    try:
-        return torch.as_tensor(np.array(images))
-    except (TypeError, ValueError):  # None, a path, images of several sizes
-        raise InputError(f"{shown(images)} is no image; give an array of uint8, RGB") from None
+def _text_of(inputs: Mapping[str, ImageInput | VectorInput]) -> str:
+    """Return names and transforms of inputs."""
+    parts = []
+    for name, seen in inputs.items():
+        steps = [step.name for step in getattr(seen, "transforms", ())]
+        parts.append(" > ".join(steps if name == PIXELS else [name, *steps]))
+    return ", ".join(parts)
 
 
 def load_policy(which: str | Path | Policy, *, outputs: str | Path = "outputs") -> Policy:

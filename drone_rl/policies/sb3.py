@@ -4,7 +4,6 @@ import copy
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 import torch
 from torch import Tensor, nn
 
@@ -19,6 +18,7 @@ extra("stable_baselines3", "sb3", "drone_rl.policies.sb3")
 
 import gymnasium  # noqa: E402 (after the check that the extra is installed)
 from gymnasium import spaces  # noqa: E402
+from gymnasium.vector.utils import create_empty_array  # noqa: E402
 from stable_baselines3.common.base_class import BaseAlgorithm  # noqa: E402
 from stable_baselines3.common.policies import ActorCriticPolicy  # noqa: E402
 from stable_baselines3.common.preprocessing import (  # noqa: E402
@@ -41,8 +41,8 @@ class Sb3Logits(nn.Module):
     """The log-probabilities of a PPO or A2C policy, a copy in evaluation mode; see `policy_from`.
 
     Raises:
-        InputError: It is no model, or no actor-critic with discrete actions, or needs a state, more
-            than one array, or an environment that was not given, or is not that of the model.
+        InputError: It is no model, or no actor-critic with discrete actions, or needs a state or
+            an environment that was not given, or is not that of the model.
     """
 
     def __init__(self, model: BaseAlgorithm, env: VecEnv | gymnasium.Env | None = None) -> None:
@@ -56,13 +56,13 @@ class Sb3Logits(nn.Module):
         kind, space = type(model).__name__, model.policy.observation_space
         is_discrete = isinstance(model.policy.action_space, spaces.Discrete)
         is_actor = isinstance(model.policy, ActorCriticPolicy) and is_discrete
-        if not is_actor or not isinstance(space, spaces.Box):
+        if not is_actor or not isinstance(space, spaces.Box | spaces.Dict):
             raise InputError(
-                f"the policy of {kind} gives no logits of a single image; give one of PPO or A2C "
-                "with discrete actions, or a callable from images to logits"
+                f"the policy of {kind} gives no logits of images; give one of PPO or A2C with "
+                "discrete actions, or a callable from images to logits"
             )
         self.policy: Any = _copy_of(model.policy)
-        sample = np.zeros((1, *space.shape), space.dtype)
+        sample: Any = create_empty_array(space)
         _, state = self.policy.predict(sample, deterministic=True)
         if state is not None:
             raise InputError(
@@ -83,29 +83,37 @@ class Sb3Logits(nn.Module):
     conditions: dict[str, Any]
     """Name, camera, task, dynamics and actions, as far as they are known."""
 
-    def forward(self, pixels: Tensor) -> Tensor:
-        """Frames (N, C, H, W), bytes as 0 to 1, to log-probabilities (N, number of actions)."""
+    def forward(self, pixels: Tensor | dict[str, Tensor]) -> Tensor:
+        """Frames (N, C, H, W), bytes as 0 to 1, to log-probabilities (N, number of actions).
+
+        A model of several inputs takes a dictionary of them.
+        """
+        if isinstance(pixels, dict):
+            return self._log_probabilities(pixels)
         seen = to_space(pixels, self.observations.space)
         return self._log_probabilities(seen)
 
     def predict(
-        self, frames: Tensor, transforms: Sequence[Transform] | None = None
+        self, frames: Any, transforms: Sequence[Transform] | None = None
     ) -> tuple[Tensor, Tensor]:
         """Return what the library itself does in an episode, with its wrappers.
 
         Args:
-            frames: RGB, uint8. Shape: (T, H, W, 3).
+            frames: RGB, uint8, of shape (T, H, W, 3), or several inputs, a TensorDict (T,).
             transforms: Those up to the wrappers, where the environment's are unknown.
 
         Returns:
             The deterministic actions, (T,), and the log-probabilities, (T, number of actions).
         """
-        seen = self.observations.of_episode(frames, transforms)
+        if isinstance(frames, Tensor):
+            seen: Any = self.observations.of_episode(frames, transforms)
+        else:
+            seen = {name: values.numpy() for name, values in frames.items()}
         actions, _ = self.policy.predict(seen, deterministic=True)
         tensor, _ = self.policy.obs_to_tensor(seen)
         return torch.from_numpy(actions), self._log_probabilities(tensor)
 
-    def _log_probabilities(self, seen: Tensor) -> Tensor:
+    def _log_probabilities(self, seen: Any) -> Tensor:
         made = self.policy.get_distribution(seen)
         logits = made.distribution.logits
         made.distribution = None  # the policy holds it, and torch copies no results

@@ -75,7 +75,7 @@ class Observations:
     It reads the wrappers and copies those with statistics; the environment does not change.
     """
 
-    def __init__(self, env: VecEnv | None, space: spaces.Box) -> None:
+    def __init__(self, env: VecEnv | None, space: Any) -> None:
         """Read the wrappers of an environment with observations of `space`; None: only the space.
 
         Raises:
@@ -84,6 +84,13 @@ class Observations:
         """
         wrappers, world = ([], None) if env is None else _unwrap(env)
         self.space, self.names = space, [type(wrapper).__name__ for wrapper in wrappers]
+        if not isinstance(space, spaces.Box) and (wrappers or world is None):
+            raise InputError(
+                f"{', '.join(self.names) or 'an unknown environment'} makes the dictionary that "
+                "the model observes, and only those of drone_rl can be read; give "
+                "drone_rl.policy_from env=, the environment of the training, without wrappers "
+                "that change observations"
+            )
         self.conditions: dict[str, Any] = _conditions(world)
         self.transforms: tuple[Transform, ...] | None = None
         self.reason = (
@@ -107,8 +114,8 @@ class Observations:
         self._wrappers = wrappers
         self._inner = _space_of(_inside(wrappers[0])) if wrappers else space
 
-    space: spaces.Box
-    """Of the model."""
+    space: Any
+    """Of the model: a box, or a dictionary of several inputs."""
     names: list[str]
     """Names of the wrappers that change observations, the innermost first."""
     conditions: dict[str, Any]
@@ -386,7 +393,7 @@ def _conditions(world: DroneWorld | DroneWorlds | None) -> dict[str, Any]:
         )
     return {
         "task": world.batch.task,
-        "camera": options.camera,
+        **({"camera": options.camera} if options.inputs is None else {"inputs": options.inputs}),
         "dynamics": options.dynamics,
         "actions": options.actions,
     }

@@ -1,7 +1,7 @@
 """Behavior cloning: train a policy's network to repeat the actions of demonstrations.
 
-The network learns from the recorded images through the policy's transforms, without its simulated
-camera faults. The loss is the cross-entropy of discrete actions, the negative log-likelihood of
+The network learns from the recorded readings through the policy's transforms, without its simulated
+errors. The loss is the cross-entropy of discrete actions, the negative log-likelihood of
 continuous ones. A new run clones before its first update; the result is part of its first
 checkpoint, so that a resumed run does not repeat it.
 """
@@ -14,10 +14,9 @@ from typing import Any, NamedTuple, Self, TypeVar
 import torch
 from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
-from torchrl.envs import Transform
 
 from drone_rl.config.training import TrainSettings
-from drone_rl.envs import Pipeline
+from drone_rl.envs.readings import Readings
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.actor import distribution_of
 from drone_rl.policies.zoo import describe
@@ -38,30 +37,35 @@ T = TypeVar("T")
 class RecordedFrames(NamedTuple):
     """The frames of several flights, one flight after the other."""
 
-    images: Tensor  # (N, H, W, 3) uint8
+    readings: dict[str, Tensor]  # (N, *), as in `drone_rl.envs.readings`
     actions: Tensor  # (N,), then the shape of an action
     starts: Tensor  # (N,) int64, index of the first frame of each frame's flight
 
     @classmethod
     def of(cls, demonstrations: Sequence[Demonstration], device: str) -> Self:
         """Join at least one flight."""
-        images = torch.cat([torch.from_numpy(flight.images) for flight in demonstrations])
+        readings = {
+            name: torch.cat([torch.from_numpy(flight.readings[name]) for flight in demonstrations])
+            for name in demonstrations[0].readings
+        }
         actions = torch.cat([torch.from_numpy(flight.actions) for flight in demonstrations])
         lengths = torch.tensor([len(flight) for flight in demonstrations])
         starts = (lengths.cumsum(0) - lengths).repeat_interleave(lengths)
-        return cls(images.to(device), actions.to(device), starts.to(device))
+        readings = {name: values.to(device) for name, values in readings.items()}
+        return cls(readings, actions.to(device), starts.to(device))
 
-    def observe(self, rows: Tensor, transforms: Sequence[Transform]) -> Tensor:
-        """Return the network's input for some frames, (k,) to (k, C, h, w).
+    def observe(self, rows: Tensor, reader: Readings) -> dict[str, Tensor]:
+        """Return the network's inputs for some frames, (k,) to (k, *).
 
         Transforms that stack frames get the earlier frames of the same flight, and repeat its first
         one, as in an episode.
         """
-        pipeline = Pipeline(transforms)
-        earlier = range(pipeline.earlier, -1, -1)
-        return pipeline.of_frames(
-            [self.images[torch.maximum(rows - by, self.starts[rows])] for by in earlier]
-        )
+        seen: dict[str, Tensor] = {}
+        for by in range(reader.earlier, -1, -1):
+            at = torch.maximum(rows - by, self.starts[rows])
+            readings = {name: values[at] for name, values in self.readings.items()}
+            seen = reader(readings, starts=by == reader.earlier)
+        return seen
 
 
 def imitation_loss(outputs: Tensor, actions: Tensor) -> Tensor:
@@ -103,7 +107,7 @@ class Cloner:
         """Take the network, which is trained in place."""
         self.network = network
         self.how, self.limits = settings.cloning, settings.trainer
-        self.transforms = describe(settings).without_faults().make_transforms()
+        self.reader = Readings(describe(settings).inputs)
         self.optimizer = torch.optim.Adam(network.parameters(), lr=self.how.lr)
 
     def learn(self, frames: RecordedFrames, generator: torch.Generator) -> dict[str, float]:
@@ -139,7 +143,7 @@ class Cloner:
         """Return the mean loss and the accuracy of the frames with the indices "row"."""
         rows = chunk.get("row")
         taken, actions = frames.actions[rows], self.network.actions
-        outputs = self.network(frames.observe(rows, self.transforms))
+        outputs = self.network(*frames.observe(rows, self.reader).values())
         is_same = actions.part(actions.greedy(outputs)) == actions.part(taken)
         return TensorDict(
             {_LOSS: imitation_loss(outputs, taken).mean(), "accuracy": is_same.float().mean()}

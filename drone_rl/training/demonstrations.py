@@ -8,12 +8,14 @@ import dataclasses
 import functools
 import io
 import re
+from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import torch
+from annotated_types import MaxLen
 from numpy.typing import NDArray
 
 from drone_rl.collectors.complete_episodes import rollout
@@ -24,8 +26,18 @@ from drone_rl.config import (
     DynamicsSettings,
 )
 from drone_rl.config.configuration import from_arguments
+from drone_rl.config.inputs import (
+    MOST_INPUTS,
+    PIXELS,
+    ImageInput,
+    InputDescription,
+    describe_inputs,
+    first_camera,
+    recorded_inputs,
+)
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
+from drone_rl.envs.readings import reading_form
 from drone_rl.envs.rollout import Recording
 from drone_rl.policies.baselines import make_baseline
 from drone_rl.sim.actions import Entry
@@ -46,7 +58,7 @@ from drone_rl.utils.schema import Instance, Text, Whole, shown
 
 MOST_DEMONSTRATIONS = 10_000
 """Largest number of demonstrations in a folder."""
-_ARRAYS = ("images", "actions", "rewards", "done")
+_ARRAYS = ("actions", "rewards", "done")
 _PILOT = Text(100)
 _NAME = re.compile(r"flight_([0-9]{5,9})\.npz")
 _PATIENCE_S = 10.0
@@ -61,12 +73,17 @@ class FlightConditions(Model):
     """Camera of the policy."""
     dynamics: DynamicsSettings
     actions: ActionSettings
+    inputs: Annotated[dict[str, InputDescription], MaxLen(MOST_INPUTS)] = {}
+    """What cameras and sensors give, by the names of the policy's inputs; empty for the image of
+    `camera` alone."""
 
     @classmethod
     def of(cls, settings: TrainSettings) -> Self:
         """Return the conditions of a training."""
         Instance(TrainSettings).read(settings, "settings")
-        return cls(**{name: getattr(settings, name) for name in cls.model_fields})
+        values = {name: getattr(settings, name) for name in cls.model_fields}
+        inputs = describe_inputs(settings.inputs, settings.camera, settings.transforms)
+        return cls(**{**values, "inputs": recorded_inputs(inputs)})
 
     def check_same(self, other: "FlightConditions", where: str) -> None:
         """Raise an `InputError` if `other`, those of a training, differ in a value with an effect.
@@ -91,7 +108,13 @@ class FlightConditions(Model):
         if names == ("mode",):
             names = ("kind", "turn_step") if self.actions.has_turns else ("kind",)
             parts["actions"] = {name: parts["actions"][name] for name in names}
+        parts["camera"] = {} if self.inputs else parts["camera"]
         return {f"{part}.{k}": v for part, values in parts.items() for k, v in values.items()}
+
+    @property
+    def recorded(self) -> dict[str, Any]:
+        """Descriptions of what is recorded, by the names of inputs."""
+        return {**(self.inputs or {PIXELS: ImageInput.of(self.camera, ())})}
 
     @functools.cached_property
     def action_entry(self) -> Entry:
@@ -117,8 +140,9 @@ class Demonstration:
     """
 
     conditions: FlightConditions
-    images: NDArray[np.uint8]  # (T, H, W, 3)
-    """Images of the policy's camera before each action, RGB."""
+    images: NDArray[np.uint8] | Mapping[str, NDArray[Any]]  # (T, H, W, 3)
+    """Images of the policy's camera before each action, RGB; what cameras and sensors give by name,
+    see `drone_rl.envs.readings`, if the conditions have inputs."""
     actions: NDArray[Any]  # (T,), then the shape of an action
     """Actions: int64 if they are discrete, else float32 from -1 to 1."""
     rewards: NDArray[np.float32]  # (T,)
@@ -139,20 +163,8 @@ class Demonstration:
         steps = len(self.actions) if self.actions.ndim else 0
         if not steps:
             raise InputError("a flight has no steps; record at least one")
-        entry, camera = self.conditions.action_entry, self.conditions.camera
-        expected = {
-            "images": ((steps, camera.height, camera.width, 3), np.dtype(np.uint8)),
-            "actions": ((steps, *entry.shape), torch.empty(0, dtype=entry.dtype).numpy().dtype),
-            "rewards": ((steps,), np.dtype(np.float32)),
-            "done": ((steps,), np.dtype(np.bool_)),
-        }
-        for name, (shape, dtype) in expected.items():
-            array = getattr(self, name)
-            if (array.shape, array.dtype) != (shape, dtype):
-                raise InputError(
-                    f"{name} has shape {array.shape} and type {array.dtype}; a flight of {steps} "
-                    f"steps under these conditions has {shape} and {dtype}"
-                )
+        self._check_shapes(steps)
+        entry = self.conditions.action_entry
         low, high = entry.low, entry.high
         assert low is not None and high is not None
         if not ((self.actions >= low) & (self.actions <= high)).all():
@@ -162,6 +174,37 @@ class Demonstration:
         if self.done[:-1].any():
             raise InputError("done is true before the last step; write one file for each episode")
 
+    def _check_shapes(self, steps: int) -> None:
+        """Check the arrays' names, shapes and types, and that readings are numbers."""
+        entry, recorded = self.conditions.action_entry, self.conditions.recorded
+        if self.readings.keys() != recorded.keys():
+            names = ", ".join(self.readings)
+            raise InputError(f"a flight has {names}; record {', '.join(recorded)}")
+        forms = {name: reading_form(seen) for name, seen in recorded.items()}
+        expected = {
+            **{"images" if n == PIXELS else n: ((steps, *s), t) for n, (t, s) in forms.items()},
+            "actions": ((steps, *entry.shape), entry.dtype),
+            "rewards": ((steps,), torch.float32),
+            "done": ((steps,), torch.bool),
+        }
+        given = {("images" if n == PIXELS else n): array for n, array in self.readings.items()}
+        for name, (shape, dtype) in expected.items():
+            array = given[name] if name in given else getattr(self, name)
+            wanted = torch.empty(0, dtype=dtype).numpy().dtype
+            if (array.shape, array.dtype) != (shape, wanted):
+                raise InputError(
+                    f"{name} has shape {array.shape} and type {array.dtype}; a flight of {steps} "
+                    f"steps under these conditions has {shape} and {wanted}"
+                )
+        for name, array in given.items():
+            if np.isnan(array).any():
+                raise InputError(f"{name} holds NaN; give numbers")
+
+    @property
+    def readings(self) -> Mapping[str, NDArray[Any]]:
+        """What cameras and sensors gave, by the names of inputs. Shapes: (T, *)."""
+        return self.images if isinstance(self.images, Mapping) else {PIXELS: self.images}
+
     def __len__(self) -> int:
         """Return the number of steps."""
         return len(self.actions)
@@ -170,6 +213,7 @@ class Demonstration:
         """Return the content of the file."""
         about = _About(pilot=self.pilot, **self.conditions.model_dump())
         arrays: dict[str, Any] = {name: getattr(self, name) for name in _ARRAYS}
+        arrays |= {_entry(name): array for name, array in self.readings.items()}
         file = io.BytesIO()
         np.savez_compressed(file, about=about.model_dump_json(), **arrays)
         return file.getvalue()
@@ -183,18 +227,28 @@ def read_demonstration(path: Path) -> Demonstration:
     """
     arrays = read_arrays(path)
     try:
-        if arrays.keys() != {*_ARRAYS, "about"}:
-            raise InputError(f"it does not hold exactly about, {', '.join(_ARRAYS)}")
-        about = arrays.pop("about")
+        about = arrays.pop("about", np.empty(0))
         if about.shape or about.dtype.kind != "U":
             raise InputError("its description is no text")
         data = _About.read(parse_json(about.item(), "its description"), "about")
-        conditions = data.model_dump(include={*FlightConditions.model_fields})
-        return Demonstration(FlightConditions.read(conditions), pilot=data.pilot, **arrays)
+        conditions = FlightConditions.read(
+            data.model_dump(include={*FlightConditions.model_fields})
+        )
+        entries = {_entry(name): name for name in conditions.recorded}
+        if arrays.keys() != {*_ARRAYS, *entries}:
+            raise InputError(f"it does not hold exactly about, {', '.join([*entries, *_ARRAYS])}")
+        readings = {name: arrays.pop(entry) for entry, name in entries.items()}
+        images = readings if conditions.inputs else readings[PIXELS]
+        return Demonstration(conditions, images=images, pilot=data.pilot, **arrays)
     except InputError as error:
         raise InputError(
             f"{path} can't be used as a demonstration ({error}); remove the file or record again"
         ) from None
+
+
+def _entry(name: str) -> str:
+    """Return the name of the array of an input in a file."""
+    return "images" if name == PIXELS else f"inputs.{name}"
 
 
 def read_demonstrations(
@@ -284,10 +338,14 @@ def record_oracle(
     settings = from_arguments(TrainSettings, settings, changes, record_oracle)
     folder = as_path(folder, "folder")
     flights = Whole(1).read(flights, "flights")
+    conditions, paths = FlightConditions.of(settings), []
+    inputs = describe_inputs(settings.inputs, settings.camera, settings.transforms)
+    clean = {name: seen.without_errors() for name, seen in inputs.items()}
     env = DroneEnv(
         flights,
         settings.task,
-        settings.camera,
+        first_camera(inputs),
+        inputs=clean if conditions.inputs else None,
         seed=seed,
         first_world=_next_number(folder),
         device=settings.device,
@@ -299,13 +357,13 @@ def record_oracle(
     with closing(env):
         worlds, actions = env.worlds, env.worlds.dynamics.actions
         oracle = make_baseline("oracle", worlds.task, actions, torch.Generator())
-        batch: Any = rollout(Recording(oracle), env, flights, keep=None).steps
-    conditions, paths = FlightConditions.of(settings), []
+        batch: Any = rollout(Recording(oracle, readings=True), env, flights, keep=None).steps
     for number in range(flights):
         steps = batch[batch["collector", "traj_ids"] == number]
+        images = {name: steps[name].numpy() for name in conditions.recorded}
         demonstration = Demonstration(
             conditions,
-            images=steps["pixels"].numpy(),
+            images=images if conditions.inputs else images[PIXELS],
             actions=steps["action"].numpy(),
             rewards=steps["next", "reward"][:, 0].numpy(),
             done=steps["next", "done"][:, 0].numpy(),

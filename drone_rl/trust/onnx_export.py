@@ -46,9 +46,10 @@ def agreement(
 ) -> Agreement:
     """Run a policy with sampled actions and compare another implementation at every step.
 
-    The actor writes "logits"; `other` takes RGB images (N, H, W, 3), uint8, for a recurrent policy
-    also which episodes start, bool (N, 1), and returns `Actions.probabilities` (N, A) on the CPU.
-    Environments whose episode ends are reset.
+    The actor writes "logits"; `other` takes the readings of each input in order, see
+    `drone_rl.envs.readings`, for a recurrent policy also `is_init`, which episodes start, bool
+    (N, 1), and returns `Actions.probabilities` (N, A) on the CPU. Environments whose episode ends
+    are reset.
     """
     base = base_env(env)
     actions = base.worlds.dynamics.actions
@@ -57,8 +58,9 @@ def agreement(
     for context, act, *_ in run:
         assert act.distribution is not None
         probs.append(actions.probabilities(act.distribution).cpu())
-        started = [context.starts[:, None].cpu()] if "is_init" in actor.in_keys else []
-        others.append(other(context.render().cpu(), *started))
+        starts = {"is_init": context.starts[:, None].cpu()} if "is_init" in actor.in_keys else {}
+        readings = [values.cpu() for values in context.readings.values()]
+        others.append(other(*readings, **starts))
     mine, its = torch.cat(probs), torch.cat(others)
     return Agreement(
         frames=len(mine),
@@ -84,7 +86,7 @@ def export_onnx(
         seed: Root of the random streams of the comparison; a fresh one by default.
 
     Returns:
-        Agreement of the model and PyTorch on 10,000 images of the policy's episodes.
+        Agreement of the model and PyTorch in 10,000 steps of the policy's episodes.
 
     Raises:
         InputError: The policy can't be converted, the model differs, or the file can't be written.

@@ -17,7 +17,9 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import EnvBase
 
+from drone_rl.config.inputs import ImageInput
 from drone_rl.envs import DroneEnv, Observer, base_env
+from drone_rl.envs.observer import ImageSource, frames_of
 from drone_rl.envs.rollout import Act, ActorAgent, Agent, StepContext, as_agent, steps
 from drone_rl.policies.actor import Exploring
 from drone_rl.policies.policy import Policy
@@ -39,6 +41,7 @@ from drone_rl.sim.rendering.appearance import Mounting, product, rotate
 from drone_rl.sim.tasks import State, Task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.trust import instruments
+from drone_rl.trust.plots.images import shown_picture
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.palette import MUTED, PAPER
 from drone_rl.utils.seeding import legacy_seed
@@ -137,7 +140,7 @@ class StepImages(NamedTuple):
     """Images of one step. Shapes: (height, width, 3); of the strip: (5, height, width, 3)."""
 
     camera: Tensor
-    """The policy's camera, before transforms."""
+    """The policy's camera, before transforms; of several images, one below the other."""
     chase: Tensor
     strip: Tensor
     """The cameras `CAMERAS`."""
@@ -224,7 +227,28 @@ def render_step(base: DroneEnv) -> StepImages:
     if isinstance(body, FlightState) and isinstance(dynamics, Quadrotor):
         panel = instruments.panel(instruments.read(body), dynamics.settings.hover_throttle)
     seen = worlds.render(worlds.state, appearance=look)[0]
+    if not base.observer.sees_pixels and base.observer.images:
+        seen = _stacked(
+            [_shown(image, worlds.state, look) for image in base.observer.images.values()]
+        )
     return StepImages(seen, chase, strip, panel)
+
+
+def _shown(image: ImageSource, state: State, look: Appearance | None) -> Tensor:
+    """Return what an input's camera gives in the first environment. (H, W, 3), uint8."""
+    reading, seen = image.read(state, torch.empty(0), look), image.seen
+    if not isinstance(seen, ImageInput) or seen.modality == "rgb":
+        return reading[0].cpu()
+    channels = {"normals": "rgb", "segmentation": "classes"}.get(seen.modality, "gray")
+    frame = frames_of(seen, reading)[0].cpu().numpy()
+    return torch.from_numpy(shown_picture(frame, 0.0, 1.0, channels))
+
+
+def _stacked(pictures: list[Tensor]) -> Tensor:
+    """Join pictures, one below the other, black at the right of narrower ones."""
+    width = max(picture.shape[1] for picture in pictures)
+    pad = torch.nn.functional.pad
+    return torch.cat([pad(one, (0, 0, 0, width - one.shape[1])) for one in pictures])
 
 
 def _compose(

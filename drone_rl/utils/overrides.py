@@ -27,7 +27,7 @@ _SCALAR = r"[\w.+-]*"
 _VALUE = rf"({_SCALAR}|\[({_SCALAR}(, ?{_SCALAR})*)?\])"
 _SECTIONS = (
     "task|appearance|dynamics|actions|camera|trainer|network|returns|objective|optimizer|"
-    "scheduler|transforms|provable|cloning"
+    "scheduler|transforms|inputs|provable|cloning"
 )
 _TAKEN_OVER = (
     r"(seed|evaluate_after|renderer)=\w*",
@@ -35,6 +35,8 @@ _TAKEN_OVER = (
     rf"({_SECTIONS}|collector|logger|experiment|sweep)=[A-Za-z][\w-]*",
     rf"\+{{0,2}}({_SECTIONS})(\.{_NAME}){{1,3}}={_VALUE}",
     rf"~transforms\.{_NAME}",
+    rf"inputs=\[({_NAME}(, ?{_NAME})*)?\]",
+    rf"\+{{0,2}}inputs@inputs\.{_NAME}={_NAME}",
     rf"collector\.(num_envs|num_threads|num_cpus|max_lost_workers|compiled)={_SCALAR}",
 )
 """Overrides that a resumed run takes from the file: choices by name and plain values."""

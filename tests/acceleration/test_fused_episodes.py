@@ -158,9 +158,21 @@ CLIMBING = VELOCITY.replace(climb_speed=1.0, backward_speed=0.5)
 PILLARS = PillarsSettings(step_limit=40)
 
 
-@pytest.mark.parametrize("task", [SHORT.replace(step_limit=40), PILLARS])
-@pytest.mark.parametrize("dynamics", [None, FLYING, GIMBAL.replace(gusts=2.0, control_ticks=66)])
-@pytest.mark.parametrize("actions", [ActionSettings(), VELOCITY, CLIMBING])
+GUSTY = GIMBAL.replace(gusts=2.0, control_ticks=66)
+LONG = SHORT.replace(step_limit=40)
+
+
+@pytest.mark.parametrize(
+    ("task", "dynamics", "actions"),
+    [
+        (LONG, None, VELOCITY),
+        (PILLARS, None, CLIMBING),
+        (LONG, FLYING, VELOCITY),
+        (PILLARS, FLYING, ActionSettings()),
+        (LONG, GUSTY, CLIMBING),
+        (PILLARS, GUSTY, VELOCITY),
+    ],
+)
 def test_flight_at_velocities_and_among_obstacles_is_fused(task, dynamics, actions):
     how = {"dynamics": dynamics, "actions": actions, "info": ("drone", "attitude")}
     collector = make(task, **how)
@@ -373,14 +385,20 @@ RANDOM = AppearanceSettings(
 )
 
 
-@pytest.mark.parametrize("look", [None, AppearanceSettings(fog_visibility=30.0), RANDOM])
+FOG = AppearanceSettings(fog_visibility=30.0)
+CROPPED = (GrayPixels, partial(Shift, 4, 6), STACK, StandardizePixels, partial(CropRows, 3, 23))
+COLORS = (RgbPixels, partial(Shift, 6, 9), ChromaticityPixels, StandardizePixels, STACK)
+
+
 @pytest.mark.parametrize(
-    "transforms",
+    ("look", "transforms"),
     [
-        (GrayPixels,),
-        (GrayPixels, partial(Shift, 4, 6), STACK, StandardizePixels, partial(CropRows, 3, 23)),
-        (RgbPixels, StandardizePixels),
-        (RgbPixels, partial(Shift, 6, 9), ChromaticityPixels, StandardizePixels, STACK),
+        (FOG, (GrayPixels,)),
+        (None, CROPPED),
+        (RANDOM, CROPPED),
+        (None, (RgbPixels, StandardizePixels)),
+        (FOG, COLORS),
+        (RANDOM, COLORS),
     ],
 )
 def test_colors_shifts_and_visual_randomization_are_fused(look, transforms):

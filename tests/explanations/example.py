@@ -34,6 +34,11 @@ def method(trusted, failed, score):
     }
 
 
+def input_effect(matters, *excess):
+    effects = {"effect": median(*excess), "placebo": median(0.0, 0.0, 0.0)}
+    return {**effects, "excess": median(*excess), "matters": matters}
+
+
 def optimized(probabilities, highest):
     images = np.zeros((ACTIONS, 1, 4, 30))
     images[1] = 1.0  # that for left is white
@@ -226,6 +231,14 @@ CONTENT = {
         },
     },
     "left_out": {"embedding": "It has no layers."},
+    "importance": {
+        "inputs": {
+            "depth": input_effect(True, 0.1, 0.2, 0.3),
+            "goal": input_effect(False, 0.0, 0.001, 0.002),
+        },
+        "least": 0.01,
+        "level": 0.001,
+    },
     "asymmetry": {
         "signed": mean(-0.2, -0.3, -0.1),
         "absolute": mean(0.3, 0.2, 0.4),

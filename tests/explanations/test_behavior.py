@@ -10,7 +10,7 @@ from drone_rl.explanations.behavior import (
     find_loops,
     find_pairs,
     flaws_section,
-    median_frame_change,
+    median_change,
     verdict_section,
 )
 from drone_rl.explanations.rollouts import RolloutDataset
@@ -91,10 +91,10 @@ def test_the_median_change_is_within_episodes():
     # episodes, 90, does not count
     pictures = [[0, 0], [6, 6], [7, 7], [10, 4], [100, 100], [104, 104], [99, 99]]
     data = fake(pictures, np.zeros((7, 3)), np.zeros((7, 2)), episode=[0, 0, 0, 0, 1, 1, 1])
-    assert median_frame_change(data) == pytest.approx(4.0)
+    assert median_change(data.observations, data.episode) == pytest.approx(4.0)
     data.arrays["episode"][4:] = [1, 2, 3]
-    assert median_frame_change(data) == pytest.approx(3.0)
-    assert median_frame_change(fake([[0]], np.zeros((1, 3)), np.zeros((1, 2)))) == 0.0
+    assert median_change(data.observations, data.episode) == pytest.approx(3.0)
+    assert median_change(np.zeros((1, 3)), np.zeros(1)) == 0.0
 
 
 class Frames(SimpleNamespace):

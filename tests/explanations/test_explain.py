@@ -10,6 +10,8 @@ import torch
 
 import drone_rl
 from drone_rl.config import TaskSettings
+from drone_rl.config.inputs import Altitude, DepthImage, GrayImage
+from drone_rl.config.networks import SmallCnn
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
 from drone_rl.explanations import explain as explaining
 from drone_rl.explanations.context import Context, LeftOutError
@@ -25,8 +27,9 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import RootSeed
 from tests.explanations.example import changed_explanation
-from tests.explanations.quick import ALL_SECTIONS, quick
+from tests.explanations.quick import ALL_SECTIONS, few_sections, quick, quick_figures
 from tests.second_task import NUM_POSTS, Posts
+from tests.untrained import untrained
 
 SEED = RootSeed(6, is_fixed=False)
 
@@ -98,6 +101,21 @@ def test_the_result_prints_verdict_and_report(tmp_path):
     assert shown._repr_html_().startswith(
         '<iframe sandbox="allow-scripts" srcdoc="&lt;h1&gt;trusted?'
     )
+
+
+def test_each_image_has_maps_of_its_own(tmp_path):
+    inputs = {"gray": GrayImage(), "altitude": Altitude(), "depth": DepthImage(size=(20, 40))}
+    policy = untrained(SmallCnn(channels=(2,), hidden=(4,)), inputs=inputs)
+    with few_sections("attribution", "dataset"), quick_figures():
+        how = {"frames": 30, "perplexity": 5, "num_envs": 30, "progress": silent}
+        found = drone_rl.explain(policy, folder=tmp_path, **how)
+    gray, depth = found.policies["untrained"], found.policies["untrained, depth"]
+    assert gray.dataset is not None and depth.dataset is None
+    assert gray.attribution.layer == "branches.gray.relu1"
+    assert gray.attribution.frames.shape[1:] == (25, 64, 3)
+    assert depth.attribution.layer == "branches.depth.relu1"
+    assert depth.attribution.frames.shape[1:] == (20, 40, 3)
+    assert "untrained, depth" in found.report.read_text()
 
 
 SMALL = ExplainSettings(frames=40, episodes=6, perplexity=5, seed=3)

@@ -152,7 +152,9 @@ def test_asymmetry_of_frames_by_hand():
     distance = 0.5 * np.abs(here - there[:, [0, 2, 1]]).sum(1)
     episode = np.arange(10) // 2
     observed = torch.tensor(x, dtype=torch.float32)[:, None, None]
-    found = asymmetry(sides(bias), observed, episode, MOVES)
+    network = sides(bias)
+    mirrored = probabilities(network, observed.flip(-1))
+    found = asymmetry(probabilities(network, observed), mirrored, episode, MOVES)
     assert found.absolute.mean == pytest.approx(distance.mean(), abs=1e-5)
     assert found.signed.mean == pytest.approx((here[:, 1] - there[:, 2]).mean(), abs=1e-5)
     assert found.signed.lower95 < -0.5  # few episodes tell little, down to -1

@@ -8,10 +8,12 @@ import torch
 from torch.nn.functional import cross_entropy
 
 from drone_rl.config import CameraSettings
+from drone_rl.config.inputs import ImageInput
 from drone_rl.config.networks import Mlp
 from drone_rl.config.training import CloningSettings, TrainSettings
 from drone_rl.config.transforms import Gray, Stack, Standardize
 from drone_rl.envs import DroneEnv
+from drone_rl.envs.readings import Readings
 from drone_rl.policies.zoo import describe
 from drone_rl.training import Callback
 from drone_rl.training.cloning import (
@@ -76,13 +78,16 @@ def test_the_loss_of_continuous_actions_is_the_negative_log_likelihood():
     torch.testing.assert_close(imitation_loss(outputs, actions), expected, rtol=1e-5, atol=1e-5)
 
 
+def reader(*transforms):
+    return Readings({"pixels": ImageInput.of(SETTINGS.camera, transforms)})
+
+
 def test_frames_are_joined_and_stacked_within_their_flight():
     frames = RecordedFrames.of([flight(0, 2), flight(1, 3)], "cpu")
     assert frames.starts.tolist() == [0, 0, 2, 2, 2]
     assert frames.actions.tolist() == [*flight(0, 2).actions, *flight(1, 3).actions]
-    level = [float(image[0, 0, 0]) / 255 for image in frames.images]
-    stacked = [t.make() for t in (Gray(), Stack(N=3))]
-    seen = frames.observe(torch.tensor([0, 1, 2, 3, 4]), stacked)
+    level = [float(image[0, 0, 0]) / 255 for image in frames.readings["pixels"]]
+    seen = frames.observe(torch.tensor([0, 1, 2, 3, 4]), reader(Gray(), Stack(N=3)))["pixels"]
     expected = [(0, 0, 0), (0, 0, 1), (2, 2, 2), (2, 2, 3), (2, 3, 4)]
     assert seen.shape == (5, 3, 2, 4)
     torch.testing.assert_close(
@@ -102,8 +107,10 @@ def test_observations_are_those_of_an_environment(more):
         seen.append(state["pixels"])
         state = env.step(state.set("action", torch.tensor([action])))["next"]
         image = raw.step(image.set("action", torch.tensor([action])))["next"]
-    frames = RecordedFrames(torch.cat(images), torch.zeros(3), torch.zeros(3, dtype=torch.int64))
-    torch.testing.assert_close(frames.observe(torch.arange(3), steps), torch.cat(seen))
+    starts = torch.zeros(3, dtype=torch.int64)
+    frames = RecordedFrames({"pixels": torch.cat(images)}, torch.zeros(3), starts)
+    found = frames.observe(torch.arange(3), reader(*SETTINGS.transforms, *more))
+    torch.testing.assert_close(found["pixels"], torch.cat(seen))
     env.close()
     raw.close()
 
@@ -135,9 +142,8 @@ def test_a_network_learns_the_actions_of_the_flights():
     assert (done["held_out_demonstrations"], done["held_out_frames"]) == (1, 12)
     assert (done["folder"], done["epochs"]) == ("x", 60) and done["seconds"] > 0
     assert Cloning.read(done, "cloning").model_dump() == done
-    observed = RecordedFrames.of(FLIGHTS, "cpu").observe(
-        torch.arange(60), [t.make() for t in SETTINGS.transforms]
-    )
+    frames = RecordedFrames.of(FLIGHTS, "cpu")
+    observed = frames.observe(torch.arange(60), reader(*SETTINGS.transforms))["pixels"]
     taken = torch.cat([torch.from_numpy(one.actions) for one in FLIGHTS])
     assert torch.equal(own(observed).argmax(-1), taken)
     assert all(parameter.grad is None for parameter in own.parameters())
@@ -155,7 +161,7 @@ def test_one_epoch_is_one_step_of_adam_for_each_minibatch():
     done = clone(settings, own, FLIGHTS)["cloning"]
     optimizer = torch.optim.Adam(other.parameters(), lr=0.01)
     frames = RecordedFrames.of(FLIGHTS, "cpu")
-    observed = frames.observe(torch.arange(60), [t.make() for t in SETTINGS.transforms])
+    observed = frames.observe(torch.arange(60), reader(*SETTINGS.transforms))["pixels"]
     loss = cross_entropy(other(observed), frames.actions)
     loss.backward()
     optimizer.step()

@@ -31,6 +31,7 @@ def test_settings_of_a_training_are_taken_over(noted):
         "++task.reward.near_wall.weight=-0.5",
         *("task.cube_color=[0.1, 0.2, 0.3]", "transforms.crop.top=3", "~transforms.standardize"),
         *("+optimizer.amsgrad=true", "objective.reduction=sum", "collector.num_envs=8"),
+        *("inputs=[gray,goal]", "+inputs@inputs.down=depth", "inputs.down.size=[48,64]"),
         *("cloning.epochs=5", "collector.compiled=false", "renderer=mujoco_warp"),
     ]
     assert taken_over(noted(settings), []) == settings
@@ -59,6 +60,7 @@ def test_paths_of_the_first_run_are_left_out(noted):
         *("network._target_=os.system", "network={_target_:os.system}", "+a={_target_:os.system}"),
         *("hydra.run.dir=/x", "hydra/launcher=ray", "+hydra.job.name=x", "pathsx.outputs=/x"),
         *("logger.tensorboard.log_dir=/x", "collector.address=ray://x", "collector.make=os.system"),
+        *("inputs.a._target_=os.system", "+inputs@inputs.a=os.system", "inputs=[os.system]"),
         *("network=../x", "network=/x", "network=a/b", "experiment=[a,b]", "+network=mlp"),
         *("seed=${oc.env:HOME}", "task.spacing=${task.num_cubes}", "seed=1,2", "seed=range(9)"),
         *("--config-dir=/x", "-m", "seed", "~network", "seed=1\nx=2", "device=os.system"),

@@ -107,13 +107,13 @@ def _defaults_of(command: type[CommandSettings]) -> tuple[dict[str, Any], dict[s
     values: dict[str, Any] = {"plugins": []}
     for name, value in command():
         (kind, *_) = inner_types(hints_of(command)[name])
+        if name in CHOSEN:
+            groups[name] = [CHOSEN[name][1]]
         if name in GROUPS:
             groups[name] = GROUPS[name][1] if isinstance(value, Settings) else None
         if isinstance(kind, Changes):
             groups[name], values[name] = None, dict.fromkeys(kind.names)
-        elif name in CHOSEN:
-            groups[name] = [CHOSEN[name][1]]
-        elif name in SEVERAL:
+        elif name in SEVERAL or name in CHOSEN:
             values[name] = {}  # without a choice, as in transforms=[], there are none
         elif groups.get(name) is None and name not in ("task", *PARTS):
             values[name] = plain(value)

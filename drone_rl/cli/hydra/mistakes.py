@@ -25,6 +25,7 @@ OPTIONS = {"-m", "--multirun", "-h", "--help"}
 """Options of Hydra that are documented; all others are refused."""
 _OVERRIDE = re.compile(r"\+{0,2}[A-Za-z][\w./@-]*=.*|~[A-Za-z][\w./@-]*(=.*)?", re.DOTALL)
 _EMPTY_FOLDER = re.compile(r"\+{0,2}(hydra\.(run|sweep)\.dir|paths\.\w+)=")
+_LIST = re.compile(r"\[([^\[\]]*)\]")
 _FOR_SWEEPS = ("hydra/launcher", "hydra/sweeper")
 _EXTENSIBLE = ("task", "network", "returns", "objective", "collector")
 """Groups for which modules of the user's register choices."""
@@ -82,6 +83,13 @@ def _problem(word: str, name: str, words: Sequence[str]) -> str | None:
         return None
     if value == "{}":
         return f"it changes nothing; {group} is one of {', '.join(choices(group))}, or [] for none"
+    for one in _LIST.findall(value):
+        listed = re.findall(r"[\w.-]+", one)
+        if twice := [choice for choice in listed if listed.count(choice) > 1]:
+            return (
+                f"it has {twice[0]} twice; give the other one a name of its own, as in "
+                f"+{group}@{group}.second={twice[0]}"
+            )
     options = choices(group)
     unknown = {*re.findall(r"[\w.-]+", value)} - {*options}
     alternative = ", or your own with plugins=[MODULE]" if group in _EXTENSIBLE else ""
@@ -122,7 +130,8 @@ def _is_group(name: str) -> bool:
 
 def _names(name: str, words: Sequence[str]) -> list[str]:
     """Return the settings and groups that a command has with the groups' choices in its words."""
-    selected = [w for w in words if "," not in w and _is_group(w.partition("=")[0])]
+    groups = [w for w in words if _is_group(w.lstrip("+").partition("=")[0].partition("@")[0])]
+    selected = [w for w in groups if "," not in _LIST.sub("", w)]
     try:
         config = composed(name, selected)
     except (HydraException, OmegaConfBaseException):
@@ -142,6 +151,8 @@ def _meant(name: str, keys: Collection[str]) -> str:
             values: Any = ConfigStore.instance().load(f"{group}/{choice}.yaml").node
             if name in flattened({group: values}):
                 return f"; {group}={choice} has it"
+            if name in flattened({group: {choice: values}}):
+                return f"; {group}=[{choice}] has it"
     return next((f"; did you mean {meant}?" for meant in similar(name, keys)), "")
 
 

@@ -12,7 +12,14 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.envs.gymnasium.world_batch import METADATA, Chosen, WorldBatch, read_action
+from drone_rl.envs.gymnasium.world_batch import (
+    METADATA,
+    Chosen,
+    Seen,
+    WorldBatch,
+    read_action,
+    rows_of,
+)
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Whole
 
@@ -20,7 +27,7 @@ Info = dict[str, Any]
 Mask = NDArray[np.bool_]
 
 
-class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
+class DroneWorlds(VectorEnv[Seen, Any, NDArray[Any]]):
     """`gymnasium.make_vec("drone_rl/MyTask-v0", num_envs=64)`; see `DroneWorld`.
 
     It behaves like Gymnasium's `SyncVectorEnv` of `DroneWorld`s: after `reset(seed=7)` environment
@@ -79,7 +86,7 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         *,
         seed: int | Sequence[int | None] | None = None,
         options: Mapping[str, Any] | None = None,
-    ) -> tuple[NDArray[Any], Info]:
+    ) -> tuple[Seen, Info]:
         """Start episodes.
 
         Args:
@@ -98,7 +105,7 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         self._ended = ~mask if self._ended is None else self._ended & ~mask
         return seen, _masked(self.batch.info(), mask)
 
-    def step(self, actions: Any) -> tuple[NDArray[Any], NDArray[Any], Mask, Mask, Info]:
+    def step(self, actions: Any) -> tuple[Seen, NDArray[Any], Mask, Mask, Info]:
         """Step each environment by one of `single_action_space`; reset those that had finished.
 
         Raises:
@@ -133,14 +140,14 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         """Close the renderer."""
         self.batch.worlds.close()
 
-    def _finish(self, ended: Mask, seen: NDArray[Any]) -> tuple[NDArray[Any], Info]:
+    def _finish(self, ended: Mask, seen: Seen) -> tuple[Seen, Info]:
         """Reset environments that have just finished, as last seen.
 
         Return the observations then, and the final information.
         """
         last = np.full(self.num_envs, None, object)
         for i in np.flatnonzero(ended):
-            last[i] = seen[i].copy()
+            last[i] = rows_of(seen, i)
         info = _masked(self.batch.info(), ended)
         after = self.batch.observe(True, self._start(ended))
         self._ended = np.zeros_like(ended)
@@ -202,14 +209,15 @@ def _mode(name: AutoresetMode | str) -> AutoresetMode:
 _ONLY = torch.zeros(1, dtype=torch.int64)
 
 
-class DroneWorld(gymnasium.Env[NDArray[Any], Any]):
+class DroneWorld(gymnasium.Env[Seen, Any]):
     """A drone with a task: `gymnasium.make("drone_rl/MyTask-v0", step_limit=50)` for my_task.
 
     The name is registered with the task: `import drone_rl` registers those of the package, your
     module its own. Gymnasium imports a module before a colon: `"my_module:drone_rl/MyTask-v0"`.
 
     Observations are camera images, RGB bytes (height, width, 3), after the `transforms`, if any,
-    among which may be camera faults and stacks of frames. With `observations="state"` they are the
+    among which may be camera faults and stacks of frames; with `inputs=["gray", "goal"]` they are a
+    dictionary of these inputs. With `observations="state"` they are the
     ground truth as a float32 vector: the entries of `info` except "end_reason" and "is_success", in
     order. For `info` see `WorldBatch.info`. The task's step limit truncates.
 
@@ -235,7 +243,7 @@ class DroneWorld(gymnasium.Env[NDArray[Any], Any]):
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[Any], dict[str, Any]]:
+    ) -> tuple[Seen, dict[str, Any]]:
         """Start an episode.
 
         A seed is that of this episode and the following ones; None continues the random stream.
@@ -248,9 +256,9 @@ class DroneWorld(gymnasium.Env[NDArray[Any], Any]):
             raise InputError(f"options={list(options)} are unknown to reset; give none")
         self.batch.reset(_ONLY, [self.np_random])
         self._is_running = True
-        return self.batch.observe(True)[0], self._info()
+        return rows_of(self.batch.observe(True), 0), self._info()
 
-    def step(self, action: Any) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
         """Step the environment by one of `action_space`.
 
         Raises:
@@ -262,7 +270,8 @@ class DroneWorld(gymnasium.Env[NDArray[Any], Any]):
         reward = self.batch.step(actions[None])
         terminated, truncated = (bool(flag) for (flag,) in self.batch.flags())
         self._is_running = not (terminated or truncated)
-        return self.batch.observe(False)[0], float(reward[0]), terminated, truncated, self._info()
+        seen = rows_of(self.batch.observe(False), 0)
+        return seen, float(reward[0]), terminated, truncated, self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
         """Render the drone from behind, (360, 640, 3), if `render_mode` is set."""

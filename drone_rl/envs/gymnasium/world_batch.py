@@ -13,7 +13,7 @@ from torch import Tensor
 
 from drone_rl.config import BaseTaskSettings, TaskSettings
 from drone_rl.config.commands import GymnasiumSettings
-from drone_rl.config.inputs import PIXELS
+from drone_rl.config.inputs import PIXELS, describe_inputs, first_camera
 from drone_rl.envs import DroneEnv
 from drone_rl.envs.observer import Starts
 from drone_rl.sim.actions import Actions, Entry
@@ -27,8 +27,19 @@ _MOST = float(np.finfo(np.float32).max)
 """Bound of spaces without a limit: Gymnasium's checker requires finite bounds."""
 
 
-def image_space(example: Tensor) -> spaces.Box:
-    """Return the space of images: bytes are from 0 to 255, floats any numbers."""
+Seen = NDArray[Any] | dict[str, NDArray[Any]]
+"""Observations: an array, or arrays by the names of inputs."""
+
+
+def rows_of(seen: Seen, row: Any) -> Any:
+    """Return a row of observations."""
+    if isinstance(seen, dict):
+        return {name: values[row] for name, values in seen.items()}
+    return seen[row]
+
+
+def input_space(example: Tensor) -> spaces.Box:
+    """Return the space of an input: bytes are from 0 to 255, floats any numbers."""
     shape, is_bytes = tuple(example.shape), example.dtype == torch.uint8
     return spaces.Box(0, 255, shape, np.uint8) if is_bytes else spaces.Box(-_MOST, _MOST, shape)
 
@@ -118,14 +129,23 @@ class WorldBatch:
         """The task or its settings."""
         self.render_mode = options.render_mode
         self.has_images = options.observations == "pixels"
-        if options.transforms and not self.has_images:
+        if (options.transforms or options.inputs) and not self.has_images:
+            what = "transforms change images" if options.transforms else "inputs are of policies"
             raise InputError(
-                f"transforms change images, but observations={options.observations}; leave them out"
+                f"{what}, but observations={options.observations}; leave one of them out"
+            )
+        self.inputs = None if options.inputs is None else describe_inputs(options.inputs)
+        """The inputs by name, if they were given."""
+        if self.inputs is not None and {"camera", "transforms"} & options.model_fields_set:
+            raise InputError(
+                "camera= and transforms= describe the default input; leave them out, or describe "
+                "all inputs in inputs="
             )
         self._env = DroneEnv(
             num_envs,
             as_task(self.task),
-            options.camera,
+            options.camera if self.inputs is None else first_camera(self.inputs),
+            inputs=self.inputs,
             transforms=[transform.make() for transform in options.transforms],
             pixels=self.has_images,
             device=options.device,
@@ -137,12 +157,15 @@ class WorldBatch:
         self._every = torch.arange(num_envs, device=self.worlds.device)
         self.names = tuple(name for name in self.worlds.entries if name != END)
         """Entries of `info` that make up the state vector, in order."""
-        self.observation_space: spaces.Box = (
-            image_space(self._env.observer.image.example()[0])
-            if self.has_images
-            else vector_space({name: self.worlds.entries[name] for name in self.names})
-        )
+        self.observation_space: spaces.Space[Any] = self._observation_space()
         self.action_space = action_space(self.worlds.dynamics.actions.entry)
+
+    def _observation_space(self) -> spaces.Space[Any]:
+        if not self.has_images:
+            return vector_space({name: self.worlds.entries[name] for name in self.names})
+        examples = self._env.observer.examples().items()
+        inputs: dict[str, Any] = {name: input_space(example[0]) for name, example in examples}
+        return inputs[PIXELS] if self.inputs is None else spaces.Dict(inputs)
 
     def reset(self, env_ids: Tensor, generators: Sequence[np.random.Generator]) -> None:
         """Reset environments by index, shape (k,), each with its own random generator."""
@@ -156,8 +179,8 @@ class WorldBatch:
         actions = actions.to(self.worlds.device)
         return self.worlds.step(self._every, actions).cpu().numpy()
 
-    def observe(self, starts: Starts, env_ids: Tensor | None = None) -> NDArray[Any]:
-        """Return the observations of all environments as a new array, after a step or reset.
+    def observe(self, starts: Starts, env_ids: Tensor | None = None) -> Seen:
+        """Return the observations of all environments as new arrays, after a step or reset.
 
         Args:
             starts: Where episodes start, see `drone_rl.envs.observer.Starts`.
@@ -165,7 +188,8 @@ class WorldBatch:
         """
         if self.has_images:
             seen = self._env.observe(self._every if env_ids is None else env_ids, starts)
-            return seen[PIXELS].cpu().numpy().copy()
+            arrays = {name: values.cpu().numpy().copy() for name, values in seen.items()}
+            return arrays[PIXELS] if self.inputs is None else arrays
         info = self.worlds.info()
         flat = [info[name][:, None].flatten(1).float().nan_to_num() for name in self.names]
         return torch.cat(flat, 1).cpu().numpy()

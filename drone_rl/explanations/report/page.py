@@ -13,6 +13,7 @@ from drone_rl.explanations.report import (
     behavior,
     class_models,
     embedding,
+    importance,
     places,
     response,
     truth,
@@ -32,6 +33,7 @@ PARTS: dict[str, Part] = {
     "dataset": behavior.DATASET_PART,
     "tsne": embedding.PART,
     "flaws": behavior.FLAWS_PART,
+    "importance": importance.PART,
     "class_model": class_models.PART,
     "attribution": attribution.PART,
     "truth": truth.PART,
@@ -104,7 +106,7 @@ def render_page(explanations: Sequence[Explanation], folder: Path) -> str:
             html = render_section(name, explanations, folder)
             parts.append({"id": name, "title": part.title, "label": part.label, "html": html})
     environment = _environment()
-    several = len(explanations) > 1
+    several = len({str(e.provenance.get("policy", e.name)) for e in explanations}) > 1
     style, script = static_text(environment, STYLES), static_text(environment, SCRIPTS)
     return environment.get_template("report.html").render(
         title="Can these policies be trusted?" if several else "Can this policy be trusted?",

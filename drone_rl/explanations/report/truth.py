@@ -25,7 +25,7 @@ _TESTS: Mapping[str, tuple[float, Callable[[MethodTest], Median | None]]] = {
 """Limit and result of each test, by the title of its chart."""
 
 
-class _Row(NamedTuple):
+class Row(NamedTuple):
     """A value with an interval, which is not known with too few episodes."""
 
     label: str
@@ -43,22 +43,22 @@ def truth_charts(truth: Truth) -> dict[str, Figure]:
     scores = [_score_row(METHOD_NAMES[n], colors[n], of.score) for n, of in methods]
     scores += [_score_row(f"placebo: {name}", css(MUTED), score) for name, score in ordered]
     title = "agreement with the patches that affect\nthe policy (score; chance: 0; line: 95%)"
-    charts = [_interval_chart(scores, 0.0, title)]
+    charts = [interval_chart(scores, 0.0, title)]
     for title, (limit, result_of) in _TESTS.items():
         rows = []
         for name, method in methods:
             result = result_of(method)
             ends = (result.median, result.lower, result.upper) if result else (None, None, None)
-            rows.append(_Row(METHOD_NAMES[name], colors[name], *ends))
-        charts.append(_interval_chart(rows, limit, title))
+            rows.append(Row(METHOD_NAMES[name], colors[name], *ends))
+        charts.append(interval_chart(rows, limit, title))
     return {chart.axes[0].get_title().replace("\n", " "): chart for chart in charts}
 
 
-def _score_row(label: str, color: str, score: Mean) -> _Row:
-    return _Row(label, color, score.mean, score.lower95, score.upper95)
+def _score_row(label: str, color: str, score: Mean) -> Row:
+    return Row(label, color, score.mean, score.lower95, score.upper95)
 
 
-def _interval_chart(rows: Sequence[_Row], limit: float, title: str) -> Figure:
+def interval_chart(rows: Sequence[Row], limit: float, title: str) -> Figure:
     """Plot values with their intervals, the first on top, and a limit."""
     figure, axis = new_chart(height=1.6 + 0.3 * len(rows))
     for y, row in enumerate(reversed(rows)):

@@ -14,6 +14,8 @@ import torch
 from PIL import Image
 from torch import Tensor
 
+from drone_rl.config.inputs import ImageInput
+from drone_rl.envs import Pipeline
 from drone_rl.flight.fly_page.pilots import (
     CONTROLS,
     Axes,
@@ -111,11 +113,10 @@ class Flight:
         self._wants_saliency, self._shows_saliency = settings.saliency, settings.saliency
         self._over = 0.0
         self._seen, self._seen_at = self.world.see(), 0.0
-        levels = [
-            self.world.scenes.transform(torch.full_like(self._seen.frame, v)) for v in (0, 255)
-        ]
-        self._levels = float(levels[0].min()), float(levels[1].max())
-        """What is shown as black and as white."""
+        described = policy.description.inputs
+        self._images = {n: i for n, i in described.items() if isinstance(i, ImageInput)}
+        self._levels = {name: _levels(image) for name, image in self._images.items()}
+        """What is shown of each image as black and as white."""
         self._number = 0
         self._flyer = make_pilot(self._kind, self.world, self._note_step)
 
@@ -220,8 +221,8 @@ class Flight:
         self.controls.release()
         self._flyer = make_pilot(self._kind, self.world, self._note_step)
 
-    def _note_step(self, frame: Tensor, action: Tensor, reward: float) -> None:
-        self.recorder.note(frame, action, reward)
+    def _note_step(self, readings: dict[str, Tensor], action: Tensor, reward: float) -> None:
+        self.recorder.note(readings, action, reward)
         if self.world.is_over:
             self._finish_recording()
 
@@ -341,6 +342,7 @@ class Flight:
             "end": end,
             "note": self.note,
             "recording": recording,
+            "vectors": self._vectors(),
             "method": _SALIENCY[self.saliency.state].format(
                 problem=self.saliency.problem, method=(self.saliency.method or "").replace("_", " ")
             ),
@@ -364,13 +366,47 @@ class Flight:
         return encode(picture, "jpeg", quality=JPEG_QUALITY)
 
     def _observed(self) -> bytes:
-        """Return the observation, with the heat map if there is one to show."""
-        seen = self._look()
-        observation = seen.observation[0].numpy()
-        picture = shown_picture(observation, *self._levels, self.world.scenes.channels)
+        """Return the images among the inputs, the first with its heat map if there is one to show.
+
+        They stand one below the other.
+        """
+        seen, pictures = self._look(), []
         shows = self._shows_saliency and self.saliency.state == "shown"
-        heat = self.saliency.heat(seen) if shows else None
-        return encode(Image.fromarray(picture if heat is None else heated(picture, heat)), "png")
+        for name, image in self._images.items():
+            values = seen.inputs[name][0].numpy()
+            picture = shown_picture(values, *self._levels[name], _channels(image))
+            heat = self.saliency.heat(seen) if shows and not pictures else None
+            pictures.append(Image.fromarray(picture if heat is None else heated(picture, heat)))
+        size = max((p.width for p in pictures), default=1), sum(p.height for p in pictures) or 1
+        whole, top = Image.new("RGB", size), 0
+        for picture in pictures:
+            whole.paste(picture, (0, top))
+            top += picture.height
+        return encode(whole, "png")
+
+    def _vectors(self) -> str:
+        """Return the vectors among the inputs, in their units, as text."""
+        readings = self._look().readings
+        vectors = {name: readings[name][0].tolist() for name in readings.keys() - self._images}
+        texts = (
+            f"{n} {' '.join(f'{v:.2f}' for v in vectors[n])}" for n in readings if n in vectors
+        )
+        return "; ".join(texts)
+
+
+def _levels(image: ImageInput) -> tuple[float, float]:
+    """Return the least and greatest value of an image after its transforms."""
+    transforms = [transform.make() for transform in image.without_errors().transforms]
+    most, dtype = (1.0, torch.float32) if image.frame.is_float else (255, torch.uint8)
+    frames = [torch.full((1, *image.frame.shape), v, dtype=dtype) for v in (0, most)]
+    dark, light = (Pipeline(transforms)(frame) for frame in frames)
+    return float(dark.min()), float(light.max())
+
+
+def _channels(image: ImageInput) -> str:
+    """Return the channels of an image, see `shown_picture`."""
+    colors = [step.name for step in image.transforms if step.name in ("rgb", "chromaticity")]
+    return {"normals": "rgb", "segmentation": "classes"}.get(image.modality, [*colors, "gray"][0])
 
 
 def packed(state: Mapping[str, Any], images: Sequence[tuple[str, str, bytes]]) -> bytes:

@@ -123,7 +123,7 @@ class FlyPilot(abc.ABC):
         """Let time pass. `speed` is in metres a second."""
 
 
-Note = Callable[[Tensor, Tensor, float], None]
+Note = Callable[[dict[str, Tensor], Tensor, float], None]
 """Called with image, action and reward of each step: (1, H, W, 3), (1, ...)."""
 
 
@@ -137,8 +137,8 @@ class _Steps(FlyPilot):
         self._note, self._left = note, 0.0
 
     def _take(self, action: Tensor) -> None:
-        frame = self.world.see().frame
-        self._note(frame, action, self.world.step(action))
+        readings = self.world.see().readings
+        self._note(readings, action, self.world.step(action))
 
     def _due(self, seconds: float, speed: float) -> int:
         """Return the number of actions that are due."""

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from torch import Tensor
 
+from drone_rl.config.inputs import PIXELS
 from drone_rl.flight.fly_page.world import World
 from drone_rl.utils.errors import InputError
 
@@ -18,22 +19,22 @@ class Recorder:
         self.is_on = False
         self.saved = 0
         """Number of files written."""
-        self._steps: list[tuple[Tensor, Tensor, float]] = []
+        self._steps: list[tuple[dict[str, Tensor], Tensor, float]] = []
 
     def __len__(self) -> int:
         """Return the number of steps that are not written yet."""
         return len(self._steps)
 
-    def note(self, frame: Tensor, action: Tensor, reward: float) -> None:
+    def note(self, readings: dict[str, Tensor], action: Tensor, reward: float) -> None:
         """Add a step, if recording is on.
 
         Args:
-            frame: Image before the action. Shape: (1, H, W, 3).
+            readings: What cameras and sensors gave before the action. Shapes: (1, *).
             action: The action. Shape: (1,), then that of an action.
             reward: Its reward.
         """
         if self.is_on:
-            self._steps.append((frame, action, reward))
+            self._steps.append((readings, action, reward))
 
     def finish(self, pilot: str) -> None:
         """Write the steps so far, if there are any, to a new file.
@@ -53,13 +54,16 @@ class Recorder:
             add_demonstration,
         )
 
-        frames, actions, rewards = zip(*steps, strict=True)
+        seen, actions, rewards = zip(*steps, strict=True)
         done = np.zeros(len(steps), np.bool_)
         done[-1] = self._world.is_over
+        conditions = FlightConditions(**self._world.conditions)
+        names = conditions.recorded
+        images = {n: np.concatenate([one[n].numpy() for one in seen]) for n in names}
         try:
             demonstration = Demonstration(
-                FlightConditions(**self._world.conditions),
-                images=np.concatenate([frame.numpy() for frame in frames]),
+                conditions,
+                images=images if conditions.inputs else images[PIXELS],
                 actions=np.concatenate([action.numpy() for action in actions]),
                 rewards=np.array(rewards, np.float32),
                 done=done,

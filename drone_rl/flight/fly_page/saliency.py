@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from drone_rl.explanations import trust
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.heat_maps import Explainer
+from drone_rl.explanations.hooks import of_input
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.flight.fly_page.world import Seen, World
 from drone_rl.policies.policy import Policy
@@ -94,10 +95,10 @@ class LiveSaliency:
             return None
         world = self._world
         if self._explainer is None:
-            network = world.policy.make_network()
+            network = of_input(world.policy.make_network(), world.scenes.name)
             self._explainer = Explainer(network, world.scenes.absent)
         part = torch.tensor(seen.probabilities).argmax()[None]
-        maps = self._explainer.methods()[self.method](seen.observation, part, seen.memory)
+        maps = self._explainer.methods()[self.method](seen.observation, part, seen.rest)
         return maps[0].numpy()
 
     def close(self) -> None:

@@ -10,9 +10,9 @@ from tensordict.utils import NestedKey
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
+from drone_rl.config.inputs import recorded_inputs
 from drone_rl.envs import Observer, base_env
 from drone_rl.envs.rollout import ActorAgent, StepContext
-from drone_rl.explanations.hooks import memory_in
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.policies.actor import Exploring
 from drone_rl.policies.policy import Policy
@@ -24,7 +24,6 @@ from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import ObjectTask
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.trust.video import probabilities, render_chase
-from drone_rl.utils.settings import Settings
 
 HEIGHT, WIDTH = 144, 256
 """Pixels of the large image; AirSim's default size."""
@@ -37,16 +36,27 @@ _OTHER_PERIOD = 0.25
 class Seen(NamedTuple):
     """What the policy observes in the present state, and what it would do."""
 
-    frame: Tensor
-    """Image of its camera, RGB, uint8. Shape: (1, H, W, 3)."""
-    observation: Tensor
-    """Input of its network. Shape: (1, C, h, w)."""
+    readings: dict[str, Tensor]
+    """What its cameras and sensors give, see `drone_rl.envs.readings`. Shapes: (1, *)."""
+    inputs: dict[str, Tensor]
+    """Inputs of its network. Shapes: (1, *)."""
     probabilities: tuple[float, ...]
     """Of each part of its actions."""
     action: Tensor
     """The action that it takes. Shape: (1,), then that of an action."""
-    memory: Tensor | None
-    """What a recurrent policy remembers, see `drone_rl.explanations.hooks`."""
+    rest: Tensor | None
+    """What else the policy reads, see `drone_rl.explanations.hooks`."""
+
+    @property
+    def frame(self) -> Tensor:
+        """What its first camera or sensor gives. Shape: (1, H, W, 3) of colors."""
+        return next(iter(self.readings.values()))
+
+    @property
+    def observation(self) -> Tensor:
+        """The first image among its inputs, or else its first input. Shape: (1, C, h, w)."""
+        images = (values for values in self.inputs.values() if values.ndim == 4)
+        return next(images, next(iter(self.inputs.values())))
 
 
 class World:
@@ -171,9 +181,8 @@ class World:
                 self._observer.load_state_dict(seen)
             context = StepContext(self._observer, self.worlds.state, self._every, starts)
             shares = probabilities(act := self._agent.act(context), self.actions)
-            frame, observation = context.render(), context.observe()
-            memory = memory_in(act.entries)
-            self._seen = Seen(frame, observation, tuple(shares.tolist()), act.action, memory)
+            rest, shares = self.scenes.rest_of(act.entries), tuple(shares.tolist())
+            self._seen = Seen(context.readings, context.inputs, shares, act.action, rest)
         return self._seen
 
     def step(self, action: Tensor) -> float:
@@ -228,12 +237,18 @@ class World:
         return base.replace(wind=(*(round(along, 9) + 0.0 for along in level), upward))
 
     @property
-    def conditions(self) -> dict[str, Settings]:
+    def conditions(self) -> dict[str, Any]:
         """The fields of `FlightConditions`, under which flights are recorded."""
         policy = self.policy
         dynamics = self.flight_dynamics if self.has_dynamics else policy.dynamics
         camera, actions = policy.description.camera, policy.actions
-        return {"task": policy.task, "camera": camera, "dynamics": dynamics, "actions": actions}
+        return {
+            "task": policy.task,
+            "camera": camera,
+            "dynamics": dynamics,
+            "actions": actions,
+            "inputs": recorded_inputs(policy.description.inputs),
+        }
 
     # Images
 
@@ -261,7 +276,7 @@ class World:
 
     def _forget(self) -> None:
         """Let the policy begin without earlier frames."""
-        self._memory: tuple[list[dict[str, Any]], Mapping[NestedKey, Tensor]] | None = None
+        self._memory: tuple[dict[str, Any], Mapping[NestedKey, Tensor]] | None = None
         """That of the observer and of the policy after the last step."""
 
     def _place(self, body: BodyState) -> None:

@@ -34,7 +34,10 @@ from drone_rl.config.inputs import (
     PIXELS,
     ImageInput,
     InputDescription,
+    VectorInput,
     describe_inputs,
+    first_camera,
+    is_plain,
     require_name,
 )
 from drone_rl.config.networks import Lstm, Network
@@ -214,7 +217,7 @@ class PolicyDescription(Model):
     @property
     def camera(self) -> CameraSettings:
         """The camera of the first image; the default one without images."""
-        return next((image.settings for image in self.images.values()), CameraSettings())
+        return first_camera(self.inputs)
 
     @property
     def transforms(self) -> tuple[Transform, ...]:
@@ -223,38 +226,19 @@ class PolicyDescription(Model):
 
     @property
     def shapes(self) -> dict[str, tuple[int, ...]]:
-        """Shape of each input as the network gets it: (C, H, W) of an image, (n,) of a vector."""
-        return {
-            name: self._frame(seen).shape if isinstance(seen, ImageInput) else (seen.size,)
-            for name, seen in self.inputs.items()
-        }
-
-    def _frame(self, image: ImageInput) -> Frame:
-        """Return shape and type of an image after its transforms."""
-        frame = image.frame
-        for transform in image.transforms:
-            frame = output_of(transform, frame)
-            if math.prod(frame.shape) > MAX_NUMBERS:
-                raise InputError(
-                    f"the transform {transform.name} makes images of shape {frame.shape}; give "
-                    f"sizes that make at most {MAX_NUMBERS} numbers"
-                )
-        if not frame.is_float:
-            raise InputError("the network needs floats; add a transform such as gray")
-        return frame
+        """Shape of each input as the network gets it, see `shapes_of`."""
+        return shapes_of(self.inputs)
 
     @property
     def sees_pixels(self) -> bool:
         """Whether its only input is the image that `camera` and `transforms` describe."""
-        seen = self.inputs.get(PIXELS)
-        if len(self.inputs) > 1 or not isinstance(seen, ImageInput):
-            return False
-        return (seen.modality, seen.camera.name) == ("rgb", "front")
+        return is_plain(self.inputs)
 
     @property
     def frames(self) -> int:
-        """Number of frames that the network gets at once."""
-        return math.prod(t.N for t in self.transforms if isinstance(t, Stack))
+        """Number of frames of an image that the network gets at once."""
+        stacks = [[t.N for t in i.transforms if isinstance(t, Stack)] for i in self.images.values()]
+        return max(map(math.prod, stacks), default=1)
 
     @property
     def is_recurrent(self) -> bool:
@@ -406,6 +390,33 @@ def describe(settings: TrainSettings) -> PolicyDescription:
         appearance=settings.appearance,
         dynamics=settings.dynamics,
     )
+
+
+def shapes_of(inputs: Mapping[str, ImageInput | VectorInput]) -> dict[str, tuple[int, ...]]:
+    """Return the shape of each input as a network gets it: (C, H, W) of an image, (n,) of a vector.
+
+    Raises:
+        InputError: An image is too large, or still bytes.
+    """
+    return {
+        name: _frame_of(seen).shape if isinstance(seen, ImageInput) else (seen.size,)
+        for name, seen in inputs.items()
+    }
+
+
+def _frame_of(image: ImageInput) -> Frame:
+    """Return shape and type of an image after its transforms."""
+    frame = image.frame
+    for transform in image.transforms:
+        frame = output_of(transform, frame)
+        if math.prod(frame.shape) > MAX_NUMBERS:
+            raise InputError(
+                f"the transform {transform.name} makes images of shape {frame.shape}; give "
+                f"sizes that make at most {MAX_NUMBERS} numbers"
+            )
+    if not frame.is_float:
+        raise InputError("the network needs floats; add a transform such as gray")
+    return frame
 
 
 def output_of(transform: Transform, frame: Frame) -> Frame:

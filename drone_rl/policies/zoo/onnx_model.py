@@ -1,4 +1,4 @@
-"""Policies as ONNX models: from a camera's frame to probabilities, for programs without torch."""
+"""Policies as ONNX models: from readings to probabilities, for programs without torch."""
 
 import contextlib
 import json
@@ -11,7 +11,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from drone_rl.envs import Pipeline
+from drone_rl.config.inputs import PIXELS
+from drone_rl.envs.readings import Readings, reading_form
 from drone_rl.policies import ImageNetwork, RecurrentNetwork
 from drone_rl.policies.recurrent import Memory
 from drone_rl.policies.zoo.description import PolicyDescription
@@ -19,12 +20,13 @@ from drone_rl.utils.errors import InputError, extra
 
 FRAMES, PROBABILITIES, ACTION = "frames", "probabilities", "action"
 STATE, NEXT_STATE = ("hidden", "cell"), ("next_hidden", "next_cell")
-"""Names of the model's inputs and outputs; only recurrent models have the states."""
+"""Names of the model's inputs and outputs; only recurrent models have the states. Other inputs than
+"pixels" have their own names."""
 _SETTING = "format=onnx"
 
 
 class _FullPolicy(nn.Module):
-    """Transforms, network and probabilities: RGB (N, H, W, 3), uint8, to outputs of the model."""
+    """Transforms, network and probabilities: readings of cameras and sensors to outputs."""
 
     def __init__(self, description: PolicyDescription, network: ImageNetwork) -> None:
         super().__init__()
@@ -33,18 +35,18 @@ class _FullPolicy(nn.Module):
                 "the policy sees a stack of frames, but an ONNX model is given one at a time; "
                 "export it with format=safetensors"
             )
-        self._network = network
-        self._transform = Pipeline(description.make_transforms())
+        self._network, self._readings = network, Readings(description.inputs)
         self.has_action = bool(network.actions.entry.shape)
         """Whether there is an output for the action, which is not the most probable part."""
 
-    def forward(self, frames: Tensor, *state: Tensor) -> tuple[Tensor, ...]:
-        actions, network, seen = self._network.actions, self._network, self._transform(frames)
+    def forward(self, *given: Tensor) -> tuple[Tensor, ...]:
+        actions, network, names = self._network.actions, self._network, [*self._readings.inputs]
+        seen = self._readings(dict(zip(names, given, strict=False)))
         following: tuple[Tensor, ...] = ()
         if isinstance(network, RecurrentNetwork):
-            outputs, following = network.step(seen, Memory(*state))
+            outputs, following = network.step(seen[PIXELS], Memory(*given[len(names) :]))
         else:
-            outputs = network(seen)
+            outputs = network(*seen.values())
         decided = (actions.greedy(outputs),) if self.has_action else ()
         return (actions.probabilities(outputs), *decided, *following)
 
@@ -54,35 +56,38 @@ def make_onnx(
 ) -> bytes:
     """Return a policy as an ONNX model.
 
-    The input is "frames", RGB of the camera, uint8 (N, H, W, 3) for any N from 1. The output is
-    "probabilities", of each action, float32 (N, A). Of continuous actions they are those of their
-    parts, see `Actions.probabilities`, and a second output is "action", float32 (N, 3). A recurrent
-    model has further inputs, "hidden" and "cell", float32 (N, 1, size), zero when an episode
-    starts, and further outputs, "next_hidden" and "next_cell", to pass with the next frame. The
-    metadata are JSON: "description", as in policy files; "actions", names in the order of the first
-    output; and `about`.
+    The input is "frames", RGB of the camera, uint8 (N, H, W, 3) for any N from 1; a policy of
+    several inputs has them by name, see `drone_rl.envs.readings`. The output is "probabilities",
+    of each action, float32 (N, A). Of continuous actions they are those of their parts, see
+    `Actions.probabilities`, and a second output is "action", float32 (N, 3). A recurrent model has
+    further inputs, "hidden" and "cell", float32 (N, 1, size), zero when an episode starts, and
+    further outputs, "next_hidden" and "next_cell", to pass with the next frame. The metadata are
+    JSON: "description", as in policy files; "actions", names in the order of the first output; and
+    `about`.
 
     Raises:
         InputError: The policy needs several frames, a package is missing, or ONNX lacks a part.
     """
     extra("onnxscript", "onnx", _SETTING)  # which torch's exporter needs
     passes = extra("onnx_ir.passes.common", "onnx", _SETTING)
-    policy, camera = _FullPolicy(description, network).eval(), description.camera
-    sample = torch.zeros(2, camera.height, camera.width, 3, dtype=torch.uint8)
+    policy = _FullPolicy(description, network).eval()
+    forms = {name: reading_form(seen) for name, seen in description.inputs.items()}
+    samples = [torch.zeros(2, *shape, dtype=dtype) for dtype, shape in forms.values()]
+    names = [FRAMES] if description.sees_pixels else [*forms]
     state = network.start(2) if isinstance(network, RecurrentNetwork) else ()
     any_number = {0: torch.export.Dim("N")}
     try:
         with _silence():
             program = torch.onnx.export(
                 policy,
-                (sample, *state),
+                (*samples, *state),
                 dynamo=True,
-                input_names=[FRAMES, *STATE[: len(state)]],
+                input_names=[*names, *STATE[: len(state)]],
                 output_names=[
                     *(PROBABILITIES, ACTION)[: 1 + policy.has_action],
                     *NEXT_STATE[: len(state)],
                 ],
-                dynamic_shapes=(any_number, *([(any_number,) * len(state)] if state else [])),
+                dynamic_shapes=((any_number,) * (len(samples) + len(state)),),
                 verbose=False,
             )
     except torch.onnx.OnnxExporterError as error:
@@ -101,7 +106,7 @@ def make_onnx(
 
 
 def open_onnx(content: bytes) -> Callable[..., Tensor]:
-    """Return a model of `make_onnx` as a function of frames; it needs onnxruntime.
+    """Return a model of `make_onnx` as a function of its inputs in order; it needs onnxruntime.
 
     A recurrent model is also given which episodes start, bool (N, 1), and keeps its state.
     """
@@ -110,16 +115,19 @@ def open_onnx(content: bytes) -> Callable[..., Tensor]:
     options.intra_op_num_threads = 1  # more would only wait for torch's, and sums depend on them
     session = runtime.InferenceSession(content, options)
 
-    sizes = {entry.name: entry.shape[-1] for entry in session.get_inputs()[1:]}
+    entries = session.get_inputs()
+    names = [entry.name for entry in entries if entry.name not in STATE]
+    sizes = {entry.name: entry.shape[-1] for entry in entries[len(names) :]}
     state: dict[str, np.ndarray] = {}
 
-    def probabilities(frames: Tensor, is_init: Tensor | None = None) -> Tensor:
+    def probabilities(*readings: Tensor, is_init: Tensor | None = None) -> Tensor:
         for name, size in sizes.items():
             assert is_init is not None
-            before = state.get(name, np.zeros((len(frames), 1, size), np.float32))
+            before = state.get(name, np.zeros((len(is_init), 1, size), np.float32))
             state[name] = np.where(is_init.numpy()[..., None], np.float32(0), before)
         outputs = [PROBABILITIES, *NEXT_STATE[: len(sizes)]]
-        chances, *following = session.run(outputs, {FRAMES: frames.numpy(), **state})
+        given = {n: values.numpy() for n, values in zip(names, readings, strict=True)}
+        chances, *following = session.run(outputs, {**given, **state})
         state.update(zip(sizes, following, strict=True))
         return torch.from_numpy(chances)
 

@@ -8,14 +8,26 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from drone_rl.sim.vocabulary import SHOWN_MOVES, ShownActions
-from drone_rl.utils.palette import BOX, INK, MUTED, PAPER, Rgb
+from drone_rl.utils.palette import (
+    BOX,
+    DOWN,
+    GROUND,
+    INK,
+    MUTED,
+    NEXT_CUBE,
+    PAPER,
+    SKY,
+    Rgb,
+)
 
 ROW = 18
 """Height of an action's row, pixels."""
 SCALE = 5
 """Enlargement of a single frame."""
-_CHANNELS = {"gray": 1, "rgb": 3, "chromaticity": 2}
+_CHANNELS = {"gray": 1, "rgb": 3, "chromaticity": 2, "classes": 5}
 """Number of channels of a frame, by kind."""
+_CLASSES = np.array([NEXT_CUBE, DOWN, GROUND, MUTED, SKY]) / 255
+"""Colors of the classes of a segmentation, see `drone_rl.config.inputs.CLASSES`."""
 
 
 def tint(frame: NDArray, color: Rgb, strength: float = 0.4) -> NDArray:
@@ -114,15 +126,17 @@ def gridded(pictures: Sequence[Image.Image], columns: int, gap: int = 12) -> Ima
 def shown_picture(observation: NDArray, low: float, high: float, channels: str) -> NDArray:
     """Convert the newest frame of an observation, shape (C, H, W), to an RGB image, uint8.
 
-    `low` is shown as black, `high` as white. The channels are "gray", "rgb", or "chromaticity" of
-    red and blue. Their green is 1 minus the mean of both: the image distinguishes colors and does
-    not show those of the scene. Shape: (H, W, 3).
+    `low` is shown as black, `high` as white. The channels are "gray", "rgb", "classes", each in its
+    color, or "chromaticity" of red and blue. Their green is 1 minus the mean of both: the image
+    distinguishes colors and does not show those of the scene. Shape: (H, W, 3).
     """
     newest = observation[-_CHANNELS.get(channels, 1) :].astype(np.float64)
     share = ((newest - low) / max(high - low, 1e-12)).clip(0, 1)
     if channels == "chromaticity":
         red, blue = share
         share = np.stack([red, 1 - (red + blue) / 2, blue])
+    elif channels == "classes":
+        share = np.tensordot(_CLASSES.T, share, 1).clip(0, 1)
     elif channels != "rgb":
         share = share.repeat(3, 0)
     return (np.moveaxis(share, 0, -1) * 255).astype(np.uint8)

@@ -43,6 +43,14 @@ def message(line):
         ("train optimizer=adm", "optimizer is one of adam, sgd; did you mean adam?"),
         ("train hydra.run.dir=", "it has no value"),
         ("train hydra/launcher=slurm", "no effect on a single run; add -m"),
+        ("train inputs=[gray,foo]", "inputs is one of altitude, attitude, depth, goal, gray"),
+        ("train inputs=[gray,gray]", "it has gray twice; give the other one a name of its own"),
+        ("train inputs.gray.stack=2", "has no setting inputs.gray.stack; inputs=[gray] has it"),
+        ("train inputs=[gray,goal] inputs.gray.stak=2", "did you mean inputs.gray.stack?"),
+        (
+            "train +inputs@inputs.down=depth inputs.down.camera=down inputs.dwn.stack=2",
+            "inputs.dwn.stack; did you mean inputs.down.stack?",
+        ),
         ("train device=cpu", "Hydra's words"),
         ("train hydra.searchpath=[file://my] sed=x", "Hydra's words"),
     ],
@@ -56,9 +64,24 @@ def test_a_value_of_a_wrong_type_is_named(in_process):
     assert line.startswith("error: optimizer.lr='abc': it must be a number above 0")
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["inputs=[]"], "inputs: the policy would see nothing; give inputs"),
+        (["inputs=[gray]", "inputs.gray.stack=0"], "inputs.gray.stack=0: it must be a whole"),
+        (["inputs=[gray]", "inputs.gray.size=48"], "inputs.gray.size=48: it must be a list"),
+        (["inputs=[gray,velocity]"], "drones that move at once have no velocity"),
+        (["inputs=[gray,goal]", "network=lstm"], "network=lstm takes pixels alone"),
+    ],
+)
+def test_inputs_that_there_are_not_are_one_line(in_process, words, message):
+    assert error_line(in_process("train", *words)).startswith(f"error: {message}")
+
+
 def test_correct_words_pass_the_check():
     words = ["-m", "seed=0,1", "--multirun", "-h", "--help", "~x", "+a.b=1", "a='b c'"]
-    words += ["x=[1,2]", "y='[', ']'", "hydra/launcher=slurm", "task=choice(pillars,collect_one)"]
+    words += ["inputs=[gray,goal],[gray]", "+inputs@inputs.down=depth", "x=[1,2]"]
+    words += ["y='[', ']'", "hydra/launcher=slurm", "task=choice(pillars,collect_one)"]
     check_words("train", words)
 
 

@@ -54,7 +54,7 @@ def test_options_set_task_and_camera(task):
         ({"transforms": ["grey"]}, "transforms.*grey.*did you mean gray"),
         (
             {"transforms": ["gray"], "observations": "state"},
-            "transforms change images, but observations=state; leave them out",
+            "transforms change images, but observations=state; leave one of them out",
         ),
     ],
 )

@@ -115,8 +115,8 @@ def test_a_recurrent_model_forgets_where_an_episode_starts():
     model = open_onnx(make_onnx(description, network, {}))
     frames = torch.randint(0, 256, (2, 8, 16, 3), generator=torch.Generator().manual_seed(1))
     frames = frames.to(torch.uint8)
-    first = model(frames, torch.tensor([[True], [True]]))
-    second = model(frames, torch.tensor([[True], [False]]))
+    first = model(frames, is_init=torch.tensor([[True], [True]]))
+    second = model(frames, is_init=torch.tensor([[True], [False]]))
     assert torch.equal(second[0], first[0])
     assert not torch.allclose(second[1], first[1], atol=1e-3)
 

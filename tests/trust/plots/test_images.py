@@ -7,7 +7,7 @@ from PIL import Image
 from drone_rl.sim.vocabulary import ShownActions
 from drone_rl.trust.plots import images as pictures
 from drone_rl.trust.plots.images import ROW, indicator
-from drone_rl.utils.palette import INK, MUTED, PAPER
+from drone_rl.utils.palette import INK, MUTED, NEXT_CUBE, PAPER, SKY
 
 BLACK = np.zeros((4, 6, 3), np.uint8)
 RED, BLUE = (214, 39, 40), (31, 96, 200)
@@ -54,6 +54,13 @@ def test_chromaticity_observation():
     observation = np.array([red, blue, gray]).T[:, None]
     shown = pictures.shown_picture(observation, 0.0, 1.0, channels="chromaticity")
     assert shown.tolist() == [[[255, 127, 0], [0, 127, 255], [0, 255, 0]]]
+
+
+def test_segmentation():
+    target, sky, none = [1.0, 0, 0, 0, 0], [0, 0, 0, 0, 1.0], [0.0] * 5
+    observation = np.array([target, sky, none]).T[:, None]
+    shown = pictures.shown_picture(observation, 0.0, 1.0, channels="classes")
+    assert shown.tolist() == [[list(NEXT_CUBE), list(SKY), [0, 0, 0]]]
 
 
 def test_stack_and_grid_of_images():
