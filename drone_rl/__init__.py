@@ -77,6 +77,7 @@ if TYPE_CHECKING:
     from drone_rl.sim.tasks.step_kernel import Mover as Mover
     from drone_rl.sim.tasks.step_kernel import Step as Step
     from drone_rl.sim.tasks.term_task import define_task as define_task
+    from drone_rl.sim.tasks.torch_terms import Steps as Steps
     from drone_rl.training.demonstrations import Demonstration as Demonstration
     from drone_rl.training.demonstrations import FlightConditions as FlightConditions
     from drone_rl.training.demonstrations import add_demonstration as add_demonstration

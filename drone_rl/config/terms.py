@@ -7,7 +7,8 @@ A user's file registers a term with a decorator, and any task can then name it:
         return wp.where(step.clearance < distance, 1.0, 0.0)
 
 Warp compiles the functions into the kernels of single steps and of whole episodes. Their numbers,
-weights included, are arrays there, so that other numbers compile nothing.
+weights included, are arrays there, so that other numbers compile nothing. A function of `Steps` is
+in torch: it is called between two kernels of a step, and whole episodes are not fused.
 """
 
 import dataclasses
@@ -54,6 +55,8 @@ class Term:
     """Names of the parameters, in order."""
     is_exact: bool
     """Whether the parameters are `wp.float64` and not `float`."""
+    is_torch: bool = False
+    """Whether the function maps the `Steps` of N environments to a tensor, (N,)."""
 
     @classmethod
     def of(
@@ -66,8 +69,11 @@ class Term:
                 f"{place} has {len(every)} parameters; give {first} and at most "
                 f"{MOST_PARAMETERS} numbers"
             )
-        rest = every[1:]
-        types = {getattr(p.annotation, "__name__", str(p.annotation)) for p in rest}
+        kind, *kinds = (getattr(p.annotation, "__name__", str(p.annotation)) for p in every)
+        rest, types = every[1:], {*kinds}
+        is_torch = kind.split(".")[-1] == "Steps"
+        if is_torch and "Step" not in first:
+            raise InputError(f"{place} is in torch, which moves no objects; give {first}")
         is_exact = bool(types) and all("float64" in of for of in types)
         for p in rest:
             is_number = isinstance(p.default, int | float) and not isinstance(p.default, bool)
@@ -82,7 +88,7 @@ class Term:
         settings = _settings_class(name, {**own, **{p.name: p.default for p in rest}})
         with prefixed_errors(name):
             settings()  # its defaults are checked
-        return cls(name, function, settings, tuple(p.name for p in rest), is_exact)
+        return cls(name, function, settings, tuple(p.name for p in rest), is_exact, is_torch)
 
     @property
     def module(self) -> str:

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from drone_rl.config.commands import PlacesSettings
+from drone_rl.config.inputs import PIXELS
 from drone_rl.explanations.context import Context, LeftOutError, needs
 from drone_rl.explanations.results import ExactMap
 from drone_rl.sim.actions import MOVES
@@ -27,6 +28,8 @@ def one_image_a_place(context: Context) -> str | None:
         return "Only cube collection has an exact map."
     if scenes.actions != MOVES:
         return f"An exact map is one of a policy that chooses among {', '.join(MOVES.names)}."
+    if scenes.seen != PIXELS:
+        return f"An exact map is one of a policy that sees {PIXELS} alone, not {scenes.seen}."
     if scenes.memory:
         return "The policy observes a stack of frames, so its actions depend on earlier frames."
     try:

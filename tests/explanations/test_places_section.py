@@ -35,13 +35,14 @@ def test_reasons_for_no_exact_map(context):
     scenes = context.scenes
 
     def refused(**changes):
-        names = ("task", "actions", "memory", "worlds")
+        names = ("task", "actions", "memory", "seen", "worlds")
         network = changes.pop("network", None)
         changed = {name: getattr(scenes, name) for name in names} | changes
         given = SimpleNamespace(scenes=SimpleNamespace(**changed), network=network)
         return find_lacking({"places": places_section.places_section}, given)["places"]
 
     assert "stack of frames" in refused(memory=1)
+    assert "not gray and goal" in refused(seen="gray and goal")
     assert "chooses among forward, left, right" in refused(actions=FIVE)
     assert "Only cube collection" in refused(task=None)
     tall = scenes.task.settings.replace(vertical_bound=1.0)

@@ -9,6 +9,7 @@ import torch
 
 from drone_rl.explanations import patches, trust
 from drone_rl.explanations.heat_maps import Explainer
+from drone_rl.explanations.hooks import of_input
 from drone_rl.explanations.patches import PatchGrid, placebo_maps
 from drone_rl.explanations.results import Likeness
 from drone_rl.explanations.rollouts import spread_frames
@@ -19,6 +20,7 @@ from drone_rl.explanations.trust import (
     method_maps,
 )
 from drone_rl.policies import MLP
+from drone_rl.policies.networks import InputsNetwork
 
 LEVEL = 0.01
 SIZE = (8, 16)
@@ -40,7 +42,7 @@ def weights(network, x, a):
     return found.view(1, *SIZE).expand(len(x), -1, -1)
 
 
-def make_trial(network, episodes=40, frames=3, seed=0):
+def make_trial(network, episodes=40, frames=3, seed=0, rest=None):
     generator = torch.Generator().manual_seed(seed)
     x = torch.randn(episodes * frames, 1, *SIZE, generator=generator)
     others = [torch.randn(x.shape, generator=generator) for _ in range(2)]
@@ -49,8 +51,9 @@ def make_trial(network, episodes=40, frames=3, seed=0):
         network=network,
         observations=x,
         actions=torch.arange(len(x)) % 3,
-        effects=patches.patch_effects(network, x, others, grid),
+        effects=patches.patch_effects(network, x, others, grid, rest),
         placebos=placebo_maps(x, torch.zeros(1, *SIZE), others),
+        rest=rest,
         episode=np.arange(len(x)) // frames,
         grid=grid,
     )
@@ -71,6 +74,29 @@ def test_the_true_map_is_trusted(trial):
     assert found.level == LEVEL and found.confidence == 0.98
     assert (found.frames, found.episodes) == (120, 40)
     assert found.placebos["ones"].mean == 0.0
+
+
+def test_other_inputs_keep_each_frames_values():
+    window = window_policy((slice(2, 6), slice(8, 16)))
+    network = InputsNetwork({"image": (1, *SIZE), "goal": (3,)}, {"image": window}, 3, hidden=())
+    with torch.no_grad():  # the goal decides in every second frame, and the window in the others
+        network.branches.vectors[0].weight.copy_(torch.eye(64, 3))
+        network.branches.vectors[0].bias.zero_()
+        seen, told = window.layers.logits.weight, torch.eye(3, 64)
+        network.layers.logits.weight.copy_(torch.cat([seen, told], 1))
+    goal = torch.zeros(120, 3)
+    goal[::2, 0] = 100.0
+    view = of_input(network, "image")
+    trial = make_trial(view, rest=goal)
+    assert (trial.effects[::2] < 1e-6).all() and (trial.effects[1::2].max(1) > 0.01).all()
+    deciding = trial[np.arange(1, 120, 2)]
+    np.testing.assert_allclose(deciding.effects, make_trial(window).effects[1::2], atol=1e-6)
+
+    def true_map(network, x, a, rest):
+        found = network.network.layers.logits.weight[:, : 8 * 16].detach().abs().sum(0)
+        return found.view(1, *SIZE).expand(len(x), -1, -1)
+
+    assert check_maps(deciding, {"true": true_map}, num_methods=5).trusted == "true"
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,8 @@ from drone_rl.sim.dynamics import Dynamics, FlightState
 from drone_rl.sim.rendering.devices import on_torch_stream, start_warp
 from drone_rl.sim.tasks.geometry_kernel import NOTHING, Objects
 from drone_rl.sim.tasks.rules_kernel import Rules
-from drone_rl.sim.tasks.step_kernel import World
+from drone_rl.sim.tasks.step_kernel import Step, World
+from drone_rl.sim.tasks.torch_terms import values_of
 from drone_rl.utils.errors import InputError
 
 SECONDS = 0.1
@@ -99,8 +100,9 @@ class AppliedRules:
         flown = isinstance(body, FlightState)
         thing = body.contact.thing if flown else torch.full_like(state.steps, NOTHING)
         timestep = getattr(dynamics, "timestep", None)
+        world = self._constants(state, timestep)
         inputs = [
-            self._constants(state, timestep),
+            world,
             is_start,
             _ctype(state.places, wp.vec3d),
             *(_ctype(getattr(state, n), wp.vec4 if n == "action" else None) for n in WRITTEN),
@@ -114,8 +116,21 @@ class AppliedRules:
         ]
         with on_torch_stream(device):
             wp.launch(self.compiled.step_all, count, inputs=inputs, device=str(device))
+            if self.compiled.settle_all is not None and not is_start:
+                world.paid = _warp(state.paid)
+                world.steps, world.end_reasons = _warp(steps), _warp(end_reasons)
+                rest = [self._each_parameters(world.seen, device), body.is_lost, rewards]
+                inputs = [world, *map(_ctype, rest)]
+                wp.launch(self.compiled.settle_all, count, inputs=inputs, device=str(device))
         state.steps[:], state.end_reason[:] = steps, end_reasons
         return rewards
+
+    def _each_parameters(self, seen: Any, device: torch.device) -> Tensor:
+        """Return the parameters of each environment, then its values of the terms in torch."""
+        given = self._lists[1]
+        every = torch.tensor(given, dtype=torch.float64, device=device).expand(len(seen), -1)
+        values = [values_of(term, seen, given[own], device) for term, own in self.compiled.in_torch]
+        return torch.cat([every, torch.stack(values, -1)], -1)
 
     def check(self, state: Any) -> None:
         """Raise an `InputError` that names the terms whose sums in states are not finite."""
@@ -157,9 +172,11 @@ class AppliedRules:
     def _constants(self, state: Any, timestep: float | None) -> Any:
         """Return the rules' constants, with no more of states than events need."""
         key = device, timestep = str(state.places.device), timestep
-        if self._events:
+        if self._events or self.compiled.in_torch:
             world = self._make_constants(device, timestep)
             self._prepare_events(world, state)
+            if self.compiled.in_torch:
+                world.seen = wp.zeros(len(state), dtype=Step, device=device)
             return world
         if key not in self._kept:
             self._kept[key] = self._make_constants(device, timestep)

@@ -1,12 +1,13 @@
 """The rules of a task of terms as kernels: one definition for single steps and whole episodes."""
 
 import functools
+import itertools
 import re
 from typing import Any
 
 import warp as wp
 
-from drone_rl.config.terms import Term
+from drone_rl.config.terms import Term, TermSettings
 from drone_rl.sim.dynamics.flight_kernel import four, three
 from drone_rl.sim.dynamics.moves_kernel import (
     Fleet,
@@ -119,6 +120,14 @@ def bound(term: Term, first: int) -> Any:  # noqa: C901 (functions that Warp com
     return call
 
 
+def _result(step: Step, value: wp.float64) -> wp.float64:
+    """Return a term's value, which torch has computed; it is a parameter of each environment."""
+    return value
+
+
+_IN_TORCH = Term("result", _result, TermSettings, ("value",), is_exact=True)
+
+
 def _added(before: Any, term: Any, number: int) -> Any:
     """Return the sum of the rewards before and a further term, which is also recorded."""
 
@@ -213,18 +222,26 @@ class Rules:
         """Fold the terms into one function."""
         self.terms = (*rewards, *ends, success, *(term for _, term in events))
         self.rewards, self.events = rewards, tuple(term for _, term in events)
-        first, pay, find = 0, _no_reward, _no_end
-        for number, term in enumerate(rewards):
-            pay = _added(pay, bound(term, first), number)
-            first += len(term.parameters)
-        checks = []
-        for number, term in (*enumerate(ends, SUCCESS + 1), (SUCCESS, success)):
-            checks.append((bound(term, first), number))
-            first += len(term.parameters)
-        velocity = _no_velocity
-        for number, term in events:
-            velocity = _moving(velocity, bound(term, first), number)
-            first += len(term.parameters)
+        sizes = [len(term.parameters) for term in self.terms]
+        *starts, total = itertools.accumulate(sizes, initial=0)
+        self.in_torch = tuple(
+            (term, slice(first, first + size))
+            for term, first, size in zip(self.terms, starts, sizes, strict=True)
+            if term.is_torch
+        )
+        """Terms in torch, each with its own of all parameters; their values follow all these."""
+        results = itertools.count(total)
+        calls = iter(
+            bound(_IN_TORCH, next(results)) if term.is_torch else bound(term, first)
+            for term, first in zip(self.terms, starts, strict=True)
+        )
+        pay, find, velocity = _no_reward, _no_end, _no_velocity
+        for number in range(len(rewards)):
+            pay = _added(pay, next(calls), number)
+        numbers = (*range(SUCCESS + 1, SUCCESS + 1 + len(ends)), SUCCESS)
+        checks = [(next(calls), number) for number in numbers]
+        for number, _ in events:
+            velocity = _moving(velocity, next(calls), number)
         if success_first:
             checks.insert(0, checks.pop())
         for term, number in checks:
@@ -246,6 +263,39 @@ class Rules:
                 objects.places[env, i] = objects.places[env, i] + moved
 
         @wp.func
+        def settle(world: World, env: int, step: Step, is_lost: bool) -> wp.float64:
+            """Write the end reason of a step and return its reward."""
+            reward = pay(world, env, step)
+            end = int(find(world, step))
+            if end == 0 and world.steps[env] >= world.step_limit:
+                end = step_limit
+            if is_lost:
+                end = lost_control
+            world.end_reasons[env] = end
+            return reward
+
+        @wp.func
+        def show(world: World, env: int, step: Step, is_lost: bool) -> wp.float64:
+            """Write a step for terms in torch, before `settle_all`."""
+            world.seen[env] = step
+            return wp.float64(0.0)
+
+        finish = show if self.in_torch else settle
+
+        @wp.kernel(module="unique", module_options=_OPTIONS)
+        def settle_all(
+            shown: World,
+            parameters: wp.array2d[wp.float64],
+            is_lost: wp.array[wp.bool],
+            rewards: wp.array[wp.float64],
+        ) -> None:
+            """End steps that `step_all` has shown; each environment has its own parameters."""
+            env = wp.tid()
+            world = shown
+            world.parameters = parameters[env]
+            rewards[env] = settle(world, env, shown.seen[env], is_lost[env])
+
+        @wp.func
         def advance(world: World, env: int, motion: Motion) -> wp.float64:
             """Apply all rules; write the end reason and return the reward."""
             move_objects(world, env, motion.before)
@@ -257,14 +307,7 @@ class Rules:
                 axes,
                 choose(world, env, motion, axes, touch(world, env, motion)),
             )
-            reward = pay(world, env, step)
-            end = int(find(world, step))
-            if end == 0 and world.steps[env] >= world.step_limit:
-                end = step_limit
-            if motion.is_lost:
-                end = lost_control
-            world.end_reasons[env] = end
-            return reward
+            return finish(world, env, step, motion.is_lost)
 
         @wp.kernel(module="unique", module_options=_OPTIONS)
         def step_all(
@@ -316,6 +359,7 @@ class Rules:
                 end_reasons,
                 constants.events,
                 constants.phases,
+                constants.seen,
             )
             motion = Motion()
             motion.before = before[env]
@@ -369,17 +413,20 @@ class Rules:
             return float(advance(envs.world, env, motion))
 
         self.step_all, self.move, self.steer = step_all, move, steer
+        self.settle_all = settle_all if self.in_torch else None
+        """Second kernel of a step, which reads the values of terms in torch."""
 
     @functools.cache  # noqa: B019 (rules are kept for ever, see `make_rules`)
     def load(self) -> None:
-        """Compile the kernel of single steps, or load it, once.
+        """Compile the kernels of single steps, or load them, once.
 
         Raises:
             InputError: Warp can't compile a term; the message has its line and the reason.
         """
         start_warp("cpu")
         try:
-            wp.load_module(self.step_all.module, device="cpu")
+            for kernel in filter(None, (self.step_all, self.settle_all)):
+                wp.load_module(kernel.module, device="cpu")
         except Exception as error:
             raise InputError(self._compile_error(str(error))) from error
 
@@ -394,7 +441,8 @@ class Rules:
         for term in self.terms:  # what it returns is wrong
             own = (self.rewards, self.events)
             kind = next((i for i, terms in enumerate(own) if term in terms), len(own))
-            if not term.module.startswith("drone_rl.") and not _returns(term, kind):
+            is_own = not term.module.startswith("drone_rl.") and not term.is_torch
+            if is_own and not _returns(term, kind):
                 what = _VALUES[kind]
                 return f"{place_of(term.function)}: no value to use ({reason}); return {what}"
         return f"the terms can't be compiled by Warp ({reason}); correct them"

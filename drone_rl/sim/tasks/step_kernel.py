@@ -114,6 +114,8 @@ class World:
     """Number of what moves each object; -1 for nothing. Shape: (P,), or no array if all stay."""
     phases: wp.array2d[wp.float64]
     """See `Mover.phase`. Shape: (N, P), or no array."""
+    seen: wp.array[Step]
+    """The last step, for terms in torch. Shape: (N,), or no array if there are none."""
 
 
 @wp.struct

@@ -7,7 +7,7 @@ import warp as wp
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 import drone_rl
-from drone_rl import InputError, Mover, Step, define_task, reward
+from drone_rl import InputError, Mover, Step, Steps, define_task, reward
 from drone_rl.acceleration import FusedEpisodes
 from drone_rl.config import ActionSettings
 from drone_rl.config.appearance import AppearanceSettings, check_appearance
@@ -455,6 +455,102 @@ def _whole(step: Step, count: int = 1) -> float:
 def test_terms_that_settings_could_not_name_are_refused(name, function, message):
     with pytest.raises(InputError, match=message):
         reward(name)(function)
+
+
+@reward("test_far", weight=0.3)
+def far(step: Step, scale: float = 1.0) -> float:
+    """The velocity to the left, less where the goal is far away."""
+    return step.velocity[1] - scale * step.distance
+
+
+@reward("test_far_torch", weight=0.3)
+def far_torch(steps: Steps, scale: float = 1.0) -> torch.Tensor:
+    """The same in torch, which changes its own copy."""
+    steps.distance.mul_(scale)
+    return steps.velocity[:, 1] - steps.distance
+
+
+@drone_rl.end("test_away")
+def away(step: Step) -> bool:
+    """Beyond 0.3 m to the left."""
+    return step.position[1] > 0.3
+
+
+@drone_rl.end("test_away_torch")
+def away_torch(steps: "drone_rl.Steps") -> torch.Tensor:
+    """The same in torch."""
+    return steps.position[:, 1] > 0.3
+
+
+@pytest.mark.parametrize("mode", ["computer_vision", "simple_flight"])
+def test_a_term_in_torch_is_its_twin_in_warp(mode):
+    twins = []
+    for kind in "", "_torch":
+        task = {
+            "name": "test_reach",
+            "reward": {"test_near": {}, f"test_far{kind}": {"scale": 0.7}, "contact": -1.0},
+            "end": [f"test_away{kind}", "contact"],
+        }
+        made = Worlds(8, BaseTaskSettings.read(task), dynamics=drone_rl.DynamicsSettings(mode=mode))
+        every = torch.arange(8)
+        made.reset(every, [np.random.RandomState(i) for i in range(8)])
+        actions = torch.randint(3, (10, 8), generator=torch.Generator().manual_seed(0))
+        rewards = [made.step(every, each) for each in actions]
+        twins.append((torch.stack(rewards), made.state.paid, made.state.end_reason))
+    assert all(torch.equal(*pair) for pair in zip(*twins, strict=True))
+    rewards, paid, ends = twins[0]
+    assert len(rewards.unique()) > 20 and bool(paid[:, 1].all()) and len(ends.unique()) > 1
+
+
+def test_a_success_in_torch_ends_an_episode_of_dm_control():
+    @drone_rl.success("test_moved")
+    def moved(steps: Steps, distance: float = 1.5) -> torch.Tensor:
+        return steps.position[:, 0] > distance
+
+    settings = {"name": "test_reach", "success": ["test_moved"], "reward": {"test_far_torch": 1.0}}
+    env = make_environment(BaseTaskSettings.read(settings), pixels=False, random_state=0)
+    env.reset()
+    first, second = env.step(FORWARD), env.step(FORWARD)
+    assert (first.reward, first.last()) == (-5.0, False)  # metres to the ball
+    assert (second.reward, second.last()) == (-4.0, True)
+
+
+@reward("test_table")
+def table(steps: Steps) -> torch.Tensor:
+    """One value too many."""
+    return steps.position[:, :2]
+
+
+@reward("test_endless")
+def endless(steps: Steps) -> torch.Tensor:
+    """Not finite."""
+    return steps.time / 0.0
+
+
+@reward("test_broken")
+def broken(steps: Steps) -> torch.Tensor:
+    """A mistake."""
+    return steps.altitude
+
+
+@pytest.mark.parametrize(
+    ("term", "reason"), [("table", r"\(1, 2\)"), ("endless", "finite"), ("broken", "altitude")]
+)
+def test_unusable_terms_in_torch_are_named_with_their_file(term, reason):
+    with pytest.raises(InputError, match=reason) as error:
+        fly(worlds(reward={"test_near": 1.0, f"test_{term}": 0.0}), FORWARD)
+    message = str(error.value)
+    assert f"test_{term}" in message and __file__ in message and "\n" not in message
+
+
+def test_terms_in_torch_are_stepped_with_a_reason():
+    rewards = {"test_far_torch": 1.0, "test_near": 0.0}
+    task = BaseTaskSettings.read({"name": "test_reach", "reward": rewards})
+    collector = make(task=task, num_envs=4, compiled=True)
+    assert "not fused: term test_far_torch is in torch" in collector.name
+    batch = collector.collect()
+    logged = batch_metrics(batch, terms=as_task(task).reward_terms)
+    assert logged["reward/test_far_torch"] == pytest.approx(logged["train/reward"], abs=1e-4)
 
 
 def test_a_camera_may_start_among_objects_that_keep_apart_from_the_start():
