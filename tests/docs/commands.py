@@ -34,6 +34,7 @@ def check_command(name, *words):
     assert name in COMMANDS, name
     command = find_command(name)
     told = [word for word in words if word not in ("-m", "--help") and "resume=" not in word]
+    told = [re.sub(r"(=\[[^\]]*\]),\[.*", r"\1", word) for word in told]  # a sweep of lists
     told = [re.sub("[<>]", "", _SWEPT.sub(lambda m: f"={m[2] or 0}", word)) for word in told]
     file = name.replace("-", "_")
     told = command.prepare(told)

@@ -48,6 +48,9 @@ def test_rows_name_benchmarks():
     named = {row.bench for table in TABLES for row in table}
     assert set(BENCHMARKS) - named == {
         "tasks",
+        "input_rates",
+        "goal",
+        "goal_flight",
         "scaling",
         "revisions",
     }  # a chart, and for contributors
