@@ -14,6 +14,7 @@ from drone_rl.sim.actions import MOVES, Entry
 from drone_rl.sim.entities import Cube
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import Goals, Grid, OracleRule, State, Task
+from drone_rl.sim.tasks.common import Side
 from drone_rl.sim.vocabulary import TaskVocabulary
 
 NUM_POSTS = 2
@@ -160,8 +161,8 @@ class Posts(Task[PostsState]):
         return away.masked_fill(lateral.abs() > REACH, 0)
 
     def stratum_at(self, offset):
-        """Return the side of an offset: 0 for left, 1 for right."""
-        return (offset[..., 1] < 0).long()
+        """Return the side of an offset, left or right."""
+        return torch.where(offset[..., 1] < 0, Side.RIGHT, Side.LEFT)
 
     def grid(self, num_forward, num_lateral):
         """Return a grid up to 6 m ahead and 3 m to each side."""

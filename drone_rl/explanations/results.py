@@ -308,7 +308,7 @@ class TargetGrid(Model):
     oracle: Array
     """The needed action: a turn where flying straight on would miss. Shape: (L,)."""
     stratum: Array
-    """The task's stratum of a target there: its side. Shape: (L,)."""
+    """`Side` of a target there. Shape: (L,)."""
 
 
 class ResponseMap(TargetGrid):

@@ -184,7 +184,7 @@ def test_all_sections_work_with_another_task(posts, tmp_path):
     with quick():
         numbers = explain_policy(posts, tmp_path, name="posts", provenance={})
     assert numbers.verdict.num_cubes == NUM_POSTS
-    assert [row.side for row in numbers.response.rows] == ["left", "right"]
+    assert [row.side for row in numbers.response.rows] == ["left", "ahead", "right"]
     assert numbers.truth.outcomes.collected.keys() == {"as it was", "moved left", "moved right"}
 
 
