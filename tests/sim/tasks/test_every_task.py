@@ -3,6 +3,7 @@
 import torch
 
 from drone_rl.sim.tasks import Goals
+from drone_rl.sim.tasks.common import Side
 from drone_rl.utils.seeding import world_random_state
 
 
@@ -166,5 +167,5 @@ def test_grid_and_needed_actions_are_symmetric(worlds, task):
     turned = torch.tensor(worlds.dynamics.actions.mirrored)[needed]
     assert torch.equal(turned[sides], mirrored[sides])
     strata = task.edits.stratum_at(offset)
-    assert torch.equal(strata[sides], len(task.strata) - 1 - strata.flip(0)[sides])
+    assert torch.equal(strata[sides], Side.LEFT + Side.RIGHT - strata.flip(0)[sides])
     assert strata.unique().numel() > 1
