@@ -44,7 +44,7 @@ TOUCHED_BY: dict[str, tuple[str, ...]] = {
     "camera_sideways": _MOVED,
     "field_of_view": ("camera.horizontal_fov", "appearance.camera_widening"),
     "sun": (*_LIGHT, *_below("appearance", "sun_elevation", "sun_azimuth", "shadows")),
-    "brightness": ("appearance.exposure", *_LIGHT),
+    "brightness": ("appearance.exposure", "transforms.bias", *_LIGHT),
     "fog": _below("appearance", "fog_visibility", "sky_horizon", "sky_zenith"),
     "object_size": _below("task", *_SIZES),
     "distractors": _DISTRACTORS,

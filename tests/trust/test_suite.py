@@ -87,7 +87,7 @@ def test_strip_has_every_strength():
 def test_strip_without_refused_strengths():
     wide = subject(Blind(0))
     wide = type(wide)(
-        wide.network, wide.task, wide.camera.replace(horizontal_fov=165.0), wide.transforms
+        wide.network, wide.task, wide.camera.replace(horizontal_fov=165.0), wide.inputs
     )
     evaluator = PairedEvaluator(wide, 1)
     shown = [picture is not None for picture in make_strip(evaluator, AXES["field_of_view"])]

@@ -15,8 +15,8 @@ from tests.untrained import untrained
 class Steps(list):
     """The steps that a pilot has taken."""
 
-    def note(self, frame, action, reward):
-        self.append((tuple(frame.shape), action.tolist(), reward))
+    def note(self, readings, action, reward):
+        self.append((tuple(readings["pixels"].shape), action.tolist(), reward))
 
 
 def fly(pilot, controls, seconds, speed=4.0, period=0.025):
