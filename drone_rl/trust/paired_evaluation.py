@@ -242,16 +242,17 @@ class PairedEvaluator:
             return look
 
         hiding_only = getattr(agent, "needs_only_hiding_faults", False)
+        inputs = self.subject.inputs
+        images = [name for name in inputs if not isinstance(inputs[name], VectorInput)]
         return Observer(
             worlds,
             self.subject.inputs,
             appearance=appearance,
             faults={
                 name: make_faults(
-                    condition.faults, self.episodes, self.seed, hiding_only=hiding_only
+                    condition.faults, self.episodes, self.seed, image=i, hiding_only=hiding_only
                 )
-                for name, seen in self.subject.inputs.items()
-                if not isinstance(seen, VectorInput)
+                for i, name in enumerate(images)
             },
             earlier=earlier,
         )

@@ -243,13 +243,20 @@ class SharedStream:
 
 
 def make_faults(
-    models: Sequence[FaultModel], num_envs: int, seed: int, *, hiding_only: bool = False
+    models: Sequence[FaultModel],
+    num_envs: int,
+    seed: int,
+    *,
+    image: int = 0,
+    hiding_only: bool = False,
 ) -> Pipeline:
     """Return faults in the order in which they act; each has a random stream of its own.
 
-    `hiding_only` leaves out those that hide nothing.
+    `image` is the number of the image among several that a policy sees. `hiding_only` leaves out
+    those that hide nothing.
     """
-    streams = (torch_generator(seed, Stream.SHIFTS, number=1 + i) for i in range(len(models)))
+    first = 1 + image * len(models)
+    streams = (torch_generator(seed, Stream.SHIFTS, number=first + i) for i in range(len(models)))
     return Pipeline(
         stages=[
             Stage(model, SharedStream(stream, num_envs))

@@ -213,15 +213,21 @@ class NetworkIdentity(Stored):
     description: dict[str, Any]
 
     @property
-    def camera_faults(self) -> list[str]:
-        """Camera faults that the policy's transforms simulate."""
+    def input_faults(self) -> list[str]:
+        """Faults of the inputs in training: those of cameras, and errors of vectors."""
         faults = {fault.name for fault in Fault.__subclasses__()}
         steps = [
             step["name"]
             for seen in self.description["inputs"].values()
             for step in seen.get("transforms", ())
         ]
-        return [name for name in steps if name in faults]
+        errors = [
+            f"{error} of {name}"
+            for name, seen in self.description["inputs"].items()
+            for error in ("noise", "bias", "delay", "loss")
+            if seen.get(error)
+        ]
+        return [*(name for name in steps if name in faults), *errors]
 
 
 class Robustness(Seeded, Provenance):

@@ -41,6 +41,7 @@ def make_blocks(root: Path) -> dict[str, str]:
         "verification": make_table(rows.VERIFICATION, figures),
         "flight": make_table(rows.FLIGHT, figures),
         "libraries": make_table(rows.LIBRARIES, figures),
+        "tasks": make_table(rows.TASKS, figures),
         "peers": make_peers(figures),
         "robust": make_robust(figures),
         "origins": list_origins(ledger, BENCHMARKS),

@@ -527,3 +527,41 @@ LIBRARIES = (
     ),
 )
 """Other libraries."""
+TASKS = (
+    Row(
+        "tasks",
+        "a user's reward term: lines; rate of fused collecting with it over that without; seconds "
+        "from an edit to the first update",
+        "{reward_term_lines}; {reward_term_ratio:.2f}; {reward_term_s:.0f}",
+        "8; 0.9; 20",
+    ),
+    Row(
+        "tasks",
+        "a user's task, reach a ball among boxes: lines; commands that work on it",
+        "{own_task_lines}; {own_task_commands}",
+        "40; 11",
+    ),
+    Row(
+        "tasks",
+        "success rate of its trained policies in a verdict, lower end of the 95% CI, worst of 3 "
+        "seeds; most seconds from the start of the training to the verdict",
+        "{own_task_lower95:%}; {own_task_s:.0f}",
+        "90%; 120",
+    ),
+    Row(
+        "tasks",
+        "`explain` on it, seconds; heat maps of placebos that are trusted; planted ones that are "
+        "found",
+        "{own_task_explain_s:.0f}; {own_task_placebos_trusted} of {own_task_placebos_total}; "
+        "{own_task_planted_found} of {own_task_planted_total}",
+        "60; 0; 90%",
+    ),
+    Row(
+        "tasks",
+        "search over two weights of its reward: success of the best trial, and of the one with the "
+        "largest running reward",
+        "{search_success:%}; {search_by_reward:%}",
+        "95%; below 50%",
+    ),
+)
+"""Tasks that users define."""
