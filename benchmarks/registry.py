@@ -22,6 +22,7 @@ from benchmarks.fragile_honest import bench_fragile_honest
 from benchmarks.gamed import bench_gamed
 from benchmarks.gymnasium import bench_gymnasium
 from benchmarks.imitation import bench_imitation
+from benchmarks.inputs.claims import bench_inputs
 from benchmarks.inputs.goal import bench_goal, bench_goal_flight
 from benchmarks.inputs.rates import bench_input_rates
 from benchmarks.maps import bench_maps
@@ -145,9 +146,10 @@ BENCHMARKS: dict[str, Benchmark] = {
     "tasks": _benchmark(
         bench_tasks, "system", *_COMMANDS, "trust", "explanations", *_parts("own_task", "maps")
     ),
-    "input_rates": _benchmark(bench_input_rates, "inputs", *_COLLECTING, "acceleration"),
-    "goal": _benchmark(bench_goal, "inputs", *_SOLVING),
-    "goal_flight": _benchmark(bench_goal_flight, "inputs", *_SOLVING),
+    "inputs": _benchmark(bench_inputs, "several_inputs", *_EXPLAINING, *_parts("inputs")),
+    "input_rates": _benchmark(bench_input_rates, "several_inputs", *_COLLECTING, "acceleration"),
+    "goal": _benchmark(bench_goal, "several_inputs", *_SOLVING),
+    "goal_flight": _benchmark(bench_goal_flight, "several_inputs", *_SOLVING),
     "startup": _benchmark(bench_startup, "system", *_COMMANDS, "trust"),
     "onnx": _benchmark(bench_onnx, "libraries", *_JUDGING),
     "peers": _benchmark(bench_peers, "libraries", *_COMMANDS, *_parts("peers")),
@@ -168,7 +170,7 @@ BENCHMARKS: dict[str, Benchmark] = {
 GROUPS = tuple(dict.fromkeys(benchmark.group for benchmark in BENCHMARKS.values()))
 """Names of groups of benchmarks: main (speed and training), adversarial (correctness of claims),
 parallel (sweeps), verification, libraries (third-party software), system (revisions and start-up
-time), inputs (policies with several inputs), long (trainings of hours), flight (vehicle
+time), several_inputs (policies with them), long (trainings of hours), flight (vehicle
 dynamics)."""
 
 

@@ -58,12 +58,12 @@ def _compare(
         for seed in setup.seeds[:3]:
             run = setup.runs / name / f"seeing_{seed}"
             begin = time.perf_counter()
-            _train(own, run, seed, most, seeing, *settings)
+            train(own, run, seed, most, seeing, *settings)
             seconds.append(time.perf_counter() - begin)
             frames.append(RunResult.read_json(run / "result.json").frames)
             lower.append(_success(own, run, setup.quick)["lower95"])
             run = setup.runs / name / f"blind_{seed}"
-            _train(own, run, seed, frames[-1], blind, *settings, "trainer.target_share=null")
+            train(own, run, seed, frames[-1], blind, *settings, "trainer.target_share=null")
             without.append(_success(own, run, setup.quick)["share"])
     return {
         f"{name}_lower95": min(lower),
@@ -73,7 +73,8 @@ def _compare(
     }
 
 
-def _train(own: Path, run: Path, seed: int, most: int, *settings: str) -> None:
+def train(own: Path, run: Path, seed: int, most: int, *settings: str) -> None:
+    """Train the task in a folder that holds its file, for at most so many frames."""
     task = (f"plugins={TASK.name}", f"task={TASK.stem}", "logger=csv", f"seed={seed}")
     call(
         "train",

@@ -15,7 +15,7 @@ from drone_rl.config import (
     TaskSettings,
 )
 from drone_rl.config.appearance import check_appearance
-from drone_rl.config.inputs import DEFAULT_INPUTS, Inputs
+from drone_rl.config.inputs import DEFAULT_INPUTS, CameraPixels, Inputs
 from drone_rl.config.learning import (
     Adam,
     Collector,
@@ -149,6 +149,14 @@ class TrainSettings(Settings):
             self.refuse("renderer", "supports only appearance=minimal; give renderer=raytrace")
         self.dynamics.check_air()
         check_appearance(self.appearance, self.camera, self.task.object_region, self.task.name)
+        seen = {"camera": CameraSettings(), "transforms": DEFAULT_TRANSFORMS}
+        unused = [name for name, default in seen.items() if getattr(self, name) != default]
+        if unused and not any(isinstance(one, CameraPixels) for one in self.inputs.values()):
+            raise InputError(
+                f"{unused[0]} describes the input pixels, which inputs={[*self.inputs]} lacks; "
+                f"leave it out and give settings such as inputs.{next(iter(self.inputs))}.size, or "
+                "add pixels"
+            )
         needs, objective = self.objective.needs, self.objective.name
         for name, part in needs.items():
             setting = getattr(self, name)

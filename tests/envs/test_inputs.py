@@ -11,6 +11,7 @@ import drone_rl
 from drone_rl import InputError, define_task
 from drone_rl.config.inputs import Altitude, DepthImage, Goal, GrayImage, LastAction
 from drone_rl.config.networks import SmallCnn
+from drone_rl.config.training import TrainSettings
 from drone_rl.envs import base_env
 from drone_rl.envs.rollout import ActorAgent, steps
 from drone_rl.flight.fly_page.flight import Flight
@@ -127,6 +128,8 @@ def test_inputs_that_there_are_not_are_one_line(inputs, message, see):
 def test_inputs_are_given_without_a_camera():
     with pytest.raises(InputError, match="leave them out"):
         drone_rl.make_env(1, camera={"width": 32}, inputs=["gray"])
+    with pytest.raises(InputError, match="camera describes the input pixels, which inputs="):
+        TrainSettings(camera={"width": 32}, inputs=["gray"])
 
 
 # Policies

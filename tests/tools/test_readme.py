@@ -47,6 +47,7 @@ def test_only_blocks_are_replaced():
 def test_rows_name_benchmarks():
     named = {row.bench for table in TABLES for row in table}
     assert set(BENCHMARKS) - named == {
+        "inputs",
         "input_rates",
         "goal",
         "goal_flight",

@@ -108,7 +108,7 @@ CLAIMS = [
     ("shifts", "it succeeds in 1.5% of episodes, the oracle in 90.0%", {},
      {"together.refused": "too dark"}),
     ("shifts", "A range is tested by new episodes", {}, {"domain": None}),
-    ("shifts", "Without the camera faults of its training (noise)",
+    ("shifts", "Without the faults of its inputs in training (noise)",
      {"network": {"weights": "", "description": NOISY}},
      {"network": None}),
     ("shifts", "no usable oracle, so a good policy succeeds in more than 90.0% of episodes",
