@@ -40,7 +40,7 @@ class Setup:
         """
         quick = settings.quick
         return cls(
-            folder=folder,
+            folder=folder.absolute(),  # commands run in other folders
             quick=quick,
             device=settings.device,
             num_envs=64 if quick else settings.num_envs,
