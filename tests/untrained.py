@@ -12,8 +12,9 @@ from drone_rl.policies.zoo import describe
 
 def untrained(network, *transforms, seed=0, **settings):
     """Return a policy of these settings, by default of gray images, and with random weights."""
-    transforms = transforms or (Gray(),)
-    settings = drone_rl.TrainSettings(transforms=transforms, network=network, **settings)
+    if "inputs" not in settings:
+        settings["transforms"] = transforms or (Gray(),)
+    settings = drone_rl.TrainSettings(network=network, **settings)
     description = describe(settings)
     weights = description.build_network(torch.Generator().manual_seed(seed)).state_dict()
     policy = drone_rl.load_policy("good")
