@@ -553,7 +553,7 @@ TASKS = (
         "`explain` on it, seconds; heat maps of placebos that are trusted; planted ones that are "
         "found",
         "{own_task_explain_s:.0f}; {own_task_placebos_trusted} of {own_task_placebos_total}; "
-        "{own_task_planted_found} of {own_task_planted_total}",
+        "{own_task_planted_found:%}",
         "60; 0; 90%",
     ),
     Row(

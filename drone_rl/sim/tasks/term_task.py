@@ -73,6 +73,19 @@ def _named(settings: TermTaskSettings) -> dict[str, ObjectSettings]:
     }
 
 
+def _has_room(
+    s: TermTaskSettings, of: ObjectSettings, place: Any, placed: list[Any], start: Any
+) -> bool:
+    """Return whether boxes around an object, the ones before it and the drone keep apart."""
+    reach, drone = np.array(of.reach), np.array(start)
+    if of.role != "decoration":
+        gap = np.abs(place - drone) - reach - 0.5 * s.drone_size
+        if np.linalg.norm(gap.clip(0)) <= s.start.apart:
+            return False
+    gaps = (np.abs(place - other) - reach - np.array(o.reach) for o, other in placed)
+    return of.apart == 0 or all(np.linalg.norm(gap.clip(0)) >= of.apart for gap in gaps)
+
+
 class TermTask(ObjectTask):
     """A task of terms: every rule is that of its settings; see `define_task`."""
 
@@ -186,23 +199,12 @@ class TermTask(ObjectTask):
             for _ in range(of.count):
                 for _ in range(_TRIES):
                     place = np.array([random_state.uniform(*of.range_of(axis)) for axis in "xyz"])
-                    if self._has_room(of, place, placed, start):
+                    if _has_room(s, of, place, placed, start):
                         placed.append((of, place))
                         break
                 else:
                     return [], name
         return [place for _, place in placed], ""
-
-    def _has_room(self, of: ObjectSettings, place: Any, placed: list[Any], start: Any) -> bool:
-        """Return whether boxes around an object, the ones before it and the drone keep apart."""
-        s = self.settings
-        reach, drone = np.array(of.reach), np.array(start)
-        if of.role != "decoration":
-            gap = np.abs(place - drone) - reach - 0.5 * s.drone_size
-            if np.linalg.norm(gap.clip(0)) <= s.start.apart:
-                return False
-        gaps = (np.abs(place - other) - reach - np.array(o.reach) for o, other in placed)
-        return of.apart == 0 or all(np.linalg.norm(gap.clip(0)) >= of.apart for gap in gaps)
 
     def start(self, sampled: Tensor, body: BodyState) -> ObjectState:
         """Return initial states; see `sample`."""
