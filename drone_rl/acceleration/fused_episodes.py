@@ -203,6 +203,12 @@ class FusedEpisodes:
         self._rules.begin(state)
         self._look(state)
         self._network.pack()
+        rollout: Any = rollout_kernel.Rollout()
+        rollout.camera, rollout.layers = self._camera, self._network.arrays
+        rollout.workspaces, rollout.num_frames = self._workspaces, self._num_frames
+        rollout.last_observations = wp.from_torch(self.last_observations)
+        rollout.num_steps = self._length
+        self._rollout = rollout
 
     def _seen(self, pixels: Tensor) -> Tensor:
         """Return the rows of frames that the policy sees."""
@@ -241,15 +247,11 @@ class FusedEpisodes:
         pixels = opened["pixels"]
         gray: Any = wp.from_torch(pixels.flatten(2).flatten(0, 1))
         frames.gray = gray
-        rollout: Any = rollout_kernel.Rollout()
-        rollout.camera, rollout.layers = self._camera, self._network.arrays
-        rollout.workspaces, rollout.draws = self._workspaces, wp.from_torch(draws)
-        rollout.frames, rollout.num_frames = frames, self._num_frames
+        rollout = self._rollout
+        rollout.draws, rollout.frames = wp.from_torch(draws), frames
         rollout.observations = wp.from_torch(pixels.flatten(1))
-        rollout.last_observations = wp.from_torch(self.last_observations)
         rollout.begins = wp.zeros(num_envs, dtype=int, device="cpu")
         rollout.logits = wp.from_torch(opened["logits"])
-        rollout.num_steps = self._length
         if self._is_continuous:
             rollout.numbers = wp.from_torch(opened["action"])
         else:
