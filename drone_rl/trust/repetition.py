@@ -8,7 +8,7 @@ alone, too.
 """
 
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -63,36 +63,44 @@ class WithOtherInputs:
 
     def act(self, context: StepContext) -> Act:
         """See `Agent`."""
-        return self._agent.act(self.exchanged(context, 1))
-
-    def exchanged(self, context: StepContext, by: int) -> StepContext:
-        """Return the context with inputs of the environments `by` further, which it notes."""
-        rows = context.rows
-        if bool(context.starts.any()):
-            self._count = len(rows)
-        for name, values in context.inputs.items():
-            self._last[name] = with_rows(self._last.get(name), rows, values)
-        other = (rows + by) % self._count
+        self.note(context)
         names = self._last if self._only is None else (self._only,)
+        return self._agent.act(self.exchanged(context, 1, names))
+
+    def note(self, context: StepContext) -> None:
+        """Remember the inputs of each environment."""
+        if bool(context.starts.any()):
+            self._count = len(context.rows)
+        for name, values in context.inputs.items():
+            self._last[name] = with_rows(self._last.get(name), context.rows, values)
+
+    def exchanged(self, context: StepContext, by: int, names: Iterable[str]) -> StepContext:
+        """Return the context with these inputs of the environments `by` further."""
+        rows = context.rows
+        other = (rows + by) % self._count
         inputs = {**context.inputs, **{name: self._last[name][other] for name in names}}
         return context.part(torch.arange(len(rows), device=rows.device), inputs)
 
 
 class CountsChanges:
-    """An agent that counts how often the action changes with an input of other episodes."""
+    """An agent that counts how often the action changes with each input of other episodes."""
 
-    def __init__(self, agent: Agent, name: str) -> None:
-        """Take an agent without memory, and the name of the input."""
-        self._agent, self._others = agent, WithOtherInputs(agent, name)
-        self.changed = self.compared = 0
+    def __init__(self, agent: Agent, names: Iterable[str]) -> None:
+        """Take an agent without memory, and the names of the inputs."""
+        self._agent, self._others = agent, WithOtherInputs(agent)
+        self.changed = dict.fromkeys(names, 0)
+        self.compared = 0
+        """Actions that were compared, for each input."""
 
     def act(self, context: StepContext) -> Act:
         """See `Agent`."""
         act = self._agent.act(context)
-        for by in DONORS:
-            other = self._agent.act(self._others.exchanged(context, by)).action
-            self.changed += int((other != act.action)[:, None].flatten(1).any(-1).sum())
-            self.compared += len(other)
+        self._others.note(context)
+        for name in self.changed:
+            for by in DONORS:
+                other = self._agent.act(self._others.exchanged(context, by, [name])).action
+                self.changed[name] += int((other != act.action)[:, None].flatten(1).any(-1).sum())
+        self.compared += len(DONORS) * len(context.rows)
         return act
 
 
@@ -161,14 +169,15 @@ def exchange_inputs(
     names, size = [*base_env(env).observer.sources], env.batch_size[0]
     count = min(EXCHANGED, len(greedy))
     count = 0 if size == 1 or len(names) == 1 else count - (count % size == 1)
-    uses, agent = {}, as_agent(actor)
-    for name in names if count else ():
-        which, own = torch.arange(count), greedy.first(count)
-        counts = CountsChanges(agent, name)
-        _again(counts, env, which)
+    if not count:
+        return {}
+    uses, agent, which, own = {}, as_agent(actor), torch.arange(count), greedy.first(count)
+    counts = CountsChanges(agent, names)
+    _again(counts, env, which)
+    for name in names:
         exchanged = _again(WithOtherInputs(agent, name), env, which)
         uses[name] = InputUse(
-            changed=proportion(counts.changed, counts.compared),
+            changed=proportion(counts.changed[name], counts.compared),
             own=float(own.success.mean()),
             exchanged=float(exchanged.success.mean()),
             success=mean_bounds(own.success - exchanged.success, -1.0, 1.0),
