@@ -13,7 +13,7 @@ from torch import nn
 from torchrl.collectors import BaseCollector
 from torchrl.envs import EnvBase
 
-from drone_rl.acceleration import FusedEpisodes, Reasons
+from drone_rl.acceleration import Reasons
 from drone_rl.acceleration.fused_episodes import PAID
 from drone_rl.envs import base_env
 from drone_rl.envs.drone_env import Entries
@@ -21,11 +21,6 @@ from drone_rl.envs.rollout import Agent, Step, as_agent
 from drone_rl.sim.tasks import ObjectState
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.threads import set_torch_threads
-
-
-def name_of(fused: FusedEpisodes | Reasons) -> str:
-    """Return how a collector runs episodes, for the log."""
-    return f"stepping collector: {fused}" if isinstance(fused, Reasons) else "fused collector"
 
 
 class BatchOptions(TypedDict, total=False):
@@ -38,6 +33,9 @@ class BatchOptions(TypedDict, total=False):
 
 class BatchedCollector(BaseCollector):
     """Iterates over batches from a batched environment and an actor, in this process."""
+
+    fused: Any = Reasons(["collector.compiled is false"])
+    """The kernel that takes the steps, or the reasons why they are taken one by one."""
 
     def __init__(
         self,
@@ -75,6 +73,12 @@ class BatchedCollector(BaseCollector):
                 f"{', '.join(self.base_env.worlds.entries)}"
             )
 
+    @property
+    def name(self) -> str:
+        """How steps are taken, for the log."""
+        fused = self.fused
+        return f"stepping collector: {fused}" if isinstance(fused, Reasons) else "fused collector"
+
     def _kept_info(self, step: Step) -> Entries:
         """Return the requested entries of ("next", "info") of a step, and `PAID`. (k, *)."""
         worlds, after = self.base_env.worlds, step.after
@@ -106,7 +110,9 @@ class BatchedCollector(BaseCollector):
     def shutdown(
         self, timeout: float | None = None, close_env: bool = True, raise_on_error: bool = True
     ) -> None:
-        """Close the environment, unless it is to stay open."""
+        """End the kernel's threads, and close the environment unless it is to stay open."""
+        if not isinstance(self.fused, Reasons):
+            self.fused.close()
         if close_env and not self.env.is_closed:
             self.env.close()
 

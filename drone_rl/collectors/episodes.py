@@ -12,7 +12,7 @@ from torchrl.envs import EnvBase
 
 from drone_rl.acceleration import FusedEpisodes, Reasons
 from drone_rl.acceleration.fused_episodes import END_REASON, EPISODE, REWARD
-from drone_rl.collectors.collector import BatchedCollector, BatchOptions, name_of
+from drone_rl.collectors.collector import BatchedCollector, BatchOptions
 from drone_rl.envs.drone_env import Entries
 from drone_rl.envs.rollout import Act, Agent, StepContext, steps
 from drone_rl.sim.tasks import State
@@ -57,17 +57,10 @@ class EpisodeCollector(BatchedCollector):
         """
         super().__init__(env, actor, **options)
         self._actor_keys = None if keep_actor_entries else ("action", *actor_keys)
-        self.fused: FusedEpisodes | Reasons = Reasons(["collector.compiled is false"])
-        """The kernel that runs the episodes, or the reasons why they are stepped."""
         if compiled:
             self.fused = FusedEpisodes.try_create(
                 self.base_env, actor, keep_actor_entries, num_threads
             )
-
-    @property
-    def name(self) -> str:
-        """How episodes are run, for the log."""
-        return name_of(self.fused)
 
     @torch.no_grad()
     def collect(self, num_envs: int | None = None) -> TensorDictBase:
@@ -99,14 +92,6 @@ class EpisodeCollector(BatchedCollector):
             taken.append({EPISODE: step.rows, **ends, **kept})
         order = torch.cat([step[EPISODE] for step in taken]).argsort(stable=True)
         return {key: torch.cat([step[key] for step in taken])[order] for key in taken[0]}
-
-    def shutdown(
-        self, timeout: float | None = None, close_env: bool = True, raise_on_error: bool = True
-    ) -> None:
-        """See `BatchedCollector`."""
-        if not isinstance(self.fused, Reasons):
-            self.fused.close()
-        super().shutdown(timeout, close_env, raise_on_error)
 
     def state_dict(self) -> dict[str, Any]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return counters and the environments' random streams between two batches."""

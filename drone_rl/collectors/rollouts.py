@@ -12,7 +12,7 @@ from torchrl.envs import EnvBase
 
 from drone_rl.acceleration import FusedRollouts, Reasons
 from drone_rl.acceleration.fused_episodes import END_REASON, REWARD
-from drone_rl.collectors.collector import BatchedCollector, BatchOptions, name_of
+from drone_rl.collectors.collector import BatchedCollector, BatchOptions
 from drone_rl.envs.drone_env import Entries
 from drone_rl.envs.rollout import Step, steps
 from drone_rl.utils.errors import InputError
@@ -43,8 +43,6 @@ class RolloutCollector(BatchedCollector):
         super().__init__(env, actor, **options)
         self.num_steps = num_steps
         self._steps: Iterator[Step] | None = None
-        self.fused: FusedRollouts | Reasons = Reasons(["collector.compiled is false"])
-        """The kernel that runs the steps, or the reasons why they are taken one by one."""
         if self._info:
             self.fused = Reasons(["info is not fused"])
         elif compiled:
@@ -54,11 +52,6 @@ class RolloutCollector(BatchedCollector):
         self._is_running = False
         self._reward = torch.zeros(*env.batch_size, 1, device=env.device)
         self._count = torch.zeros(*env.batch_size, 1, dtype=torch.int64, device=env.device)
-
-    @property
-    def name(self) -> str:
-        """How steps are taken, for the log."""
-        return name_of(self.fused)
 
     @torch.no_grad()
     def collect(self) -> TensorDictBase:
@@ -146,14 +139,6 @@ class RolloutCollector(BatchedCollector):
             ("next", "episode_reward"): self._reward,
             ("next", "step_count"): self._count,
         }
-
-    def shutdown(
-        self, timeout: float | None = None, close_env: bool = True, raise_on_error: bool = True
-    ) -> None:
-        """See `BatchedCollector`."""
-        if not isinstance(self.fused, Reasons):
-            self.fused.close()
-        super().shutdown(timeout, close_env, raise_on_error)
 
     def set_seed(self, seed: int, static_seed: bool = False) -> int:
         """See `BatchedCollector.set_seed`; all episodes restart."""
