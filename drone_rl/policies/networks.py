@@ -73,7 +73,25 @@ Weighted = nn.Conv2d | nn.Linear
 """Layers with weights."""
 
 
-class PolicyNetwork(ImageNetwork):
+class LayersNetwork(ImageNetwork):
+    """A network that ends in the sequence `layers`, of which the last, "logits", is linear."""
+
+    layers: nn.Sequential
+
+    @property
+    def num_actions(self) -> int:
+        """Number of outputs, see `Actions.num_outputs`."""
+        return len(self.layers.get_parameter("logits.weight"))
+
+    @torch.no_grad()
+    def rescale(self, factor: Tensor, shift: Tensor) -> None:
+        """See `ImageNetwork`; the last layer changes."""
+        weight, bias = (self.layers.get_parameter(f"logits.{n}") for n in ("weight", "bias"))
+        weight.mul_(factor[:, None])
+        bias.mul_(factor).add_(shift)
+
+
+class PolicyNetwork(LayersNetwork):
     """Layers from a frame to logits; the last one is linear and named "logits"."""
 
     def __init__(
@@ -96,11 +114,6 @@ class PolicyNetwork(ImageNetwork):
         self.layers.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
 
     @property
-    def num_actions(self) -> int:
-        """Number of outputs, see `Actions.num_outputs`."""
-        return len(self.layers.get_parameter("logits.weight"))
-
-    @property
     def parts(self) -> nn.Module:
         """The layers."""
         return self.layers
@@ -109,13 +122,6 @@ class PolicyNetwork(ImageNetwork):
     def is_sequential(self) -> bool:
         """Whether the outputs are those of `layers` in turn: no class overrides `forward`."""
         return type(self).forward is PolicyNetwork.forward
-
-    @torch.no_grad()
-    def rescale(self, factor: Tensor, shift: Tensor) -> None:
-        """See `ImageNetwork`; the last layer changes."""
-        weight, bias = (self.layers.get_parameter(f"logits.{n}") for n in ("weight", "bias"))
-        weight.mul_(factor[:, None])
-        bias.mul_(factor).add_(shift)
 
     def check(self, pixels: Tensor) -> None:
         """Raise an `InputError` for frames of another shape than the network's."""
@@ -134,7 +140,7 @@ class PolicyNetwork(ImageNetwork):
         return logits.reshape(*pixels.shape[:-3], logits.shape[-1])
 
 
-class InputsNetwork(ImageNetwork):
+class InputsNetwork(LayersNetwork):
     """A network of several inputs, joined: layers for each image, one for all vectors, and a trunk.
 
     Initial weights are orthogonal, the logits near zero.
@@ -178,18 +184,6 @@ class InputsNetwork(ImageNetwork):
         for layer in self.layers:
             if isinstance(layer, nn.Linear):
                 initialise(layer, layer is self.layers[-1])
-
-    @property
-    def num_actions(self) -> int:
-        """Number of outputs, see `Actions.num_outputs`."""
-        return len(self.layers.get_parameter("logits.weight"))
-
-    @torch.no_grad()
-    def rescale(self, factor: Tensor, shift: Tensor) -> None:
-        """See `ImageNetwork`; the last layer changes."""
-        weight, bias = (self.layers.get_parameter(f"logits.{n}") for n in ("weight", "bias"))
-        weight.mul_(factor[:, None])
-        bias.mul_(factor).add_(shift)
 
     def features(self, *inputs: Tensor) -> Tensor:
         """Return the joined outputs of all branches. Shapes: (N, *) to (N, F)."""
