@@ -9,7 +9,7 @@ from pydantic import BeforeValidator
 from drone_rl.config.task import BaseTaskSettings, Color, ObjectRegion
 from drone_rl.config.terms import Ends, Events, Rewards, Success
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import OneOf, Real, Several, Span, Whole
+from drone_rl.utils.schema import Listed, OneOf, Real, Several, Span, Whole
 from drone_rl.utils.settings import Settings
 
 Coordinate = Annotated[Any, Span(Real(-1000.0, 1000.0, unit="m"))]
@@ -111,6 +111,13 @@ class StartSettings(Settings):
 class TermTaskSettings(BaseTaskSettings):
     """A task of terms; `drone_rl.define_task` gives one a name. Lengths in metres."""
 
+    scene: Annotated[tuple[str, ...], Listed("scene file", 16)] | None = None
+    """File of the scene, MJCF or a mesh, or several, one of which each episode draws. None for an
+    empty field."""
+    scene_up: Annotated[str, OneOf(("z", "y"))] = "z"
+    """Axis of a mesh that points up."""
+    scene_scale: Annotated[float, Real(1e-6, 1e6)] = 1.0
+    """Metres of one unit of a mesh."""
     objects: dict[str, ObjectSettings] = {}
     """Objects by name; those placed later keep away from earlier ones."""
     start: StartSettings = StartSettings()

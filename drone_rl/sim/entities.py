@@ -6,6 +6,7 @@ from drone_rl.config import CameraSettings
 from drone_rl.config.camera import FRONT
 from drone_rl.sim.quiet_dm_control import composer, engine, mjcf
 from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.scenes import SceneFile
 from drone_rl.utils.errors import InputError
 
 SKY_COLOR = (0.62, 0.74, 0.92)
@@ -63,14 +64,27 @@ def add_camera(body: Any, spec: CameraSpec, vertical_fov: float) -> Any:
 
 
 class Field(composer.Arena):
-    """A flat floor under a uniform sky and one sun. Its boundaries are rules of the task."""
+    """A flat floor under a uniform sky and one sun, or what scene files put there instead."""
 
     semantic_class = SemanticClass.GROUND
 
-    def _build(self, name: str = "field") -> None:
+    def _build(self, scene: SceneFile | None = None, name: str = "field") -> None:
+        """Make the arena; that of a scene file has its headlight and draw distance alone."""
         super()._build(name=name)
         root: Any = self._mjcf_root
         root.statistic.extent = 1.0
+        if scene is not None:
+            vis, extent = scene.model.vis, float(scene.model.stat.extent)
+            root.visual.map.set_attributes(
+                znear=min(0.05, vis.map.znear * extent), zfar=vis.map.zfar * extent
+            )
+            root.visual.headlight.set_attributes(
+                active=vis.headlight.active,
+                ambient=vis.headlight.ambient,
+                diffuse=vis.headlight.diffuse,
+                specular=vis.headlight.specular,
+            )
+            return
         root.visual.map.set_attributes(znear=0.05, zfar=DRAW_DISTANCE)
         root.visual.headlight.active = 0
         root.visual.quality.shadowsize = 2048
@@ -82,6 +96,24 @@ class Field(composer.Arena):
         sun = {"directional": True, "pos": (0, 0, 50), "dir": (0.35, -0.45, -0.82)}
         light = {"ambient": (0.35,) * 3, "diffuse": (0.75,) * 3, "specular": (0, 0, 0)}
         root.worldbody.add("light", name="sun", castshadow=False, **sun, **light)
+
+
+class SceneEntity(composer.Entity):
+    """A scene file; its frame is the file's."""
+
+    semantic_class = SemanticClass.OBSTACLE
+
+    def _build(self, scene: SceneFile, name: str = "scene") -> None:
+        root: Any = mjcf.from_xml_string(scene.mjcf, assets=dict(scene.assets))
+        root.model = name
+        for section in ("option", "statistic", "visual", "size"):  # those of the field apply
+            getattr(root, section).remove()
+        self._mjcf_root = root
+
+    @property
+    def mjcf_model(self) -> Any:
+        """The `mjcf.RootElement`."""
+        return self._mjcf_root
 
 
 class VisualEntity(composer.Entity):

@@ -15,7 +15,9 @@ class SceneModel:
     def __init__(self, task: Task[Any], camera: CameraSettings, distractors: int = 0) -> None:
         """Compose the model; raise an `InputError` if the task's props fail."""
         self.name = f"task={task.name}"
-        self.field = entities.Field()
+        scenes = getattr(task, "scenes", ())
+        self._sky = (0.0, 0.0, 0.0) if scenes else entities.SKY_COLOR
+        self.field = entities.Field(next(iter(scenes), None))
         model: Any = self.field.mjcf_model
         model.option.gravity = (0, 0, 0)
         self.drone = entities.DroneEntity(size=task.drone_size, camera=camera)
@@ -37,4 +39,4 @@ class SceneModel:
         for number, entity in [(-1, self.drone), *enumerate(self.props)]:
             for geom in physics.bind(entity.mjcf_model.find_all("geom")).element_id:
                 classes[geom], props[geom] = entity.semantic_class, number
-        return Scene(model, tuple(classes), tuple(props), entities.SKY_COLOR)
+        return Scene(model, tuple(classes), tuple(props), self._sky)

@@ -15,6 +15,9 @@ from drone_rl.utils.text import ordinal
 HIDDEN_DEPTH = 100.0
 """Metres below its place at which an absent prop is kept, out of sight under the floor."""
 
+FAR_BELOW = 10_000.0
+"""Metres below the ground at which the scene files of other episodes are kept."""
+
 
 class Side(enum.IntEnum):
     """Where something is, seen from the drone: strata of tasks that count by side."""

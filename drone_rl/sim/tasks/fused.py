@@ -29,6 +29,8 @@ def fused_rules(task: Task[Any], dynamics: Dynamics, state: State) -> "FusedObje
     is_known = type(dynamics) in (ComputerVision, Kinematic, Quadrotor)
     if not isinstance(task, ObjectTask) or not follows_rules(task) or not is_known:
         return f"task {type(task).__name__} with {type(dynamics).__name__} is not fused"
+    if task.scenes:
+        return "not fused: the task takes place in a scene file"
     if in_torch := [term.name for term, _ in task.rules.compiled.in_torch]:
         return f"not fused: term {', '.join(in_torch)} is in torch"
     if isinstance(dynamics, Quadrotor) and any(

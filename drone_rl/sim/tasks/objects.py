@@ -10,10 +10,11 @@ from torch import Tensor
 
 from drone_rl.config.term_task import ROLES, ObjectSettings
 from drone_rl.sim.dynamics import BodyState, ComputerVision, Dynamics, Obstacles
-from drone_rl.sim.entities import VisualEntity
+from drone_rl.sim.entities import SceneEntity, VisualEntity
 from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.scenes import SceneFile
 from drone_rl.sim.tasks.applied_rules import AppliedRules
-from drone_rl.sim.tasks.common import HIDDEN_DEPTH, SIDES
+from drone_rl.sim.tasks.common import FAR_BELOW, HIDDEN_DEPTH, SIDES
 from drone_rl.sim.tasks.geometry_kernel import NOTHING
 from drone_rl.sim.tasks.task import State, Task
 
@@ -66,6 +67,8 @@ class ObjectTask(Task[ObjectState]):
     strata = SIDES
     num_sampled: int = 0
     """K of `ObjectState.sampled`."""
+    scenes: tuple[SceneFile, ...] = ()
+    """The S scenes, one of which each episode takes place in; none for an empty field."""
 
     def __init__(
         self,
@@ -99,9 +102,11 @@ class ObjectTask(Task[ObjectState]):
         """Return moves of the task's length (Table 1 of Luo et al., 2018)."""
         return ComputerVision(self.settings.step_length)
 
-    def make_props(self) -> list[ObjectEntity]:
-        """Return the objects, in order."""
-        return [ObjectEntity(of, name=name) for name, of in self.objects.items()]
+    def make_props(self) -> list[ObjectEntity | SceneEntity]:
+        """Return the objects, in order, then the scenes."""
+        objects = [ObjectEntity(of, name=name) for name, of in self.objects.items()]
+        scenes = [SceneEntity(of, name=f"scene_{i}") for i, of in enumerate(self.scenes)]
+        return [*objects, *scenes]
 
     def begun(self, body: BodyState, places: Tensor, sampled: Tensor | None = None) -> ObjectState:
         """Return states at the start of episodes, with objects at places, (N, P, 3).
@@ -172,9 +177,19 @@ class ObjectTask(Task[ObjectState]):
         """
 
     def places(self, state: ObjectState) -> Tensor:
-        """Return the objects' centres, those of absent ones under the floor."""
+        """Return the objects' centres, then the scenes' origins; those of absent ones below."""
         hidden = (~state.present).double() * HIDDEN_DEPTH
-        return state.places - torch.nn.functional.pad(hidden[..., None], (2, 0))
+        objects = state.places - torch.nn.functional.pad(hidden[..., None], (2, 0))
+        if not self.scenes:
+            return objects
+        scenes = objects.new_zeros(len(objects), len(self.scenes), 3)
+        scenes[..., 2] = -FAR_BELOW
+        scenes[torch.arange(len(objects)), self.scene_of(state)] = 0.0
+        return torch.cat([objects, scenes], 1)
+
+    def scene_of(self, state: ObjectState) -> Tensor:
+        """Return the number of each episode's scene, of `scenes`. Shape: (N,), int64."""
+        return torch.zeros(len(state), dtype=torch.int64, device=state.places.device)
 
     def obstacles(self, state: ObjectState) -> Obstacles | None:
         """Return what is solid, if all of it is of one size and parallel to the axes."""

@@ -14,6 +14,7 @@ from drone_rl.config.term_task import ObjectSettings, TermTaskSettings
 from drone_rl.config.terms import ENDS, EVENTS, SUCCESSES
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.scenes import load_scene
 from drone_rl.sim.tasks.applied_rules import AppliedRules, reward_terms
 from drone_rl.sim.tasks.common import Side
 from drone_rl.sim.tasks.geometry_kernel import GOAL
@@ -125,7 +126,8 @@ class TermTask(ObjectTask):
             ],
         )
         super().__init__(s, objects, rules)
-        self.num_sampled = 4 + (4 if events else 3) * len(objects)
+        self.scenes = tuple(load_scene(path, s.scene_up, s.scene_scale) for path in s.scene or ())
+        self.num_sampled = 4 + (4 if events else 3) * len(objects) + bool(self.scenes)
         x, y, z = (sum(s.start.range_of(axis)) / 2 for axis in "xyz")
         self.origin = (x, y, z)
         own = [term.name.upper() for term in ends]
@@ -168,7 +170,8 @@ class TermTask(ObjectTask):
     def sample(self, random_state: np.random.RandomState) -> Tensor:
         """Sample x, y, z (m) and heading (rad) of the start, then the centres. Shape: (K,).
 
-        With events, the last P numbers are the objects' phases, see `Mover`.
+        The scene's number follows if there are scene files. With events, the last P numbers are
+        the objects' phases, see `Mover`.
 
         Raises:
             InputError: A region has no room left for an object.
@@ -182,7 +185,9 @@ class TermTask(ObjectTask):
                 phases = random_state.uniform(
                     size=len(self.each) if self.rules.compiled.events else 0
                 )
-                numbers = np.concatenate([[*start, math.radians(heading)], *placed, phases])
+                scene = [random_state.randint(len(self.scenes))] if self.scenes else []
+                begun = [*start, math.radians(heading)]
+                numbers = np.concatenate([begun, *placed, scene, phases])
                 return torch.from_numpy(numbers)
         raise InputError(
             f"task.objects: found no room for {crowded} in {_MOST_TRIES} tries that keeps "
@@ -217,6 +222,10 @@ class TermTask(ObjectTask):
     def _sampled_places(self, sampled: Tensor) -> Tensor:
         """Return the sampled centres. Shape: (N, K) to (N, P, 3)."""
         return sampled[:, 4 : 4 + 3 * len(self.each)].unflatten(1, (-1, 3))
+
+    def scene_of(self, state: ObjectState) -> Tensor:
+        """See `ObjectTask.scene_of`."""
+        return state.sampled[:, 4 + 3 * len(self.each)].long()
 
     def info(self, state: ObjectState) -> dict[str, Tensor]:
         """See `entries`."""
