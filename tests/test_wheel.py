@@ -21,6 +21,8 @@ def test_wheel_contains_the_configuration_and_runs_without_the_checkout(tmp_path
     assert "drone_rl/explanations/report/templates/report.html" in names
     page = {f"drone_rl/flight/fly_page/{n}" for n in ("index.html", "fly.js", "fly.css")}
     assert page <= names
+    scenes = (ROOT / "drone_rl/sim/scenes/files").rglob("*.*")
+    assert {path.relative_to(ROOT).as_posix() for path in scenes} <= names
     policies = ("good", "poor", "right_and_forward", "proved")
     assert {f"drone_rl/policies/zoo/{n}.safetensors" for n in policies} <= names
     assert "drone_rl/policies/zoo/proved.certificate.json" in names
