@@ -42,6 +42,10 @@ from benchmarks.startup import bench_startup
 from benchmarks.sweeps import bench_kills, bench_sweeps
 from benchmarks.training import bench_experiment, bench_large, bench_seeds, bench_solve
 from benchmarks.verdicts import bench_verdicts
+from benchmarks.worlds.commands import bench_world_commands
+from benchmarks.worlds.drawing import bench_drawing
+from benchmarks.worlds.judging import bench_world_judging
+from benchmarks.worlds.training import bench_world_training
 from drone_rl.utils.errors import InputError
 
 _RENDERING = ("sim", "envs")
@@ -150,6 +154,20 @@ BENCHMARKS: dict[str, Benchmark] = {
     "input_rates": _benchmark(bench_input_rates, "several_inputs", *_COLLECTING, "acceleration"),
     "goal": _benchmark(bench_goal, "several_inputs", *_SOLVING),
     "goal_flight": _benchmark(bench_goal_flight, "several_inputs", *_SOLVING),
+    "world_drawing": _benchmark(
+        bench_drawing, "worlds", *_COLLECTING, "acceleration", *_parts("worlds/house")
+    ),
+    "world_training": _benchmark(bench_world_training, "worlds", *_SOLVING, "acceleration"),
+    "world_judging": _benchmark(
+        bench_world_judging, "worlds", *_EXPLAINING, *_parts("maps", "worlds/training")
+    ),
+    "world_commands": _benchmark(
+        bench_world_commands,
+        "worlds",
+        *_COMMANDS,
+        *("trust", "explanations", "flight"),
+        *_parts("worlds"),
+    ),
     "startup": _benchmark(bench_startup, "system", *_COMMANDS, "trust"),
     "onnx": _benchmark(bench_onnx, "libraries", *_JUDGING),
     "peers": _benchmark(bench_peers, "libraries", *_COMMANDS, *_parts("peers")),
@@ -170,8 +188,8 @@ BENCHMARKS: dict[str, Benchmark] = {
 GROUPS = tuple(dict.fromkeys(benchmark.group for benchmark in BENCHMARKS.values()))
 """Names of groups of benchmarks: main (speed and training), adversarial (correctness of claims),
 parallel (sweeps), verification, libraries (third-party software), system (revisions and start-up
-time), several_inputs (policies with them), long (trainings of hours), flight (vehicle
-dynamics)."""
+time), several_inputs (policies with them), worlds (scenes from files), long (trainings of hours),
+flight (vehicle dynamics)."""
 
 
 def find_benchmarks(names: Iterable[str]) -> list[str]:

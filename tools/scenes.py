@@ -167,9 +167,10 @@ def planks() -> Points:
 
 def speckled(color: tuple, seed: int) -> Points:
     """A plain color with noise that repeats without seams."""
-    rng = np.random.default_rng(seed)
-    noise = rng.normal(size=(64, 64))
-    near = sum(np.roll(noise, (i, j), (0, 1)) for i in (-1, 0, 1) for j in (-1, 0, 1))
+    noise = np.random.default_rng(seed).normal(size=(64, 64))
+    near = np.zeros((64, 64))
+    for shift in np.ndindex(3, 3):
+        near += np.roll(noise, shift, (0, 1))
     return (1 + 0.07 * near / 3)[..., None] * np.array(color)
 
 
