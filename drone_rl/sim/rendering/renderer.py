@@ -1,7 +1,7 @@
 """The renderer interface, and the choice of a renderer by name.
 
-`raytrace` (the default) is this project's ray tracer of simple solids, on CPU and GPU;
-`mujoco_warp` renders any MuJoCo model, about twenty times slower.
+`raytrace` (the default) is this project's ray tracer: of simple solids on CPU and GPU, of any
+scene on a CPU. `mujoco_warp` renders any MuJoCo model, several times slower.
 """
 
 import dataclasses
@@ -71,10 +71,10 @@ class RendererFactory(Protocol):
 
 
 _CLASSES = {
-    "raytrace": "drone_rl.sim.rendering.raytrace.renderer.Raytracer",
+    "raytrace": "drone_rl.sim.rendering.raytrace.world_renderer.make_raytracer",
     "mujoco_warp": "drone_rl.sim.rendering.mujoco_warp.WarpRenderer",
 }
-"""The class of each renderer, imported when it is needed."""
+"""What makes each renderer, imported when it is needed."""
 
 
 def find_renderer(which: str | RendererFactory) -> RendererFactory:

@@ -15,6 +15,8 @@ mujoco: Any = _mujoco
 """MuJoCo's bindings, which are untyped."""
 _UNSET = (0.5, 0.5, 0.5, 1.0)
 """MuJoCo's color of a geom that was given none."""
+_HIDDEN_GROUPS = 3
+"""The first group of geoms that is not rendered: collision geoms, by convention."""
 
 
 def compiled(model: mjcf.RootElement, name: str) -> mjcf.Physics:
@@ -67,9 +69,13 @@ class Scene:
         return [i for i, kind in enumerate(self.semantic_classes) if kind is semantic_class]
 
     def shown(self, show_drone: bool) -> list[int]:
-        """Return the indices of visible geoms; without `show_drone`, not the drone's."""
-        hidden = [] if show_drone else self.geoms(SemanticClass.DRONE)
-        return [i for i in np.flatnonzero(self.colors[:, 3] > 0).tolist() if i not in hidden]
+        """Return the indices of visible geoms; without `show_drone`, not the drone's.
+
+        As in MuJoCo's viewers, groups 0 to 2 are visible.
+        """
+        hidden = set[int]() if show_drone else {*self.geoms(SemanticClass.DRONE)}
+        is_visible = (self.colors[:, 3] > 0) & (self.model.geom_group < _HIDDEN_GROUPS)
+        return [i for i in np.flatnonzero(is_visible).tolist() if i not in hidden]
 
     @property
     def colors(self) -> NDArray[np.float32]:

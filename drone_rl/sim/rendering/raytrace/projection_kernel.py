@@ -33,10 +33,10 @@ def start_job(
     job.env = env
     job.view = view
     job.camera = view.cameras[camera]
-    turned = _frame_attitude(job.camera.frame, poses.attitudes[env])
+    turned = frame_attitude(job.camera.frame, poses.attitudes[env])
     origin = poses.positions[env, job.camera.frame]
-    job.eye = origin + _rotation(turned) @ job.camera.position
-    job.camera_to_world = _rotation(_product(turned, job.camera.attitude))
+    job.eye = origin + rotation(turned) @ job.camera.position
+    job.camera_to_world = rotation(product(turned, job.camera.attitude))
     job.rays = view.rays[camera]
     job.cosines = view.cosines[camera]
     job.nearest = scratch.nearest[buffer]
@@ -51,8 +51,8 @@ def start_job(
 def view_geom(job: Job, geoms: Geoms, geom: int, poses: PoseArrays) -> GeomView:
     """Return a geom relative to the camera."""
     frame = geoms.frame[geom]
-    turned = _frame_attitude(frame, poses.attitudes[job.env])
-    centre = poses.positions[job.env, frame] + _rotation(turned) @ geoms.position[geom]
+    turned = frame_attitude(frame, poses.attitudes[job.env])
+    centre = poses.positions[job.env, frame] + rotation(turned) @ geoms.position[geom]
     geom_view = GeomView()
     geom_view.kind = geoms.kind[geom]
     geom_view.number = geoms.number[geom]
@@ -61,7 +61,7 @@ def view_geom(job: Job, geoms: Geoms, geom: int, poses: PoseArrays) -> GeomView:
     if poses.scales:
         geom_view.size *= poses.scales[job.env, frame]
         geom_view.reach *= poses.scales[job.env, frame]
-    geom_view.axes = _rotation(_product(turned, geoms.attitude[geom]))
+    geom_view.axes = rotation(product(turned, geoms.attitude[geom]))
     geom_view.eye = wp.transpose(geom_view.axes) @ (job.eye - centre)
     geom_view.into = wp.transpose(geom_view.axes) @ job.camera_to_world
     return geom_view
@@ -131,14 +131,16 @@ def _first_pixel(place: float, half: float, count: int) -> int:
 
 
 @wp.func
-def _frame_attitude(frame: int, drone: wp.vec4) -> wp.vec4:
+def frame_attitude(frame: int, drone: wp.vec4) -> wp.vec4:
+    """Return the attitude of a frame, given the drone's."""
     if frame == DRONE_FRAME:
         return drone
     return wp.vec4(1.0, 0.0, 0.0, 0.0)
 
 
 @wp.func
-def _product(a: wp.vec4, b: wp.vec4) -> wp.vec4:
+def product(a: wp.vec4, b: wp.vec4) -> wp.vec4:
+    """Multiply quaternions (w, x, y, z): b in the frame of a."""
     return wp.vec4(
         a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
         a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
@@ -148,7 +150,8 @@ def _product(a: wp.vec4, b: wp.vec4) -> wp.vec4:
 
 
 @wp.func
-def _rotation(q: wp.vec4) -> wp.mat33:
+def rotation(q: wp.vec4) -> wp.mat33:
+    """Return the rotation matrix of a quaternion (w, x, y, z)."""
     ww, xx, yy, zz = q[0] * q[0], q[1] * q[1], q[2] * q[2], q[3] * q[3]
     wx, wy, wz = q[0] * q[1], q[0] * q[2], q[0] * q[3]
     xy, xz, yz = q[1] * q[2], q[1] * q[3], q[2] * q[3]

@@ -20,8 +20,10 @@ from drone_rl.sim.rendering.raytrace.materials import MaterialsEncoder
 from drone_rl.sim.rendering.renderer import Poses
 from drone_rl.sim.rendering.scene import Scene
 from drone_rl.sim.rendering.view import MODALITIES, Modality, View
+from drone_rl.utils.errors import InputError
 
-_BITS: dict[Modality, int] = {name: getattr(structs, name.upper()) for name in MODALITIES}
+MODALITY_BITS: dict[Modality, int] = {name: getattr(structs, name.upper()) for name in MODALITIES}
+"""Bit of each modality in `ViewArrays.what`."""
 _VECTORS = {"rgb": wp.vec3ub, "normals": wp.vec3}
 """Warp types of modalities with several numbers per pixel."""
 
@@ -58,7 +60,8 @@ class Raytracer:
         if the scene has unsupported geoms or lights, or there is no such device.
         """
         start_warp(device)
-        scenes.check_scene(scene)
+        if reason := scenes.why_not_simple(scene):
+            raise InputError(f"{reason}, which Raytracer can't render; give renderer=raytrace")
         self.scene, self.device = scene, torch.device(device)
         is_cpu = self.device.type == "cpu"
         self._launcher = CpuLauncher(num_envs, num_shards) if is_cpu else GpuLauncher(device)
@@ -101,12 +104,12 @@ class Raytracer:
         self._launcher.close()
 
     def _encode(self, view: View) -> tuple[structs.ViewArrays, structs.Geoms]:
-        view.check_modalities(self, _BITS)
+        view.check_modalities(self, MODALITY_BITS)
         device = str(self.device)
         with on_torch_stream(self.device):
             encoded = scenes.make_view(self.scene, self._frames, view, device)
             geoms = scenes.make_geoms(self.scene, self._frames, view.show_drone, device)
-        encoded.what = sum({_BITS[modality] for modality in view.modalities})
+        encoded.what = sum({MODALITY_BITS[modality] for modality in view.modalities})
         return encoded, geoms
 
 

@@ -32,32 +32,40 @@ HALF_EXTENTS: dict[int, Callable[[NDArray], NDArray]] = {
 the size itself."""
 
 
-def check_scene(scene: Scene) -> None:
-    """Raise an `InputError` if the ray tracer does not support a geom or light of a scene."""
+_TRIANGLES = (
+    int(mujoco.mjtGeom.mjGEOM_MESH),
+    int(mujoco.mjtGeom.mjGEOM_SDF),
+    int(mujoco.mjtGeom.mjGEOM_HFIELD),
+)
+"""Kinds of geoms that are rendered as triangles."""
+
+
+def why_not_simple(scene: Scene) -> str | None:
+    """Return a geom or light that only `SceneRaytracer` renders; None if `Raytracer` can."""
     model = scene.model
     for geom in range(model.ngeom):
         if model.geom_type[geom] not in HALF_EXTENTS:
             kind = mujoco.mjtGeom(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
-            raise InputError(
-                f"geom {model.geom(geom).name!r} is a {kind}, which Raytracer can't render; give "
-                "renderer=mujoco_warp"
-            )
+            return f"geom {model.geom(geom).name!r} is a {kind}"
     if model.nflex:
-        raise InputError(
-            "the scene has soft bodies, which Raytracer can't render; give renderer=mujoco_warp"
-        )
+        return "the scene has soft bodies"
     if not model.nlight:
-        raise InputError("the scene has no light, so nothing could be seen; add one")
+        return "the scene has no light"
     is_distant = model.light_type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
     is_fixed = model.light_bodyid == 0
     if not (is_distant & is_fixed & (model.light_castshadow == 0)).all():
-        raise InputError(
-            "a light of the scene is not directional, is attached to a body or has "
-            "castshadow=true, which Raytracer does not support (appearance.shadows casts shadows); "
-            "give renderer=mujoco_warp"
+        return (
+            "a light of the scene is not directional, is attached to a body or has castshadow=true"
         )
     if model.vis.headlight.active:
-        raise InputError("the scene's headlight is on; switch it off or give renderer=mujoco_warp")
+        return "the scene's headlight is on"
+    return None
+
+
+def kind_of(model: Any, geom: int) -> int:
+    """Return the kind of a geom as it is rendered: height fields are meshes, too."""
+    kind = int(model.geom_type[geom])
+    return _TRIANGLES[0] if kind in _TRIANGLES else kind
 
 
 class Frames:
@@ -156,18 +164,25 @@ def make_geoms(scene: Scene, frames: Frames, show_drone: bool, device: str) -> s
     bodies, positions, attitudes = model.geom_bodyid, model.geom_pos, model.geom_quat
     places = [frames.place(bodies[i], positions[i], attitudes[i]) for i in seen]
     values = {
-        "kind": (model.geom_type[seen], int),
+        "kind": ([kind_of(model, i) for i in seen], int),
         "number": (seen, int),
         "frame": ([place[0] for place in places], int),
         "position": ([place[1] for place in places], wp.vec3),
         "attitude": ([place[2] for place in places], wp.vec4),
         "size": (model.geom_size[seen], wp.vec3),
-        "reach": ([HALF_EXTENTS[model.geom_type[i]](model.geom_size[i]) for i in seen], wp.vec3),
+        "reach": ([_reach(model, i) for i in seen], wp.vec3),
     }
     geoms: Any = structs.Geoms()
     for name, (value, dtype) in values.items():
         setattr(geoms, name, wp.array(value, dtype=dtype, device=device))
     return geoms
+
+
+def _reach(model: Any, geom: int) -> NDArray:
+    """Half extents of a geom's bounding box around its position."""
+    if (kind := int(model.geom_type[geom])) in HALF_EXTENTS:
+        return HALF_EXTENTS[kind](model.geom_size[geom])
+    return np.abs(model.geom_aabb[geom, :3]) + model.geom_aabb[geom, 3:]
 
 
 class Cameras:

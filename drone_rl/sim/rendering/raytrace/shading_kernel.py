@@ -26,10 +26,10 @@ def shade_span(
     """
     shown = _find_surface(job, first, last, owner, distance)
     if shown.number == structs.NO_GEOM:
-        shown.color = _bytes(materials.sky[job.env % materials.sky.shape[0]])
+        shown.color = to_bytes(materials.sky[job.env % materials.sky.shape[0]])
     else:
-        shown.color = _bytes(_lambert(materials, job.env, shown.number, shown.normal))
-    shown.gray = _gray(shown.color)
+        shown.color = to_bytes(_lambert(materials, job.env, shown.number, shown.normal))
+    shown.gray = gray_of(shown.color)
     write_span(job, images, job.view.what, first, last, shown)
 
 
@@ -122,12 +122,13 @@ def _lambert(materials: structs.Materials, env: int, geom: int, normal: wp.vec3)
 
 
 @wp.func
-def _bytes(color: wp.vec3) -> wp.vec3ub:
+def to_bytes(color: wp.vec3) -> wp.vec3ub:
+    """Round a color of 0 to 255 down to bytes."""
     return wp.vec3ub(wp.uint8(color[0]), wp.uint8(color[1]), wp.uint8(color[2]))
 
 
 @wp.func
-def _gray(color: wp.vec3ub) -> float:
+def gray_of(color: wp.vec3ub) -> float:
     """Return fma(green, G, red * R) + blue * B in float32, as torch does on x86 by `WEIGHTS`."""
     red, green, blue = float(color[0]), float(color[1]), float(color[2])
     two = float(wp.float64(red * _RED) + wp.float64(green) * wp.float64(_GREEN))

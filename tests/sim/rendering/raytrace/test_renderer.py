@@ -258,10 +258,10 @@ def test_geoms_beyond_the_far_limit_are_sky(both):
         (
             'type="sphere" size=".8"',
             'type="hfield" hfield="h"',
-            "geom 'a' is a hfield, which .* renderer=mujoco_warp$",
+            "geom 'a' is a hfield, which .* renderer=raytrace$",
         ),
-        ('castshadow="false"/>\n<light', 'castshadow="true"/>\n<light', "casts shadows"),
-        ('<headlight active="0"/>', '<headlight active="1"/>', "headlight is on; switch it off"),
+        ('castshadow="false"/>\n<light', 'castshadow="true"/>\n<light', "castshadow=true, which"),
+        ('<headlight active="0"/>', '<headlight active="1"/>', "headlight is on, which"),
         (
             ' fovy="60"',
             ' projection="orthographic"',
