@@ -2,7 +2,6 @@
 
 import dataclasses
 import functools
-import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,10 +10,26 @@ import mujoco as _mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from drone_rl.sim.scenes.assets import Folder, version_of
+from drone_rl.sim.scenes.compiling import compile_scene, freeze
+from drone_rl.sim.scenes.elements import write
+from drone_rl.sim.scenes.reader import Reader, Reading
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import as_path
 
 mujoco: Any = _mujoco
 """MuJoCo's bindings, which are untyped."""
+_SMALLEST, _LARGEST = 0.1, 1000.0
+"""Longest edges of worlds, metres; outside of this range the units are wrong."""
+_NOT_DRAWN = {
+    "flex": "flexes are",
+    "flexcomp": "flexes are",
+    "skin": "skins are",
+    "composite": "composites are",
+    "sdf": "signed distance shapes are",
+    "reflectance": "reflections are",
+    "haze": "haze is",
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,7 +44,7 @@ class Site:
     """Of its x axis, degrees to the left of the world's x."""
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class SceneFile:
     """A scene: what is left of a file once nothing in it moves by itself.
 
@@ -39,7 +54,7 @@ class SceneFile:
 
     path: Path
     sha256: str
-    """Hash of the file and of all that it includes."""
+    """Hash of the file and of all files that it names."""
     mjcf: str
     """The normalized model, in radians, without joints, actuators and contacts."""
     assets: Mapping[str, bytes]
@@ -77,8 +92,14 @@ class SceneFile:
         return np.min(lows, 0), np.max(highs, 0)
 
 
+_loaded: dict[tuple[Path, str, float], tuple[dict[Path, tuple[int, int]], SceneFile]] = {}
+"""Scenes that were read, with the versions of their files."""
+
+
 def load_scene(path: str | Path, up: str = "z", scale: float = 1.0) -> SceneFile:
-    """Read a scene.
+    """Read a scene; return the same one again while its files do not change.
+
+    Nothing outside of the file's folder is read, and nothing large before its size is checked.
 
     Args:
         path: An MJCF file, or a mesh.
@@ -88,59 +109,82 @@ def load_scene(path: str | Path, up: str = "z", scale: float = 1.0) -> SceneFile
     Raises:
         InputError: The file can't be read; the message names the element and the remedy.
     """
-    file = Path(path)
     try:
-        content = file.read_bytes()
-    except OSError as error:
-        reason = error.strerror
-        raise InputError(f"scene={path} can't be read ({reason}); give an MJCF file") from error
-    return _load(file.resolve(), hashlib.sha256(content).hexdigest(), up, scale)
+        file = as_path(path, "scene").resolve()
+        versions, scene = _loaded.get((file, up, scale), ({}, None))
+        if scene is None or any(version_of(of) != version for of, version in versions.items()):
+            folder = Folder(file.parent)
+            scene = _load(file, folder)
+            _loaded[file, up, scale] = folder.versions, scene
+        return scene
+    except (InputError, OSError, RuntimeError) as error:  # loops of links
+        raise InputError(f"scene={path}: {error}") from error
 
 
-@functools.lru_cache(16)
-def _load(path: Path, sha256: str, up: str, scale: float) -> SceneFile:
-    try:
-        spec = mujoco.MjSpec.from_file(str(path))
-        model = spec.compile()
-    except ValueError as error:
-        raise InputError(f"scene={path}: {str(error).splitlines()[0]}; correct it") from error
-    _freeze(spec, model)
-    assets: dict[str, bytes] = {}
-    for kind in (spec.meshes, spec.textures, spec.hfields):
-        for one in kind:
-            if getattr(one, "file", ""):
-                assets[one.file] = (path.parent / one.file).read_bytes()
-    solid = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
-    return SceneFile(path, sha256, spec.to_xml(), assets, _sites(model), tuple(solid.tolist()))
-
-
-def _freeze(spec: Any, model: Any) -> None:
-    """Leave bodies where the first key frame has them, without joints and all that acts on them."""
+def _load(file: Path, folder: Folder) -> SceneFile:
+    reading = Reading(folder)
+    root = Reader(file, reading).root
+    model, text, solid = compile_scene(root, reading)
     data = mujoco.MjData(model)
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_kinematics(model, data)
-    for number, body in enumerate(spec.bodies[1:], start=1):
-        parent = model.body_parentid[number]
-        back, place, turn = np.empty(4), np.empty(3), np.empty(4)
-        mujoco.mju_negQuat(back, data.xquat[parent])
-        mujoco.mju_rotVecQuat(place, data.xpos[number] - data.xpos[parent], back)
-        mujoco.mju_mulQuat(turn, back, data.xquat[number])
-        body.pos, body.quat, body.mocap = place, turn, False
-        body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
-        for joint in list(body.joints):
-            spec.delete(joint)
-    names = ("keys", "actuators", "sensors", "tendons", "equalities", "excludes", "pairs")
-    for kind in (*names, "skins", "flexes", "cameras"):
-        for one in list(getattr(spec, kind)):
-            spec.delete(one)
+    mujoco.mj_comPos(model, data)  # some lights follow it
+    mujoco.mj_camlight(model, data)
+    frozen = freeze(text, file, model, data)
+    used = {value for element in frozen.every() for value in element.attributes.values()}
+    scene = SceneFile(
+        file,
+        folder.hash.hexdigest(),
+        write(frozen)[0],
+        {name: content for name, content in reading.files.items() if name in used},
+        _sites(model, data),
+        solid,
+        tuple(_warnings(reading.notes)),
+    )
+    _check_size(scene)
+    return scene
 
 
-def _sites(model: Any) -> tuple[Site, ...]:
-    data = mujoco.MjData(model)
-    if model.nkey:
-        mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_kinematics(model, data)
+def _check_size(scene: SceneFile) -> None:
+    """Raise an `InputError` if the world is too small or too large, or infinite."""
+    low, high = scene.bounds
+    model = scene.model
+    planes = model.geom_size[model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE, :2]
+    size = max(float((high - low).max()), 2 * float(planes.max(initial=0.0)))
+    if not _SMALLEST <= size <= _LARGEST:
+        raise InputError(
+            f"the world's longest edge is {size:.3g} m; give one of {_SMALLEST:g} to "
+            f"{_LARGEST:g} m (scale of meshes, or task.scene_scale for a mesh file)"
+        )
+    if max(abs(low).max(), abs(high).max()) > _LARGEST:
+        far = f"[{', '.join(f'{value:.3g}' for value in (low + high) / 2)}]"
+        raise InputError(f"the world's middle is {far} m; move it within {_LARGEST:g} m of 0")
+
+
+def _warnings(notes: Mapping[str, list[str]]) -> list[str]:
+    lines = [
+        f"{what} not drawn: {_some(notes[kind])}"
+        for kind, what in _NOT_DRAWN.items()
+        if notes[kind]
+    ]
+    if notes["plugin"]:
+        lines.append(f"plugins do not run: {_some(notes['plugin'])}")
+    joints = notes["joint"] + notes["freejoint"]
+    if joints:
+        where = f"key frame {notes['key'][0]} has them" if notes["key"] else "they begin"
+        lines.append(f"joints do not move; they stay where {where}: {_some(joints)}")
+    return lines
+
+
+def _some(names: list[str]) -> str:
+    """Return the first names, and how many more there are."""
+    distinct = list(dict.fromkeys(names))
+    rest = f" and {len(distinct) - 5} more" if len(distinct) > 5 else ""
+    return ", ".join(name[:40] for name in distinct[:5]) + rest
+
+
+def _sites(model: Any, data: Any) -> tuple[Site, ...]:
     found = []
     for i in range(model.nsite):
         turn = data.site_xmat[i].reshape(3, 3)

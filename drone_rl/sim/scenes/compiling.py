@@ -1,0 +1,134 @@
+"""Compile a scene's MJCF, and write it again as what does not move."""
+
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import mujoco as _mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from drone_rl.sim.scenes.elements import Element, parse, write
+from drone_rl.sim.scenes.reader import Reading
+from drone_rl.utils.errors import InputError
+
+mujoco: Any = _mujoco
+"""MuJoCo's bindings, which are untyped."""
+_SECTIONS = {"statistic", "visual", "default", "asset", "worldbody"}
+
+
+def compile_scene(root: Element, reading: Reading) -> tuple[Any, str, tuple[bool, ...]]:
+    """Return the compiled model, its MJCF, and whether each of its geoms can be touched.
+
+    Raises:
+        InputError: MuJoCo refuses the scene.
+    """
+    text, of_line = write(root)
+    try:
+        spec = mujoco.MjSpec.from_string(text, include=reading.models, assets=reading.files)
+        can_touch = [bool(geom.contype or geom.conaffinity) for geom in spec.geoms]
+        for geom in spec.geoms:  # MuJoCo would make convex hulls of meshes, for its own contacts
+            geom.contype = geom.conaffinity = 0
+        model = spec.compile()
+        solid = {geom.id: is_solid for geom, is_solid in zip(spec.geoms, can_touch, strict=True)}
+        return model, spec.to_xml(), tuple(solid[i] for i in range(model.ngeom))
+    except (ValueError, RuntimeError, mujoco.FatalError) as error:
+        raise InputError(_reason(str(error), of_line)) from error
+
+
+def _reason(message: str, of_line: list[Element]) -> str:
+    """Return MuJoCo's message about a line of our text with the line of the user's file."""
+    lines = [line for line in message.splitlines() if line.strip()] or ["MuJoCo can't compile it"]
+    what = re.sub(r"^(XML )?Error: (Error: )?", "", lines[0])[:200]
+    place = re.search(r"line (\d+)\s*$", message.rstrip())
+    number = int(place[1]) if place else 0
+    where = f"{of_line[number - 1]}: " if 0 < number <= len(of_line) else ""
+    return f"{where}{what}; correct it"
+
+
+def freeze(text: str, file: Path, model: Any, data: Any) -> Element:
+    """Return a model's MJCF with everything where `data` has it, without joints and frames."""
+    root = parse(text.encode(), file)
+    kept = [section for section in root.children if section.tag in _SECTIONS]
+    root.children = [Element("compiler", {"angle": "radian"}, file, 0), *kept]
+    bodies = iter(range(1, model.nbody))
+    owners = {tag: getattr(model, f"{tag}_bodyid") for tag in _PLACED}
+
+    def place(element: Element, body: int) -> None:
+        """Place what a body has, then the bodies in it, which are numbered in this order."""
+        children = [child for child in _without_frames(element) if child.tag in (*_PLACED, "body")]
+        for tag in _PLACED:
+            own = [child for child in children if child.tag == tag]
+            for child, number in zip(own, np.flatnonzero(owners[tag] == body), strict=True):
+                _PLACED[tag](child, model, data, int(number))
+        element.children = children
+        for child in children:
+            if child.tag == "body":
+                number = next(bodies)
+                _place_body(child, model, data, number)
+                place(child, number)
+
+    for section in kept:
+        if section.tag == "worldbody":
+            place(section, 0)
+    return root
+
+
+def _without_frames(element: Element) -> Iterator[Element]:
+    for child in element.children:
+        if child.tag == "frame":
+            yield from _without_frames(child)
+        else:
+            yield child
+
+
+def _place_body(element: Element, model: Any, data: Any, number: int) -> None:
+    parent = model.body_parentid[number]
+    turn = data.xmat[parent].reshape(3, 3)
+    back, quat = np.empty(4), np.empty(4)
+    mujoco.mju_negQuat(back, data.xquat[parent])
+    mujoco.mju_mulQuat(quat, back, data.xquat[number])
+    _set(element, pos=turn.T @ (data.xpos[number] - data.xpos[parent]), quat=quat)
+    for name in ("mocap", "gravcomp", "sleep"):
+        element.attributes.pop(name, None)
+
+
+def _place_geom(element: Element, model: Any, data: Any, number: int) -> None:
+    pos, quat = model.geom_pos[number], model.geom_quat[number]
+    kind, mesh = model.geom_type[number], model.geom_dataid[number]
+    if kind == mujoco.mjtGeom.mjGEOM_MESH:  # MuJoCo moves meshes to their centres of mass
+        back, moved, offset = np.empty(4), np.empty(4), np.empty(3)
+        mujoco.mju_negQuat(back, model.mesh_quat[mesh])
+        mujoco.mju_mulQuat(moved, quat, back)
+        mujoco.mju_rotVecQuat(offset, model.mesh_pos[mesh], moved)
+        pos, quat = pos - offset, moved
+    elif element.attributes.pop("mesh", None):  # fitted to it
+        element.attributes.pop("fitscale", None)
+        _set(element, size=model.geom_size[number])
+    _set(element, pos=pos, quat=quat)
+
+
+def _place_site(element: Element, model: Any, data: Any, number: int) -> None:
+    _set(element, pos=model.site_pos[number], quat=model.site_quat[number])
+
+
+def _place_light(element: Element, model: Any, data: Any, number: int) -> None:
+    body = model.light_bodyid[number]
+    turn = data.xmat[body].reshape(3, 3)
+    for name in ("mode", "target"):
+        element.attributes.pop(name, None)
+    pos = turn.T @ (data.light_xpos[number] - data.xpos[body])
+    _set(element, pos=pos, dir=turn.T @ data.light_xdir[number])
+
+
+def _set(element: Element, **values: NDArray[np.float64]) -> None:
+    for name, numbers in values.items():
+        element.attributes[name] = " ".join(f"{number:.9g}" for number in numbers)
+
+
+_PLACED: dict[str, Callable[[Element, Any, Any, int], None]] = {
+    "geom": _place_geom,
+    "site": _place_site,
+    "light": _place_light,
+}
