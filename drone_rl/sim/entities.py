@@ -104,7 +104,9 @@ class SceneEntity(composer.Entity):
     semantic_class = SemanticClass.OBSTACLE
 
     def _build(self, scene: SceneFile, name: str = "scene") -> None:
-        root: Any = mjcf.from_xml_string(scene.mjcf, assets=dict(scene.assets))
+        root: Any = mjcf.from_xml_string(
+            scene.mjcf, escape_separators=True, assets=dict(scene.assets)
+        )
         root.model = name
         for section in ("option", "statistic", "visual", "size"):  # those of the field apply
             getattr(root, section).remove()

@@ -65,12 +65,24 @@ def parse(content: bytes, file: Path) -> Element:
     parser.StartElementHandler, parser.EndElementHandler = begin, lambda _: stack.pop()
     parser.StartDoctypeDeclHandler = refuse
     try:
-        parser.Parse(content, True)
+        parser.Parse(_without_comments(content), True)
     except (xml.parsers.expat.ExpatError, ValueError) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(f"{file.name} is no XML ({error}); correct it") from None
     return roots[0]
+
+
+def _without_comments(content: bytes) -> bytes:
+    """Return XML without comments, on the same lines: MuJoCo accepts -- in them, XML does not."""
+    parts, at = [], 0
+    while (begin := content.find(b"<!--", at)) >= 0:
+        end = content.find(b"-->", begin)
+        if end < 0:
+            break
+        parts += [content[at:begin], b"\n" * content.count(b"\n", begin, end)]
+        at = end + 3
+    return b"".join([*parts, content[at:]])
 
 
 def write(root: Element) -> tuple[str, list[Element]]:

@@ -14,7 +14,7 @@ from drone_rl.sim.scenes.assets import Folder, version_of
 from drone_rl.sim.scenes.compiling import compile_scene, freeze
 from drone_rl.sim.scenes.elements import write
 from drone_rl.sim.scenes.reader import Reader, Reading
-from drone_rl.utils.errors import InputError
+from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.files import as_path
 
 mujoco: Any = _mujoco
@@ -92,8 +92,33 @@ class SceneFile:
         return np.min(lows, 0), np.max(highs, 0)
 
 
+FILES = Path(__file__).parent / "files"
+"""The shipped scenes, which have names: those of the files here, without .xml."""
+
 _loaded: dict[tuple[Path, str, float], tuple[dict[Path, tuple[int, int]], SceneFile]] = {}
 """Scenes that were read, with the versions of their files."""
+
+
+def scene_names() -> list[str]:
+    """Return the names of the shipped scenes."""
+    return sorted(file.stem for file in FILES.glob("*.xml"))
+
+
+def find_scene(scene: str | Path) -> Path:
+    """Return the path of a scene's file, of a shipped one if no file has that path.
+
+    Raises:
+        InputError: There is none.
+    """
+    path = as_path(scene, "scene")
+    if path.exists() or path.is_symlink():
+        return path
+    if str(scene) in scene_names():
+        return FILES / f"{scene}.xml"
+    raise InputError(
+        f"it does not exist; give {', '.join(scene_names())}, or the path of an MJCF file or mesh"
+        f"{did_you_mean(scene, scene_names())}"
+    )
 
 
 def load_scene(path: str | Path, up: str = "z", scale: float = 1.0) -> SceneFile:
@@ -102,7 +127,7 @@ def load_scene(path: str | Path, up: str = "z", scale: float = 1.0) -> SceneFile
     Nothing outside of the file's folder is read, and nothing large before its size is checked.
 
     Args:
-        path: An MJCF file, or a mesh.
+        path: An MJCF file, a mesh, or the name of a shipped scene.
         up: Axis of a mesh that points up, "y" or "z".
         scale: Metres of one unit of a mesh.
 
@@ -110,15 +135,16 @@ def load_scene(path: str | Path, up: str = "z", scale: float = 1.0) -> SceneFile
         InputError: The file can't be read; the message names the element and the remedy.
     """
     try:
-        file = as_path(path, "scene").resolve()
+        file = find_scene(path).resolve()
         versions, scene = _loaded.get((file, up, scale), ({}, None))
         if scene is None or any(version_of(of) != version for of, version in versions.items()):
             folder = Folder(file.parent)
             scene = _load(file, folder)
             _loaded[file, up, scale] = folder.versions, scene
         return scene
-    except (InputError, OSError, RuntimeError) as error:  # loops of links
-        raise InputError(f"scene={path}: {error}") from error
+    except (InputError, OSError, RuntimeError) as error:  # the last are loops of links
+        text = str(error).replace(f"{path} ", "it ") if isinstance(error, InputError) else error
+        raise InputError(f"scene={path}: {text}") from error
 
 
 def _load(file: Path, folder: Folder) -> SceneFile:
