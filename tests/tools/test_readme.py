@@ -20,7 +20,10 @@ from tools.readme.tables import (
     make_table,
 )
 
-TABLES = (rows.MAIN, rows.ADVERSARIAL, rows.VERIFICATION, rows.FLIGHT, rows.LIBRARIES, rows.TASKS)
+TABLES = (
+    *(rows.MAIN, rows.ADVERSARIAL, rows.VERIFICATION, rows.FLIGHT, rows.LIBRARIES, rows.TASKS),
+    rows.WORLDS,
+)
 
 
 @pytest.fixture(scope="module")

@@ -18,6 +18,11 @@ def _relative_time(figures: Figures) -> str:
     return f"{ratio:.2f} ({ours:.1f} s against {ours / ratio:.1f} s)"
 
 
+def _world_solved(figures: Figures) -> str:
+    solved = figures["world_solve_s"].values()
+    return "; ".join("not solved" if one is None else f"{one:.0f}" for one in solved)
+
+
 HEADLINES = (
     Row(
         "solve",
@@ -565,3 +570,51 @@ TASKS = (
     ),
 )
 """Tasks that users define."""
+WORLDS = (
+    Row(
+        "world_drawing",
+        "frames/s at 64x64 in the indoor scene relative to MuJoCo Warp's renderer; to MuJoCo's "
+        "OpenGL without shadows and multisampling",
+        "{world_over_warp:.1f} times; {world_over_opengl:.1f} times",
+        "4; 6",
+    ),
+    Row(
+        "world_drawing",
+        "frames/s of collecting with a policy there relative to MuJoCo Warp's renderer alone",
+        "{world_collecting_over_warp:.1f} times",
+        "3",
+    ),
+    Row(
+        "world_training",
+        "`reach` indoors, by moves and in flight: seconds until a verdict's success is 90% (median "
+        "of 3 seeds)",
+        _world_solved,
+        "600; 1800",
+    ),
+    Row(
+        "world_training",
+        "the same: success rate, lower end of the 95% CI, worst seed; success of policies that "
+        "learned without the image",
+        "{world_lower95:%}; {world_blind:%}",
+        "85%; 30%",
+    ),
+    Row(
+        "world_commands",
+        "commands and libraries that work on a new scene without Python",
+        "{world_commands} of {world_commands_total}",
+        "all",
+    ),
+    Row(
+        "world_judging",
+        "seconds of `verdict`, `explain`, and `shifts` of one axis, default episodes",
+        "{world_verdict_s:.0f}; {world_explain_s:.0f}; {world_shifts_s:.0f}",
+        "120; 180; 150",
+    ),
+    Row(
+        "world_judging",
+        "heat maps of placebos that are trusted; planted ones that are found",
+        "{world_placebos_trusted} of {world_placebos_total}; {world_planted_found:%}",
+        "0; 90%",
+    ),
+)
+"""Scenes from files."""
