@@ -45,6 +45,9 @@ class Hit:
     env: int
     geom: int
     """Index in the model; -1 for nothing, and then all but `env` is zero."""
+    kind: int
+    part: int
+    """Its face, see `intersection_kernel.ROUND`, or triangle."""
     distance: float
     """Along the ray."""
     point: wp.vec3
@@ -56,6 +59,8 @@ class Hit:
     """The point in the geom's frame."""
     local_normal: wp.vec3
     """`face_normal` in the geom's frame."""
+    axes: wp.mat33
+    """Rotates directions from the geom's frame to the world's."""
     size: wp.vec3
     """Of the geom, as MuJoCo's; zero for meshes and height fields."""
     is_mapped: bool
@@ -157,28 +162,51 @@ def make_hit(
     hit.geom = world.geoms.number[geom]
     hit.distance = along
     hit.point = origin + along * direction
-    hit.local = local.origin + along * local.ray
-    if local.kind == MESH:
+    mesh = world.mesh[geom]
+    return complete_hit(
+        hit, world, local.kind, local.size, local.axes, mesh, part, local.origin, local.ray
+    )
+
+
+@wp.func
+def complete_hit(
+    hit: Hit,
+    world: World,
+    kind: int,
+    size: wp.vec3,
+    axes: wp.mat33,
+    mesh: int,
+    part: int,
+    origin: wp.vec3,
+    ray: wp.vec3,
+) -> Hit:
+    """Return a hit with all that depends on the geom.
+
+    `axes` rotates directions from the geom's frame, in which `origin` and `ray` are, to the world.
+    """
+    hit.kind = kind
+    hit.part = part
+    hit.axes = axes
+    hit.local = origin + hit.distance * ray
+    if kind == MESH:
         triangles = world.triangles
         hit.local_normal = triangle_normal(triangles, part)
-        hit.face_normal = local.axes @ hit.local_normal
-        weights = triangle_weights(triangles, part, local.origin, local.ray)
+        hit.face_normal = axes @ hit.local_normal
+        weights = triangle_weights(triangles, part, origin, ray)
         smooth = wp.vec3()
         for corner in range(3):
             smooth += weights[corner] * triangles.normals[3 * part + corner]
-        hit.normal = local.axes @ wp.normalize(smooth)
-        hit.is_mapped = triangles.is_mapped[world.mesh[geom]] != 0
+        hit.normal = axes @ wp.normalize(smooth)
+        hit.is_mapped = triangles.is_mapped[mesh] != 0
         if hit.is_mapped:
             for corner in range(3):
                 hit.texcoord += weights[corner] * triangles.texcoords[3 * part + corner]
     else:
-        hit.size = local.size
-        hit.local_normal = surface_normal(
-            local.kind, local.size, part, local.origin, local.ray, along
-        )
-        if local.kind == PLANE and local.origin[2] < 0.0:
+        hit.size = size
+        hit.local_normal = surface_normal(kind, size, part, origin, ray, hit.distance)
+        if kind == PLANE and origin[2] < 0.0:
             hit.local_normal = -hit.local_normal
-        hit.face_normal = local.axes @ hit.local_normal
+        hit.face_normal = axes @ hit.local_normal
         hit.normal = hit.face_normal
     return hit
 

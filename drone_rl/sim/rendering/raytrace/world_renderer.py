@@ -13,7 +13,9 @@ from torch import Tensor
 from drone_rl.sim.rendering.appearance import Appearance
 from drone_rl.sim.rendering.devices import WorkerPool, load_kernels, start_warp
 from drone_rl.sim.rendering.raytrace import scene as scenes
+from drone_rl.sim.rendering.raytrace import structs_kernel as structs
 from drone_rl.sim.rendering.raytrace import tiles_kernel
+from drone_rl.sim.rendering.raytrace.canvas_kernel import TILE
 from drone_rl.sim.rendering.raytrace.cast_kernel import MESH, World
 from drone_rl.sim.rendering.raytrace.light import LookEncoder
 from drone_rl.sim.rendering.raytrace.renderer import MODALITY_BITS, Raytracer, as_images
@@ -49,7 +51,7 @@ class SceneRaytracer:
         self._workers = WorkerPool(num_envs, num_shards)
         self._frames, self._looks = scenes.Frames(scene), LookEncoder(scene)
         self._triangles, self._mesh_of_geom = _read_triangles(scene)
-        self._views: dict[View, tuple[scenes.Cameras, Any]] = {}
+        self._views: dict[View, tuple[scenes.Cameras, Any, Any]] = {}
         self._poses = scenes.PoseBuffers(self.device)
 
     def prepare(self, view: View) -> None:
@@ -60,24 +62,26 @@ class SceneRaytracer:
         encoded = scenes.make_view(self.scene, self._frames, view, "cpu")
         encoded.what = sum({MODALITY_BITS[modality] for modality in view.modalities})
         world = self.make_world(view.show_drone)
-        self._views[view] = scenes.Cameras(view, encoded, self.device), world
+        scratch = _make_scratch(view, self._workers.size, len(world.geoms.kind))
+        self._views[view] = scenes.Cameras(view, encoded, self.device), world, scratch
 
     def render(
         self, view: View, poses: Poses, appearance: Appearance | None = None
     ) -> dict[Modality, Tensor]:
         """Render environments; see `Renderer.render`."""
         self.prepare(view)
-        cameras, world = self._views[view]
+        cameras, world, scratch = self._views[view]
         look = appearance or Appearance()
         encoded = cameras.encode(look.camera, len(poses))
         world.poses = self._poses.write(poses, look.distractors)
         images = view.new_images(len(poses))
-        inputs = [encoded, world, self._looks.encode(appearance, len(poses)), as_images(images)]
+        shown = self._looks.encode(appearance, len(poses))
+        inputs = [encoded, world, shown, scratch, as_images(images)]
         load_kernels(tiles_kernel).result()
 
         def work(worker: int, first: int, last: int) -> None:
-            del worker
-            wp.launch(tiles_kernel.render_tiles, 1, inputs=[first, last, *inputs], device="cpu")
+            given = [first, last, worker, *inputs]
+            wp.launch(tiles_kernel.render_tiles, 1, inputs=given, device="cpu")
 
         self._workers.map_spans(0, len(poses) * len(view.cameras), work)
         return images
@@ -109,3 +113,24 @@ def _read_triangles(scene: Scene) -> tuple[Any, np.ndarray]:
         (read_height_field if is_field else read_mesh)(model, number) for is_field, number in known
     ]
     return make_triangles(meshes), of_geom
+
+
+def _make_scratch(view: View, workers: int, geoms: int) -> Any:
+    across, down = -(-view.width // TILE), -(-view.height // TILE)
+    tiles = across * down
+    kind: Any = structs.GeomView
+    arrays = {
+        "depth": (tiles * TILE**2, float),
+        "owner": (tiles * TILE**2, int),
+        "part": (tiles * TILE**2, int),
+        "farthest": (tiles, float),
+        "is_old": (tiles, int),
+        "geoms": (geoms, kind),
+        "order": (geoms, int),
+        "least": (geoms, float),
+        "parts": (geoms, wp.vec4i),
+    }
+    scratch: Any = tiles_kernel.TileScratch()
+    for name, (length, dtype) in arrays.items():
+        setattr(scratch, name, wp.empty((workers, length), dtype=dtype, device="cpu"))
+    return scratch

@@ -1,0 +1,460 @@
+"""Drawing of geoms into tiles of 8 x 8 pixels, by the depth along the camera's axis.
+
+A canvas has the pixels of a tile next to each other, so that compilers test eight rays at once. The
+ray through pixel (i, j) is x = (i - x0) / x_scale, y = (y0 - j) / y_scale, z = -1 in the camera's
+frame: what it meets at `t` has the depth t, and 1 / t changes evenly over a flat surface.
+
+Solids test the rays of all tiles that they can be seen in. Meshes descend their hierarchy to nodes
+that some pixel can show: those with no pixel's centre or behind what is drawn already are skipped,
+so that the triangles of a distant mesh cost no more than the pixels that it covers.
+"""
+
+import warp as wp
+
+from drone_rl.sim.rendering.raytrace.intersection_kernel import (
+    BOX,
+    CAPSULE,
+    CYLINDER,
+    FAR_AWAY,
+    PLANE,
+    ROUND,
+    SAME,
+    SPHERE,
+    UPPER,
+)
+from drone_rl.sim.rendering.raytrace.projection_kernel import NEAR
+from drone_rl.sim.rendering.raytrace.structs_kernel import NO_GEOM, GeomView, struct
+from drone_rl.sim.rendering.raytrace.triangles_kernel import Triangles
+
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+TILE = 8
+"""Edge of a tile, pixels."""
+
+
+@struct
+class Canvas:
+    """One image in tiles, row by row; the last of a row or column may reach beyond the image."""
+
+    width: int
+    height: int
+    across: int
+    """Tiles in a row."""
+    down: int
+    x0: float
+    """The camera's axis, in pixels: the centre of pixel 0 is at 0."""
+    y0: float
+    x_scale: float
+    """Pixels across at depth 1."""
+    y_scale: float
+    far: float
+    """Largest depth that is drawn, metres."""
+    depth: wp.array[float]
+    owner: wp.array[int]
+    """Index of the rendered geom that a pixel shows."""
+    part: wp.array[int]
+    """Which face or triangle that is."""
+    farthest: wp.array[float]
+    """Largest depth of each tile, or more."""
+    is_old: wp.array[int]
+    """Whether a tile's `farthest` is larger than need be."""
+
+
+@wp.func_native(f"""
+for (int i = 0; i < 64 * canvas.across * canvas.down; ++i) {{
+    canvas.depth.data[i] = {float(FAR_AWAY)}f;
+    canvas.owner.data[i] = {int(NO_GEOM)};
+}}
+for (int tile = 0; tile < canvas.across * canvas.down; ++tile) {{
+    const int left = tile % canvas.across * 8, top = tile / canvas.across * 8;
+    canvas.farthest.data[tile] = {float(FAR_AWAY)}f;
+    canvas.is_old.data[tile] = 0;
+    if (left + 8 > canvas.width || top + 8 > canvas.height)
+        for (int i = 0; i < 64; ++i)
+            if (left + i % 8 >= canvas.width || top + i / 8 >= canvas.height)
+                canvas.depth.data[64 * tile + i] = 0.0f;
+}}""")
+def clear(canvas: Canvas) -> None:
+    """Show nothing; what lies beyond the image counts as drawn."""
+    ...
+
+
+_AXES = """
+const auto &m = geom.into.data;
+const float x_scale = canvas.x_scale, y_scale = canvas.y_scale;
+const float ex = geom.eye[0], ey = geom.eye[1], ez = geom.eye[2];
+"""
+
+_BOUNDS = f"""
+{_AXES}
+float x[8], y[8], z[8];
+for (int k = 0; k < 8; ++k) {{
+    const float px = (k & 1 ? geom.reach[0] : -geom.reach[0]) - ex;
+    const float py = (k & 2 ? geom.reach[1] : -geom.reach[1]) - ey;
+    const float pz = (k & 4 ? geom.reach[2] : -geom.reach[2]) - ez;
+    x[k] = x_scale * (m[0][0] * px + m[1][0] * py + m[2][0] * pz);
+    y[k] = -y_scale * (m[0][1] * px + m[1][1] * py + m[2][1] * pz);
+    z[k] = -(m[0][2] * px + m[1][2] * py + m[2][2] * pz);
+}}
+const float front = {float(NEAR)}f;
+float left = 1e9f, right = -1e9f, top = 1e9f, bottom = -1e9f, nearest = 1e30f;
+const auto see = [&](float a, float b, float c) {{
+    const float u = a / c, v = b / c;
+    left = u < left ? u : left;
+    right = u > right ? u : right;
+    top = v < top ? v : top;
+    bottom = v > bottom ? v : bottom;
+}};
+bool is_cut = false;
+for (int k = 0; k < 8; ++k) {{
+    nearest = z[k] < nearest ? z[k] : nearest;
+    if (z[k] >= front) see(x[k], y[k], z[k]);
+    else is_cut = true;
+}}
+if (is_cut)
+    for (int k = 0; k < 8; ++k)
+        for (int bit = 1; bit < 8; bit *= 2) {{
+            const int other = k ^ bit;
+            if (z[k] >= front && z[other] < front) {{
+                const float share = (z[k] - front) / (z[k] - z[other]);
+                see(x[k] + share * (x[other] - x[k]), y[k] + share * (y[other] - y[k]), front);
+            }}
+        }}
+const float slack = 0.01f;
+left = wp::max(left + canvas.x0 - slack, 0.0f);
+right = wp::min(right + canvas.x0 + slack, canvas.width - 1.0f);
+top = wp::max(top + canvas.y0 - slack, 0.0f);
+bottom = wp::min(bottom + canvas.y0 + slack, canvas.height - 1.0f);
+const bool is_seen = nearest <= canvas.far && left <= right && top <= bottom;
+if (!is_seen) return wp::vec_t<4, int>(0, -1, 0, -1);
+return wp::vec_t<4, int>((int)ceilf(left), (int)right, (int)ceilf(top), (int)bottom);
+"""
+
+
+@wp.func_native(_BOUNDS)
+def bounds(canvas: Canvas, geom: GeomView) -> wp.vec4i:
+    """Return the first and last column and the first and last row of pixels of a geom's box."""
+    ...
+
+
+@wp.func_native(f"""
+{_AXES}
+float depth = m[0][2] * ex + m[1][2] * ey + m[2][2] * ez;
+for (int c = 0; c < 3; ++c) depth -= wp::abs(m[c][2]) * geom.reach[c];
+return wp::max(depth, 0.0f);
+""")
+def least_depth(canvas: Canvas, geom: GeomView) -> float:
+    """Return the least depth of a geom's box."""
+    ...
+
+
+@wp.func_native("""
+for (int gap = count / 2; gap > 0; gap /= 2)
+    for (int i = gap; i < count; ++i) {
+        const int moved = order.data[i];
+        int j = i;
+        for (; j >= gap && keys.data[order.data[j - gap]] > keys.data[moved]; j -= gap)
+            order.data[j] = order.data[j - gap];
+        order.data[j] = moved;
+    }""")
+def sort(order: wp.array[int], keys: wp.array[float], count: int) -> None:
+    """Sort the first `count` indices by their keys."""
+    ...
+
+
+_PLANE = """
+const float along = -ez / (wp::abs(w) > 1e-20f ? w : 1e-20f);
+const bool on_x = (sx <= 0.0f) | (wp::abs(ex + along * u) <= sx);
+const bool on_y = (sy <= 0.0f) | (wp::abs(ey + along * v) <= sy);
+const bool is_hit = on_x & on_y & (along > 0.0f);
+const int face = UPPER;
+"""
+_BOX = """
+const float pu = 1.0f / (wp::abs(u) > 1e-20f ? u : 1e-20f);
+const float pv = 1.0f / (wp::abs(v) > 1e-20f ? v : 1e-20f);
+const float pw = 1.0f / (wp::abs(w) > 1e-20f ? w : 1e-20f);
+const float hu = sx * wp::abs(pu), hv = sy * wp::abs(pv), hw = sz * wp::abs(pw);
+const float mu = -ex * pu, mv = -ey * pv, mw = -ez * pw;
+const float iu = mu - hu, iv = mv - hv, iw = mw - hw;
+const float ou = mu + hu, ov = mv + hv, ow = mw + hw;
+const float uv = iu > iv ? iu : iv, along = uv > iw ? uv : iw;
+const float out_uv = ou < ov ? ou : ov, out = out_uv < ow ? out_uv : ow;
+const bool is_hit = (along <= out) & (along >= 0.0f);
+const int face_uv = iu > iv ? (u < 0.0f ? 1 : 0) : (v < 0.0f ? 3 : 2);
+const int face = uv > iw ? face_uv : (w < 0.0f ? 5 : 4);
+"""
+_BALL = """
+const float a = u * u + v * v + w * w, b = u * ex + v * ey + w * ez;
+const float inside = b * b - a * c0;
+const float root = sqrtf(inside > 0.0f ? inside : 0.0f);
+const float along = (-b - root) / a;
+const bool is_hit = (inside > 0.0f) & (along >= 0.0f);
+const int face = ROUND;
+"""
+_TUBE = """
+const float a = u * u + v * v, b = u * ex + v * ey;
+const float inside = b * b - a * c0;
+const float root = sqrtf(inside > 0.0f ? inside : 0.0f), per = 1.0f / (a > 1e-20f ? a : 1e-20f);
+const bool is_steep = a <= 1e-20f;
+const float tube_in = is_steep ? (c0 > 0.0f ? 1e20f : -1e20f) : (-b - root) * per;
+const float tube_out = is_steep ? 1e20f : (-b + root) * per;
+"""
+_CYLINDER = f"""
+{_TUBE}
+const float pw = 1.0f / (wp::abs(w) > 1e-20f ? w : 1e-20f);
+const float ends_in = -ez * pw - sy * wp::abs(pw), ends_out = -ez * pw + sy * wp::abs(pw);
+const float along = tube_in > ends_in ? tube_in : ends_in;
+const float out = tube_out < ends_out ? tube_out : ends_out;
+const bool is_hit = (is_steep | (inside > 0.0f)) & (along <= out) & (along >= 0.0f);
+const int face = tube_in > ends_in ? ROUND : (w < 0.0f ? 5 : 4);
+"""
+_CAPSULE = f"""
+{_TUBE}
+(void)tube_out;
+const bool on_side = (inside > 0.0f) & (tube_in >= 0.0f) & (wp::abs(ez + tube_in * w) <= sy);
+const float a3 = a + w * w, lower = ez + sy, upper = ez - sy;
+const float b1 = b + w * lower, b2 = b + w * upper;
+const float d1 = b1 * b1 - a3 * (c0 + lower * lower), d2 = b2 * b2 - a3 * (c0 + upper * upper);
+const float t1 = (-b1 - sqrtf(d1 > 0.0f ? d1 : 0.0f)) / a3;
+const float t2 = (-b2 - sqrtf(d2 > 0.0f ? d2 : 0.0f)) / a3;
+const float side = on_side ? tube_in : 1e20f;
+const float one = ((d1 > 0.0f) & (t1 >= 0.0f)) ? t1 : 1e20f;
+const float two = ((d2 > 0.0f) & (t2 >= 0.0f)) ? t2 : 1e20f;
+const float both = one < two ? one : two, along = side < both ? side : both;
+const bool is_hit = along < 1e19f;
+const int face = ROUND;
+"""
+_DRAW = """
+for (int row = top / 8; row <= bottom / 8; ++row)
+    for (int column = left / 8; column <= right / 8; ++column) {
+        const int tile = row * canvas.across + column;
+        if (least > canvas.farthest.data[tile]) continue;
+        canvas.is_old.data[tile] = 1;
+        float *const depths = canvas.depth.data + 64 * tile;
+        int *const owners = canvas.owner.data + 64 * tile;
+        int *const parts = canvas.part.data + 64 * tile;
+        const float i0 = 8 * column - canvas.x0, j0 = 8 * row - canvas.y0;
+#pragma clang loop vectorize(enable) interleave(disable)
+        for (int k = 0; k < 64; ++k) {
+            const float i = i0 + (k & 7), j = j0 + (k >> 3);
+            const float u = ux + i * ui + j * uj, v = vx + i * vi + j * vj;
+            const float w = wx + i * wi + j * wj;
+            KIND
+            const float before = depths[k];
+            const float same = SAME * (before > 1.0f ? before : 1.0f);
+            const float limit = number >= owners[k] ? before + same : before - same;
+            const bool is_shown = is_hit & (along <= limit) & (along <= far);
+            depths[k] = is_shown ? along : before;
+            owners[k] = is_shown ? number : owners[k];
+            parts[k] = is_shown ? face : parts[k];
+        }
+    }
+"""
+
+
+def _draw(code: str) -> str:
+    """The loop over tiles and rays for one kind of solid."""
+    loop = _DRAW.replace("KIND", code)
+    for name, value in (("SAME", f"{float(SAME)}f"), ("UPPER", UPPER), ("ROUND", ROUND)):
+        loop = loop.replace(name, str(int(value) if name != "SAME" else value))
+    return loop
+
+
+@wp.func_native(f"""
+{_AXES}
+const int left = part[0], right = part[1], top = part[2], bottom = part[3];
+const float far = canvas.far;
+float ui = m[0][0] / x_scale, vi = m[1][0] / x_scale, wi = m[2][0] / x_scale;
+float uj = -m[0][1] / y_scale, vj = -m[1][1] / y_scale, wj = -m[2][1] / y_scale;
+float ux = -m[0][2], vx = -m[1][2], wx = -m[2][2];
+const float sx = geom.size[0], sy = geom.size[1], sz = geom.size[2];
+if (geom.kind == {int(PLANE)}) {{
+    {_draw(_PLANE)}
+}} else if (geom.kind == {int(BOX)}) {{
+    {_draw(_BOX)}
+}} else if (geom.kind == {int(CYLINDER)}) {{
+    const float c0 = ex * ex + ey * ey - sx * sx;
+    {_draw(_CYLINDER)}
+}} else if (geom.kind == {int(CAPSULE)}) {{
+    const float c0 = ex * ex + ey * ey - sx * sx;
+    const float ends = wp::max(wp::abs(ez) - sy, 0.0f);
+    if (c0 + ends * ends < 0.0f) return;
+    {_draw(_CAPSULE)}
+}} else {{
+    const bool is_round = geom.kind == {int(SPHERE)};
+    const float rx = 1.0f / sx, ry = is_round ? rx : 1.0f / sy, rz = is_round ? rx : 1.0f / sz;
+    ui *= rx, uj *= rx, ux *= rx, vi *= ry, vj *= ry, vx *= ry, wi *= rz, wj *= rz, wx *= rz;
+    const float ex = geom.eye[0] * rx, ey = geom.eye[1] * ry, ez = geom.eye[2] * rz;
+    const float c0 = ex * ex + ey * ey + ez * ez - 1.0f;
+    {_draw(_BALL)}
+}}
+""")
+def draw_solid(canvas: Canvas, geom: GeomView, number: int, part: wp.vec4i, least: float) -> None:
+    """Draw a solid or plane, the rendered geom `number`, in the pixels of `part`; see `bounds`.
+
+    `least` is its least depth.
+    """
+    ...
+
+
+_NODE = """
+    const float px = 0.5f * (low[at][0] + high[at][0]) - ex, hx = 0.5f * (high[at][0] - low[at][0]);
+    const float py = 0.5f * (low[at][1] + high[at][1]) - ey, hy = 0.5f * (high[at][1] - low[at][1]);
+    const float pz = 0.5f * (low[at][2] + high[at][2]) - ez, hz = 0.5f * (high[at][2] - low[at][2]);
+    const float zc = z0 * px + z1 * py + z2 * pz;
+    const float zh = wp::abs(z0) * hx + wp::abs(z1) * hy + wp::abs(z2) * hz;
+    const float near = zc - zh;
+    if (zc + zh < 0.0f || near > canvas.far) continue;
+    int left = part[0], right = part[1], top = part[2], bottom = part[3];
+    if (near > front) {
+        const float xc = x0 * px + x1 * py + x2 * pz, yc = y0 * px + y1 * py + y2 * pz;
+        const float xh = wp::abs(x0) * hx + wp::abs(x1) * hy + wp::abs(x2) * hz;
+        const float yh = wp::abs(y0) * hx + wp::abs(y1) * hy + wp::abs(y2) * hz;
+        const float per_near = 1.0f / near, per_far = 1.0f / (zc + zh);
+        const float x_low = xc - xh, x_high = xc + xh, y_low = yc - yh, y_high = yc + yh;
+        const float first = x_low * (x_low < 0.0f ? per_near : per_far) + canvas.x0 - slack;
+        const float last = x_high * (x_high > 0.0f ? per_near : per_far) + canvas.x0 + slack;
+        const float upper = y_low * (y_low < 0.0f ? per_near : per_far) + canvas.y0 - slack;
+        const float lower = y_high * (y_high > 0.0f ? per_near : per_far) + canvas.y0 + slack;
+        if (first > right || last < left || upper > bottom || lower < top) continue;
+        left = first > left ? (int)ceilf(first) : left;
+        right = last < right ? (int)floorf(last) : right;
+        top = upper > top ? (int)ceilf(upper) : top;
+        bottom = lower < bottom ? (int)floorf(lower) : bottom;
+        if (left > right || top > bottom) continue;
+    }
+    if ((right / 8 - left / 8 + 1) * (bottom / 8 - top / 8 + 1) <= 16) {
+        bool is_hidden = true;
+        for (int row = top / 8; row <= bottom / 8 && is_hidden; ++row)
+            for (int column = left / 8; column <= right / 8 && is_hidden; ++column) {
+                const int tile = row * canvas.across + column;
+                if (near > canvas.farthest.data[tile]) continue;
+                if (canvas.is_old.data[tile]) {
+                    const float *const depths = canvas.depth.data + 64 * tile;
+                    float most[8];
+                    for (int c = 0; c < 8; ++c) most[c] = depths[c];
+                    for (int r = 1; r < 8; ++r)
+                        for (int c = 0; c < 8; ++c)
+                            most[c] = most[c] > depths[8 * r + c] ? most[c] : depths[8 * r + c];
+                    for (int c = 1; c < 8; ++c) most[0] = most[0] > most[c] ? most[0] : most[c];
+                    canvas.farthest.data[tile] = most[0] * 1.00001f;
+                    canvas.is_old.data[tile] = 0;
+                }
+                is_hidden = near > canvas.farthest.data[tile];
+            }
+        if (is_hidden) continue;
+    }
+"""
+"""Skips node `at` unless one of the pixels from `left` to `right` and from `top` to `bottom` may
+show a part of it."""
+
+_LEAF = """
+    const int slot = leaf + at - (leaves - 1);
+    const float *const v = triangles.corners.data + 72 * slot;
+    float ui[8], uj[8], u1[8], vi[8], vj[8], v1[8], wi[8], wj[8], w1[8];
+    float ni[8], nj[8], n1[8], plane[8], least[8];
+    float lefts[8], rights[8], tops[8], bottoms[8];
+    for (int k = 0; k < 8; ++k) {
+        const float ax = v[k] - ex, ay = v[8 + k] - ey, az = v[16 + k] - ez;
+        const float bx = v[24 + k] - ex, by = v[32 + k] - ey, bz = v[40 + k] - ez;
+        const float cx = v[48 + k] - ex, cy = v[56 + k] - ey, cz = v[64 + k] - ez;
+        const float ai = x0 * ax + x1 * ay + x2 * az, bi = x0 * bx + x1 * by + x2 * bz;
+        const float aj = y0 * ax + y1 * ay + y2 * az, bj = y0 * bx + y1 * by + y2 * bz;
+        const float a1 = z0 * ax + z1 * ay + z2 * az, b1 = z0 * bx + z1 * by + z2 * bz;
+        const float ci = x0 * cx + x1 * cy + x2 * cz, cj = y0 * cx + y1 * cy + y2 * cz;
+        const float c1 = z0 * cx + z1 * cy + z2 * cz;
+        const float pi = ci - bi, pj = cj - bj, p1 = c1 - b1, si = ci + bi, sj = cj + bj;
+        const float qi = ai - ci, qj = aj - cj, q1 = a1 - c1, ti = ai + ci, tj = aj + cj;
+        const float ri = bi - ai, rj = bj - aj, r1 = b1 - a1, mi = bi + ai, mj = bj + aj;
+        const float s1 = c1 + b1, t1 = a1 + c1, m1 = b1 + a1;
+        ui[k] = pj * s1 - p1 * sj, uj[k] = p1 * si - pi * s1, u1[k] = pi * sj - pj * si;
+        vi[k] = qj * t1 - q1 * tj, vj[k] = q1 * ti - qi * t1, v1[k] = qi * tj - qj * ti;
+        wi[k] = rj * m1 - r1 * mj, wj[k] = r1 * mi - ri * m1, w1[k] = ri * mj - rj * mi;
+        ni[k] = qj * r1 - q1 * rj, nj[k] = q1 * ri - qi * r1, n1[k] = qi * rj - qj * ri;
+        plane[k] = ai * ni[k] + aj * nj[k] + a1 * n1[k];
+        const float ab = a1 < b1 ? a1 : b1, near = ab < c1 ? ab : c1;
+        least[k] = near;
+        const float a_per = 1.0f / a1, b_per = 1.0f / b1, c_per = 1.0f / c1;
+        const float au = ai * a_per, bu = bi * b_per, cu = ci * c_per;
+        const float av = aj * a_per, bv = bj * b_per, cv = cj * c_per;
+        const float ab_left = au < bu ? au : bu, ab_right = au < bu ? bu : au;
+        const float ab_top = av < bv ? av : bv, ab_bottom = av < bv ? bv : av;
+        const bool is_cut = near <= front;
+        lefts[k] = is_cut ? -1e9f : (ab_left < cu ? ab_left : cu) + canvas.x0 - slack;
+        rights[k] = is_cut ? 1e9f : (ab_right > cu ? ab_right : cu) + canvas.x0 + slack;
+        tops[k] = is_cut ? -1e9f : (ab_top < cv ? ab_top : cv) + canvas.y0 - slack;
+        bottoms[k] = is_cut ? 1e9f : (ab_bottom > cv ? ab_bottom : cv) + canvas.y0 + slack;
+    }
+    for (int k = 0; k < 8; ++k) {
+        if (!(plane[k] < 0.0f)) continue;
+        const int from = lefts[k] > left ? (int)ceilf(wp::min(lefts[k], 1e6f)) : left;
+        const int to = rights[k] < right ? (int)floorf(wp::max(rights[k], -1e6f)) : right;
+        const int begin = tops[k] > top ? (int)ceilf(wp::min(tops[k], 1e6f)) : top;
+        const int end = bottoms[k] < bottom ? (int)floorf(wp::max(bottoms[k], -1e6f)) : bottom;
+        if (from > to) continue;
+        for (int row = begin / 8; row <= end / 8 && begin <= end; ++row)
+            for (int column = from / 8; column <= to / 8; ++column) {
+                const int tile = row * canvas.across + column;
+                if (least[k] > canvas.farthest.data[tile]) continue;
+                const int top_row = begin > 8 * row ? begin - 8 * row : 0;
+                const int last_row = end < 8 * row + 7 ? end - 8 * row : 7;
+                const float i0 = 8 * column - canvas.x0;
+                canvas.is_old.data[tile] = 1;
+                for (int r = top_row; r <= last_row; ++r) {
+                    const float j = 8 * row + r - canvas.y0;
+                    const float u0 = u1[k] + j * uj[k], v0 = v1[k] + j * vj[k];
+                    const float w0 = w1[k] + j * wj[k], n0 = n1[k] + j * nj[k];
+                    float *const depths = canvas.depth.data + 64 * tile + 8 * r;
+                    int *const owners = canvas.owner.data + 64 * tile + 8 * r;
+                    int *const parts = canvas.part.data + 64 * tile + 8 * r;
+                    for (int c = 0; c < 8; ++c) {
+                        const float i = i0 + c;
+                        const float u = u0 + i * ui[k], v = v0 + i * vi[k], w = w0 + i * wi[k];
+                        const float along = plane[k] / (n0 + i * ni[k]);
+                        const float before = depths[c];
+                        const float same = SAME * (before > 1.0f ? before : 1.0f);
+                        const float limit = number >= owners[c] ? before + same : before - same;
+                        const bool is_in = (u >= 0.0f) & (v >= 0.0f) & (w >= 0.0f);
+                        const bool is_near = (along > 0.0f) & (along <= limit) & (along <= far);
+                        const bool is_shown = is_in & is_near;
+                        depths[c] = is_shown ? along : before;
+                        owners[c] = is_shown ? number : owners[c];
+                        parts[c] = is_shown ? 8 * slot + k : parts[c];
+                    }
+                }
+            }
+    }
+    continue;
+""".replace("SAME", f"{float(SAME)}f")
+
+
+@wp.func_native(f"""
+{_AXES}
+const float x0 = x_scale * m[0][0], x1 = x_scale * m[1][0], x2 = x_scale * m[2][0];
+const float y0 = -y_scale * m[0][1], y1 = -y_scale * m[1][1], y2 = -y_scale * m[2][1];
+const float z0 = -m[0][2], z1 = -m[1][2], z2 = -m[2][2];
+const float far = canvas.far, front = {float(NEAR)}f, slack = 0.01f;
+const int root = triangles.node.data[mesh], leaf = triangles.leaf.data[mesh];
+const int leaves = 1 << triangles.depth.data[mesh];
+const wp::vec_t<3, float> *const low = triangles.low.data + root;
+const wp::vec_t<3, float> *const high = triangles.high.data + root;
+int stack[64], depth = 1;
+stack[0] = 0;
+while (depth > 0) {{
+    const int at = stack[--depth];
+    {_NODE}
+    if (at >= leaves - 1) {{
+        {_LEAF}
+    }}
+    const int one = 2 * at + 1, other = 2 * at + 2;
+    const float apart = z0 * (low[other][0] + high[other][0] - low[one][0] - high[one][0])
+        + z1 * (low[other][1] + high[other][1] - low[one][1] - high[one][1])
+        + z2 * (low[other][2] + high[other][2] - low[one][2] - high[one][2]);
+    stack[depth++] = apart > 0.0f ? other : one;
+    stack[depth++] = apart > 0.0f ? one : other;
+}}""")
+def draw_mesh(
+    canvas: Canvas, triangles: Triangles, mesh: int, geom: GeomView, number: int, part: wp.vec4i
+) -> None:
+    """Draw the fronts of a mesh's triangles; see `draw_solid`."""
+    ...
