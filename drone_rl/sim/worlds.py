@@ -95,6 +95,10 @@ class Worlds:
         self.camera = camera or CameraSettings()
         self.dynamics = make_dynamics(self.task.make_dynamics, dynamics, actions)
         check_actions(self.task, self.dynamics.actions)
+        self._needs_obstacles = self.dynamics.needs_obstacles or (
+            bool(getattr(self.task, "scenes", ()))
+            and getattr(self.dynamics, "stops_at_solids", False)
+        )
         self.device = torch.device(device)
         self._every = torch.arange(num_envs, device=self.device)
         self._make_renderer, self._num_shards = find_renderer(renderer), num_shards
@@ -192,7 +196,7 @@ class Worlds:
 
     def advance(self, state: State, action: Tensor) -> tuple[State, Tensor]:
         """Return states a step later, and rewards; the environments stay as they are."""
-        around = [self.task.obstacles(state)] if self.dynamics.needs_obstacles else []
+        around = [self.task.obstacles(state)] if self._needs_obstacles else []
         body = self.dynamics.step(state.body, action, *around)
         more: Any = (action, self.dynamics) if follows_rules(self.task) else ()
         step: Any = self.task.step

@@ -30,6 +30,8 @@ class Dynamics(Protocol):
     """Whether `start` uses its `seeds`."""
     needs_obstacles: bool = False
     """Whether `step` needs the obstacles."""
+    stops_at_solids: bool = False
+    """Whether `step` needs them in scene files, whose solids stop the drones."""
     timestep: float | None = None
     """Seconds that an action lasts; None if it is done at once."""
 
@@ -47,13 +49,19 @@ class Dynamics(Protocol):
         """Return the drones a control step later; `body` stays as it is.
 
         `action` is one of `actions` for each; shape (num_envs, *actions.entry.shape).
-        `obstacles` are given if `needs_obstacles` and there are any.
+        `obstacles` are given if `needs_obstacles` and there are any, and in scene files if
+        `stops_at_solids`.
         """
         ...
 
 
 class ComputerVision(Dynamics):
-    """Moves of one length along the drone's heading, and turns about z; both are done at once."""
+    """Moves of one length along the drone's heading, and turns about z; both are done at once.
+
+    What is solid in a scene file ends a move.
+    """
+
+    stops_at_solids = True
 
     def __init__(
         self, step_length: float = 1.0, actions: Actions = MOVES, turn_step: float = 0.0
@@ -73,11 +81,19 @@ class ComputerVision(Dynamics):
     ) -> BodyState:
         """Return the drones after a move."""
         moves, turns = self.moves.to(action.device), self.turns.to(action.device)
-        return body.moved(*move_all(body.position, body.attitude, action, moves, turns))
+        position, attitude = move_all(body.position, body.attitude, action, moves, turns)
+        if obstacles is not None and obstacles.scene is not None:
+            position = obstacles.scene.reached(body.position, position)
+        return body.moved(position, attitude)
 
 
 class Kinematic(Dynamics):
-    """Flies level at the commanded speeds, without inertia; a step moves first, and then turns."""
+    """Flies level at the commanded speeds, without inertia; a step moves first, and then turns.
+
+    What is solid in a scene file ends the movement of a step.
+    """
+
+    stops_at_solids = True
 
     def __init__(self, actions: ActionSettings, timestep: float = 0.1) -> None:
         """Take the greatest speeds, and the seconds that an action lasts."""
@@ -92,6 +108,9 @@ class Kinematic(Dynamics):
         rates = self._continuous.to_rates(action)
         moved = glide_all(body.position, body.attitude, rates, self._seconds)
         position, attitude, velocity = moved
+        if obstacles is not None and obstacles.scene is not None:
+            position = obstacles.scene.reached(body.position, position)
+            velocity = (position - body.position) / self._seconds
         turn = rates[..., YAW]
         zero = torch.zeros_like(turn)
         return dataclasses.replace(

@@ -196,15 +196,22 @@ def force_on(frame: rigid.AirframeNumbers, flight: CommandedDrone, axes: rigid.A
 
 
 @wp.func
-def _ticked(frame: rigid.AirframeNumbers, goal: Goal, before: CommandedDrone) -> CommandedDrone:
-    """Return a flight a tick later, over bare ground."""
+def ticked(frame: rigid.AirframeNumbers, goal: Goal, before: CommandedDrone) -> CommandedDrone:
+    """Return a flight a tick later, without any contact."""
     axes = rigid.axes_of(before.motion.attitude)
     flight = driven(frame, goal, before, axes)
-    lift = rigid.thrust_of(frame, flight.rotors)
     force = force_on(frame, flight, axes)
     flight.motion = rigid.advanced(
         frame, before.motion, force, rigid.torque_of(frame, flight.rotors)
     )
+    return flight
+
+
+@wp.func
+def over_ground(frame: rigid.AirframeNumbers, before: CommandedDrone) -> CommandedDrone:
+    """Return a flight after bare ground, if the drone touches it, has pushed it back."""
+    flight = before
+    lift = rigid.thrust_of(frame, flight.rotors)
     overlap = rigid.Overlap()
     overlap.normal = wp.vec3(0.0, 0.0, 1.0)
     overlap.depth = frame.radius - (float(before.start[2]) + flight.motion.position[2])
@@ -332,16 +339,30 @@ def run(
     frame = command.frame
     flight = loaded(before, world)
     goal = goal_of(command, world, flight.start)
-    lost = before[world, fs.LOST] != wp.float64(0.0) or not is_plausible(goal, flight.start)
     near = False
     if command.centers.shape[1] > 0:
         near = is_near(command, world, flight)
     for tick in range(command.ticks):
         flight.tick = tick
         goal.seconds = frame.tick * float(tick)
-        flight = _ticked(frame, goal, flight)
+        flight = over_ground(frame, ticked(frame, goal, flight))
         if near:
             flight = among(command, world, flight)
+    finish(command, goal, flight, before, after, world)
+
+
+@wp.func
+def finish(
+    command: FlightCommand,
+    goal: Goal,
+    flight: CommandedDrone,
+    before: wp.array2d[wp.float64],
+    after: wp.array2d[wp.float64],
+    world: int,
+) -> None:
+    """Write the numbers of a drone after all ticks of a command."""
+    frame = command.frame
+    lost = before[world, fs.LOST] != wp.float64(0.0) or not is_plausible(goal, flight.start)
     for i in range(fs.NUMBERS):
         after[world, i] = before[world, i]
     if lost or not is_sound(flight.motion):

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from drone_rl.config import ActionSettings, DynamicsSettings
 from drone_rl.sim.actions import Actions
-from drone_rl.sim.dynamics import flight_kernel
+from drone_rl.sim.dynamics import flight_kernel, scene_flight_kernel
 from drone_rl.sim.dynamics.control import FlightGoals, Moves, Velocities, rotor_goals
 from drone_rl.sim.dynamics.rigid_body_kernel import make_airframe
 from drone_rl.sim.dynamics.state import CLIMB_INTEGRAL, BodyState, FlightState, Obstacles
@@ -35,7 +35,7 @@ class Quadrotor:
         self.mount: str = settings.camera_mount
         self.is_random = settings.gusts > 0.0
         """Whether there are gusts, which `seeds` make different."""
-        self.needs_obstacles = True
+        self.needs_obstacles = self.stops_at_solids = True
         self.timestep: float | None = settings.control_timestep
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -67,14 +67,14 @@ class Quadrotor:
     ) -> FlightState:
         """Return the drones after ticks under their controllers; `body` stays as it is."""
         device, count = body.numbers.device, len(body)
-        load_kernels(str(device))
         after = torch.empty_like(body.numbers)
         command = flight_kernel.make_command(self.frame, goals, ticks, obstacles)
         arrays = [wp.from_torch(numbers.contiguous()) for numbers in (body.numbers, after)]
+        kernel, around = kernel_among(obstacles, str(device))
 
         def work(member: int, first: int, last: int) -> None:
-            inputs = [first, command, *arrays]
-            wp.launch(flight_kernel.fly, last - first, inputs=inputs, device=str(device))
+            inputs = [first, command, *around, *arrays]
+            wp.launch(kernel, last - first, inputs=inputs, device=str(device))
 
         if device.type == "cpu" and count * ticks >= _LEAST_WORK:
             self._workers.map_spans(0, count, work)
@@ -88,8 +88,17 @@ class Quadrotor:
         return WorkerPool(2**30)
 
 
+def kernel_among(obstacles: Obstacles | None, device: str) -> tuple[Any, list[Any]]:
+    """Return the kernel that flies a command, and its arguments between command and numbers."""
+    if obstacles is None or obstacles.scene is None:
+        _load("flight_kernel", device)
+        return flight_kernel.fly, []
+    _load("scene_flight_kernel", device)
+    return scene_flight_kernel.fly_in_scene, [obstacles.scene.solids.at(obstacles.scene.places)]
+
+
 @functools.cache
-def load_kernels(device: str) -> None:
-    """Compile the kernel, or load it, once for a device."""
+def _load(module: str, device: str) -> None:
+    """Compile the kernels of a module of this package, or load them, once for a device."""
     start_warp(device)
-    wp.load_module(flight_kernel, device=device)
+    wp.load_module(f"{__package__}.{module}", device=device)

@@ -1,5 +1,6 @@
 """One drone that flies many short commands: the memory and the launch of its kernel are kept."""
 
+import dataclasses
 from typing import Any
 
 import torch
@@ -8,7 +9,7 @@ import warp as wp
 from drone_rl.config import ActionSettings, DynamicsSettings
 from drone_rl.sim.dynamics import flight_kernel
 from drone_rl.sim.dynamics.control import FlightGoals
-from drone_rl.sim.dynamics.quadrotor import Quadrotor, load_kernels
+from drone_rl.sim.dynamics.quadrotor import Quadrotor, kernel_among
 from drone_rl.sim.dynamics.state import NUMBERS, FlightState, Obstacles
 
 
@@ -37,8 +38,10 @@ class SingleQuadrotor(Quadrotor):
         """See `Quadrotor`."""
         if len(body) != 1 or body.numbers.device.type != "cpu":
             return super().fly(body, goals, ticks, obstacles)
-        shape = None if obstacles is None else (obstacles.centers.shape, obstacles.half_sizes)
-        wanted = (goals.modes, ticks, shape)
+        around = None
+        if obstacles is not None:
+            around = (obstacles.centers.shape, obstacles.half_sizes, obstacles.scene)
+        wanted = (goals.modes, ticks, around)
         if wanted != self._prepared:
             self._prepare(goals, ticks, obstacles)
             self._prepared = wanted
@@ -51,14 +54,13 @@ class SingleQuadrotor(Quadrotor):
         return FlightState(self._after.clone())
 
     def _prepare(self, goals: FlightGoals, ticks: int, obstacles: Obstacles | None) -> None:
-        load_kernels("cpu")
         around = None
         if obstacles is not None:
             self._centers = torch.empty_like(obstacles.centers)
-            around = Obstacles(self._centers, obstacles.half_sizes)
+            around = dataclasses.replace(obstacles, centers=self._centers)
         held = FlightGoals(goals.modes, self._values, self._drifts)
         command = flight_kernel.make_command(self.frame, held, ticks, around)
         arrays = [wp.from_torch(numbers) for numbers in (self._before, self._after)]
-        self._launch = wp.launch(
-            flight_kernel.fly, 1, inputs=[0, command, *arrays], device="cpu", record_cmd=True
-        )
+        kernel, solids = kernel_among(around, "cpu")
+        inputs = [0, command, *solids, *arrays]
+        self._launch = wp.launch(kernel, 1, inputs=inputs, device="cpu", record_cmd=True)

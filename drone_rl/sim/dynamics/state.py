@@ -6,6 +6,7 @@ from typing import Any, Self
 import torch
 from torch import Tensor
 
+from drone_rl.sim.scenes.solids import PlacedSolids
 from drone_rl.utils.batch import Batch
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
@@ -59,15 +60,17 @@ class BodyState(Batch):
 
 @dataclasses.dataclass(frozen=True)
 class Obstacles:
-    """Axis-aligned boxes of one size, as many in every environment. Metres."""
+    """Axis-aligned boxes of one size, as many in every environment, or a scene. Metres."""
 
     centers: Tensor  # (num_envs, K, 3) float64
     """Their middles; far below the ground where one is absent."""
     half_sizes: tuple[float, float, float]
+    scene: PlacedSolids | None = None
+    """What is solid in scene files, which replaces the ground at height 0."""
 
 
 NOTHING, GROUND = -2, -1
-"""Numbers of what is touched: no thing, and the ground. Obstacles count from 0."""
+"""Numbers of what is touched: no thing, and the ground. Obstacles count from 0, then solids."""
 
 
 POSITION, ATTITUDE, VELOCITY, RATES, ROTORS, REFERENCE = 0, 3, 7, 10, 13, 17
@@ -82,7 +85,7 @@ class Contact(Batch):
     """What `num_envs` drones last touched. World frame, SI units."""
 
     thing: Tensor  # (num_envs,) int64
-    """An obstacle's number, `GROUND`, or `NOTHING` where nothing was touched in this episode."""
+    """Number of an obstacle or solid, `GROUND`, or `NOTHING` until something is touched."""
     normal: Tensor  # (num_envs, 3) float64
     """Unit vector out of the thing."""
     point: Tensor  # (num_envs, 3) float64

@@ -1,5 +1,6 @@
 """What can be touched in scenes: distances, and paths that it stops."""
 
+import dataclasses
 import functools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -291,6 +292,37 @@ class Solids:
                 corners = vertices[own].reshape(-1, 3)
                 made.append((kind, mesh.id, np.stack([corners.min(0), corners.max(0)])))
         return made
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class PlacedSolids:
+    """The solids around the drones of N environments, which stay where they are."""
+
+    solids: Solids
+    places: Tensor  # (N, G, 3) float64
+    """See `Solids.at`."""
+    radius: float
+    """Of the ball around a drone that moves without inertia, metres."""
+
+    def reached(self, before: Tensor, now: Tensor) -> Tensor:
+        """Return where balls get to that go straight, the first solid at most. Shapes: (N, 3)."""
+        fraction = self.solids.sweep_at(before, now, self.radius, self.places).fraction[:, None]
+        return torch.where(fraction <= 1.0, before + fraction.clamp(max=1.0) * (now - before), now)
+
+    def touched(self, before: Tensor, now: Tensor) -> tuple[Tensor, Tensor]:
+        """Return which balls touch a solid on their way, and how far it is from their centres then.
+
+        Shapes: (N,), bool, and (N,), float64, metres.
+        """
+        distance = self.solids.nearest_at(now, self.places).distance
+        is_stopped = self.solids.sweep_at(before, now, self.radius, self.places).fraction <= 1.0
+        return is_stopped | (distance <= self.radius + float(kernel.TOUCHING)), distance
+
+
+@functools.lru_cache(8)
+def solids_of(scenes: tuple[SceneFile, ...], device: str) -> Solids:
+    """Return the solids of scenes; the same object for the same scenes."""
+    return Solids(scenes, device)
 
 
 def triangles_of(model: Any, geom: int) -> Triangles:

@@ -66,7 +66,14 @@ class AppliedRules:
         """Choose what is ahead in states, `ObjectState`, in place."""
         self._run(state, state.drone, torch.zeros_like(state.action), None, is_start=True)
 
-    def step(self, state: Any, before: Tensor, speeds: Tensor, dynamics: Dynamics | None) -> Tensor:
+    def step(
+        self,
+        state: Any,
+        before: Tensor,
+        speeds: Tensor,
+        dynamics: Dynamics | None,
+        around: tuple[Tensor, Tensor] | None = None,
+    ) -> Tensor:
         """Write states after drones have moved, and return the rewards.
 
         Args:
@@ -74,11 +81,12 @@ class AppliedRules:
             before: Where the drones were, metres. Shape: (N, 3).
             speeds: See `Step.action`. Shape: (N, 4).
             dynamics: What moved the drones; None for moves that are done at once.
+            around: In scenes, `World.struck` and `World.gaps`.
 
         Raises:
             InputError: A reward term or an event is not finite.
         """
-        rewards = self._run(state, before, speeds, dynamics, is_start=False)
+        rewards = self._run(state, before, speeds, dynamics, around, is_start=False)
         self.check(state)
         return rewards
 
@@ -88,6 +96,7 @@ class AppliedRules:
         before: Tensor,
         speeds: Tensor,
         dynamics: Dynamics | None,
+        around: tuple[Tensor, Tensor] | None = None,
         *,
         is_start: bool,
     ) -> Tensor:
@@ -100,7 +109,9 @@ class AppliedRules:
         flown = isinstance(body, FlightState)
         thing = body.contact.thing if flown else torch.full_like(state.steps, NOTHING)
         timestep = getattr(dynamics, "timestep", None)
-        world = self._constants(state, timestep)
+        world = self._constants(state, timestep, is_kept=around is None)
+        if around is not None:
+            world.struck, world.gaps = map(_warp, around)
         inputs = [
             world,
             is_start,
@@ -169,10 +180,10 @@ class AppliedRules:
         world.steps, world.end_reasons = _warp(steps), _warp(end_reasons)
         return world
 
-    def _constants(self, state: Any, timestep: float | None) -> Any:
+    def _constants(self, state: Any, timestep: float | None, *, is_kept: bool) -> Any:
         """Return the rules' constants, with no more of states than events need."""
         key = device, timestep = str(state.places.device), timestep
-        if self._events or self.compiled.in_torch:
+        if self._events or self.compiled.in_torch or not is_kept:
             world = self._make_constants(device, timestep)
             self._prepare_events(world, state)
             if self.compiled.in_torch:

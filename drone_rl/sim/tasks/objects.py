@@ -9,10 +9,11 @@ import torch
 from torch import Tensor
 
 from drone_rl.config.term_task import ROLES, ObjectSettings
-from drone_rl.sim.dynamics import BodyState, ComputerVision, Dynamics, Obstacles
+from drone_rl.sim.dynamics import BodyState, ComputerVision, Dynamics, FlightState, Obstacles
 from drone_rl.sim.entities import SceneEntity, VisualEntity
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.scenes import SceneFile
+from drone_rl.sim.scenes.solids import PlacedSolids, solids_of
 from drone_rl.sim.tasks.applied_rules import AppliedRules
 from drone_rl.sim.tasks.common import FAR_BELOW, HIDDEN_DEPTH, SIDES
 from drone_rl.sim.tasks.geometry_kernel import NOTHING
@@ -151,6 +152,8 @@ class ObjectTask(Task[ObjectState]):
     ) -> tuple[ObjectState, Tensor]:
         """Apply the rules: contacts, what is ahead, rewards, ends and success.
 
+        In a scene, what the dynamics have touched counts as well as what is on the straight path.
+
         `action`, (N, *), is what `dynamics` took, for terms that read it; None for none.
         """
         copies = {
@@ -161,7 +164,13 @@ class ObjectTask(Task[ObjectState]):
         speeds = torch.zeros_like(state.action)
         if action is not None and dynamics is not None:
             speeds = dynamics.actions.speeds_of(action)
-        return new, self.rules.step(new, state.drone, speeds, dynamics)
+        around = None
+        if self.scenes:
+            struck, gaps = self.solids(state).touched(state.drone, body.position)
+            if isinstance(body, FlightState) and isinstance(state.body, FlightState):
+                struck |= body.contact.time > state.body.contact.time
+            around = struck, gaps
+        return new, self.rules.step(new, state.drone, speeds, dynamics, around)
 
     def touch(
         self, state: ObjectState, position: Tensor, before: Tensor | None = None
@@ -187,17 +196,27 @@ class ObjectTask(Task[ObjectState]):
         scenes[torch.arange(len(objects)), self.scene_of(state)] = 0.0
         return torch.cat([objects, scenes], 1)
 
+    def solids(self, state: ObjectState) -> PlacedSolids:
+        """Return what is solid in the scene of each episode; not for an empty field."""
+        places = self.places(state)[:, len(self.each) :]
+        solids = solids_of(self.scenes, str(places.device))
+        return PlacedSolids(solids, places, 0.5 * self.drone_size)
+
     def scene_of(self, state: ObjectState) -> Tensor:
         """Return the number of each episode's scene, of `scenes`. Shape: (N,), int64."""
         return torch.zeros(len(state), dtype=torch.int64, device=state.places.device)
 
     def obstacles(self, state: ObjectState) -> Obstacles | None:
-        """Return what is solid, if all of it is of one size and parallel to the axes."""
+        """Return the scene, and solid objects if all are of one size and parallel to the axes."""
         solid = [i for i, of in enumerate(self.each) if of.role == "obstacle"]
         is_turned = any(self.each[i].heading for i in solid)
         if is_turned or len({self.each[i].half_size for i in solid}) != 1:
-            return None
-        return Obstacles(self.places(state)[:, solid], self.each[solid[0]].half_size)
+            if not self.scenes:
+                return None
+            solid = []
+        half = self.each[solid[0]].half_size if solid else (0.0, 0.0, 0.0)
+        scene = self.solids(state) if self.scenes else None
+        return Obstacles(self.places(state)[:, solid], half, scene)
 
 
 def follows_rules(task: Task[Any]) -> bool:

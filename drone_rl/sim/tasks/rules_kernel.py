@@ -360,6 +360,8 @@ class Rules:
                 constants.events,
                 constants.phases,
                 constants.seen,
+                constants.struck,
+                constants.gaps,
             )
             motion = Motion()
             motion.before = before[env]

@@ -20,7 +20,7 @@ def reached(step: Step) -> float:
 
 @REWARDS.implement("contact")
 def contact(step: Step) -> float:
-    """1 in contact with an obstacle or the ground."""
+    """1 in contact with an obstacle, the ground or the scene."""
     return wp.where(step.contact, 1.0, 0.0)
 
 
@@ -57,7 +57,7 @@ def altitude(step: Step, height: float) -> float:
 
 @end("contact")
 def touches(step: Step) -> bool:
-    """The drone touches an obstacle or the ground."""
+    """The drone touches an obstacle, the ground or the scene."""
     return step.contact
 
 

@@ -39,9 +39,12 @@ class Step:
     distance_before: float
     """The same before the step."""
     clearance: float
-    """From the drone's surface to the nearest obstacle or the ground; negative in contact."""
+    """From the drone's surface to what is nearest and solid; negative in contact.
+
+    That are obstacles and the ground, or what is solid in a scene file.
+    """
     contact: bool
-    """Whether it touched an obstacle or the ground on its way."""
+    """Whether it touched an obstacle, the ground or the scene on its way."""
     reached: int
     """Number of goals that it reached in this step."""
     remaining: int
@@ -116,6 +119,13 @@ class World:
     """See `Mover.phase`. Shape: (N, P), or no array."""
     seen: wp.array[Step]
     """The last step, for terms in torch. Shape: (N,), or no array if there are none."""
+    struck: wp.array[wp.bool]
+    """Whether each drone touched a scene's solids in this step. Shape: (N,), as of what follows.
+
+    No array over bare ground.
+    """
+    gaps: wp.array[wp.float64]
+    """Distance from each drone's centre to the nearest solid, after the step."""
 
 
 @wp.struct
@@ -160,7 +170,9 @@ def touch_solid(world: World, env: int, motion: Motion) -> Step:
                     step.reached += 1
         if objects.roles[i] == GOAL and not world.reached[env, i]:
             step.remaining += 1
-    if motion.now[2] < world.radius:
+    if world.struck.shape[0] > 0:
+        step.contact = step.contact or world.struck[env]
+    elif motion.now[2] < world.radius:
         step.contact = True
     return step
 
@@ -222,8 +234,11 @@ def see(world: World, env: int, motion: Motion, axes: Axes, step: Step) -> Step:
         seen.goal = wp.vec3(
             wp.dot(away, axes.forward), wp.dot(away, axes.left), wp.dot(away, axes.up)
         )
+    ground = motion.now[2]
+    if world.gaps.shape[0] > 0:
+        ground = world.gaps[env]
     around = nearest(objects, env, motion.now, OBSTACLE)
-    seen.clearance = float(wp.min(motion.now[2], around.distance) - world.radius)
+    seen.clearance = float(wp.min(ground, around.distance) - world.radius)
     seen.exact_position = motion.now
     seen.position = wp.vec3(motion.now)
     seen.velocity = motion.velocity
