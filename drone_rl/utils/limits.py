@@ -18,10 +18,10 @@ FILM_BYTES = 2**23  # the film of a report
 FILM_STEPS = 2000  # steps of the film of a report
 
 SCENE_XML_BYTES = 2**23  # one file of a scene, and all of them together
-SCENE_ASSET_BYTES = 2**27  # one mesh, image or height field of a scene
+SCENE_ASSET_BYTES = 2**26  # one mesh, image or height field of a scene
 SCENE_BYTES = 2**28  # all of them
 SCENE_FILES = 1000
 SCENE_ELEMENTS = 5_000  # bodies, geoms, sites and lights, copies included
-SCENE_TRIANGLES = 1_000_000
-SCENE_TEXELS = 2**25  # pixels of all textures
+SCENE_TRIANGLES = 500_000
+SCENE_TEXELS = 2**24  # pixels of all textures
 SCENE_CELLS = 2**22  # points of all height fields

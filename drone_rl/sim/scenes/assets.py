@@ -18,6 +18,8 @@ from drone_rl.utils.files import read_bytes
 
 _MOST_CORNERS = 64
 """Of one face of an OBJ file; a face of n corners takes a time of n squared."""
+_MOST_STL = 200_000
+"""Triangles of an STL file that MuJoCo reads."""
 _PNG = b"\x89PNG\r\n\x1a\n"
 Kind = Literal["mesh", "texture", "hfield"]
 
@@ -103,11 +105,15 @@ def mesh(content: bytes, path: Path) -> Asset:
     """Check a mesh's size by its header or lines; endings are those of MuJoCo's readers."""
     ending = path.suffix.lower()
     if ending == ".obj":
-        return Asset(ending, content, _obj_triangles(content, path.name))
+        return Asset(ending, content, _obj_size(content, path.name))
     if ending == ".stl":
         (count,) = struct.unpack_from("<I", content, 80) if len(content) >= 84 else (-1,)
         if len(content) != 84 + 50 * count:
             raise InputError(f"{path.name} is no binary STL, or damaged; save it as binary STL")
+        if not 0 < count <= _MOST_STL:
+            raise InputError(
+                f"{path.name} has {count} triangles; give 1 to {_MOST_STL}, or save it as OBJ"
+            )
         return Asset(ending, content, count)
     if ending == ".msh":
         numbers = struct.unpack_from("<4i", content) if len(content) >= 16 else (-1,) * 4
@@ -115,21 +121,24 @@ def mesh(content: bytes, path: Path) -> Asset:
         length = 16 + 12 * vertices + 12 * normals + 8 * places + 12 * count
         if min(numbers) < 0 or len(content) != length:
             raise InputError(f"{path.name} is no MSH file, or damaged; save it as OBJ")
-        return Asset(ending, content, count)
+        return Asset(ending, content, max(count, vertices))
     raise InputError(f"{path.name} is no OBJ, STL or MSH file; save the mesh as OBJ")
 
 
-def _obj_triangles(content: bytes, name: str) -> int:
-    triangles = 0
+def _obj_size(content: bytes, name: str) -> int:
+    """Return the number of triangles, or of vertices, texture coordinates and normals if more."""
+    triangles = points = 0
     for line in content.splitlines():
-        if line.lstrip()[:2] in (b"f ", b"f\t"):
+        start = line.lstrip()[:2]
+        points += start[:1] == b"v"
+        if start in (b"f ", b"f\t"):
             corners = len(line.split()) - 1
             if corners > _MOST_CORNERS:
                 raise InputError(
                     f"{name} has a face of {corners} corners; give faces of at most {_MOST_CORNERS}"
                 )
             triangles += corners - 2
-    return triangles
+    return max(triangles, points // 3)
 
 
 def _is_image(content: bytes) -> bool:

@@ -34,7 +34,10 @@ def compile_scene(root: Element, reading: Reading) -> tuple[Any, str, tuple[bool
         solid = {geom.id: is_solid for geom, is_solid in zip(spec.geoms, can_touch, strict=True)}
         return model, spec.to_xml(), tuple(solid[i] for i in range(model.ngeom))
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
-        raise InputError(_reason(str(error), of_line)) from error
+        message = str(error)
+        for (_, path), (name, _) in reading.names.items():
+            message = message.replace(f"'{name}'", f"'{path.name}'")
+        raise InputError(_reason(message, of_line)) from error
 
 
 def _reason(message: str, of_line: list[Element]) -> str:
@@ -62,11 +65,13 @@ def freeze(text: str, file: Path, model: Any, data: Any) -> Element:
             own = [child for child in children if child.tag == tag]
             for child, number in zip(own, np.flatnonzero(owners[tag] == body), strict=True):
                 _PLACED[tag](child, model, data, int(number))
+                _name(child, int(number))
         element.children = children
         for child in children:
             if child.tag == "body":
                 number = next(bodies)
                 _place_body(child, model, data, number)
+                _name(child, number)
                 place(child, number)
 
     for section in kept:
@@ -120,6 +125,11 @@ def _place_light(element: Element, model: Any, data: Any, number: int) -> None:
         element.attributes.pop(name, None)
     pos = turn.T @ (data.light_xpos[number] - data.xpos[body])
     _set(element, pos=pos, dir=turn.T @ data.light_xdir[number])
+
+
+def _name(element: Element, number: int) -> None:
+    """Name an element as dm_control would, which takes a time of the square of their number."""
+    element.attributes.setdefault("name", f"unnamed_{element.tag}_{number}")
 
 
 def _set(element: Element, **values: NDArray[np.float64]) -> None:

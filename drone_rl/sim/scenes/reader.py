@@ -274,7 +274,7 @@ class Reader:
             elif child.tag == "attach" and child.get("model") in self._models:
                 for name, size in self._models[child.get("model")].costs.items():
                     self.costs[name] += times * size
-            self.costs["elements"] += copies
+            self.costs["elements"] += copies if child.tag not in ("frame", "replicate") else 0
             self._check_costs(child)
             self._count(child, copies)
 

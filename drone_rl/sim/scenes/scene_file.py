@@ -21,6 +21,8 @@ mujoco: Any = _mujoco
 """MuJoCo's bindings, which are untyped."""
 _SMALLEST, _LARGEST = 0.1, 1000.0
 """Longest edges of worlds, metres; outside of this range the units are wrong."""
+_HUGE = 1e6
+"""Metres."""
 _NOT_DRAWN = {
     "flex": "flexes are",
     "flexcomp": "flexes are",
@@ -157,6 +159,7 @@ def _load(file: Path, folder: Folder) -> SceneFile:
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)  # some lights follow it
     mujoco.mj_camlight(model, data)
+    _check_numbers(model, data)
     frozen = freeze(text, file, model, data)
     used = {value for element in frozen.every() for value in element.attributes.values()}
     scene = SceneFile(
@@ -168,8 +171,27 @@ def _load(file: Path, folder: Folder) -> SceneFile:
         solid,
         tuple(_warnings(reading.notes)),
     )
+    del model, data  # of large meshes hundreds of megabytes
     _check_size(scene)
     return scene
+
+
+def _check_numbers(model: Any, data: Any) -> None:
+    """Raise an `InputError` about the first place or size that is no number, or far too large."""
+    parts = {
+        "geom": np.hstack([data.geom_xpos, data.geom_xmat, model.geom_size]),
+        "site": np.hstack([data.site_xpos, data.site_xmat, model.site_size]),
+        "light": np.hstack([data.light_xpos, data.light_xdir]),
+        "mesh": model.mesh_vert,
+        "hfield": model.hfield_data[:, None],
+    }
+    for tag, numbers in parts.items():
+        for number in np.flatnonzero(~(np.abs(numbers) < _HUGE).all(1))[:1]:
+            name = getattr(model, tag)(number).name if tag in ("geom", "site", "light") else ""
+            raise InputError(
+                f"{tag} {name or number} has a place or size that is no number, or beyond "
+                f"{_HUGE:g} m; correct it"
+            )
 
 
 def _check_size(scene: SceneFile) -> None:
