@@ -120,7 +120,7 @@ if (is_cut)
                 see(x[k] + share * (x[other] - x[k]), y[k] + share * (y[other] - y[k]), front);
             }}
         }}
-const float slack = 0.01f;
+const float slack = 0.002f;
 left = wp::max(left + canvas.x0 - slack, 0.0f);
 right = wp::min(right + canvas.x0 + slack, canvas.width - 1.0f);
 top = wp::max(top + canvas.y0 - slack, 0.0f);
@@ -230,9 +230,9 @@ for (int row = top / 8; row <= bottom / 8; ++row)
         const int tile = row * canvas.across + column;
         if (least > canvas.farthest.data[tile]) continue;
         canvas.is_old.data[tile] = 1;
-        float *const depths = canvas.depth.data + 64 * tile;
-        int *const owners = canvas.owner.data + 64 * tile;
-        int *const parts = canvas.part.data + 64 * tile;
+        float *const __restrict depths = canvas.depth.data + 64 * tile;
+        int *const __restrict owners = canvas.owner.data + 64 * tile;
+        int *const __restrict parts = canvas.part.data + 64 * tile;
         const float i0 = 8 * column - canvas.x0, j0 = 8 * row - canvas.y0;
 #pragma clang loop vectorize(enable) interleave(disable)
         for (int k = 0; k < 64; ++k) {
@@ -298,9 +298,9 @@ def draw_solid(canvas: Canvas, geom: GeomView, number: int, part: wp.vec4i, leas
 
 
 _NODE = """
-    const float px = 0.5f * (low[at][0] + high[at][0]) - ex, hx = 0.5f * (high[at][0] - low[at][0]);
-    const float py = 0.5f * (low[at][1] + high[at][1]) - ey, hy = 0.5f * (high[at][1] - low[at][1]);
-    const float pz = 0.5f * (low[at][2] + high[at][2]) - ez, hz = 0.5f * (high[at][2] - low[at][2]);
+    const float *const box = boxes + 6 * at;
+    const float px = box[0] - ex, py = box[1] - ey, pz = box[2] - ez;
+    const float hx = box[3], hy = box[4], hz = box[5];
     const float zc = z0 * px + z1 * py + z2 * pz;
     const float zh = wp::abs(z0) * hx + wp::abs(z1) * hy + wp::abs(z2) * hz;
     const float near = zc - zh;
@@ -323,27 +323,37 @@ _NODE = """
         bottom = lower < bottom ? (int)floorf(lower) : bottom;
         if (left > right || top > bottom) continue;
     }
-    if ((right / 8 - left / 8 + 1) * (bottom / 8 - top / 8 + 1) <= 16) {
-        bool is_hidden = true;
-        for (int row = top / 8; row <= bottom / 8 && is_hidden; ++row)
-            for (int column = left / 8; column <= right / 8 && is_hidden; ++column) {
-                const int tile = row * canvas.across + column;
-                if (near > canvas.farthest.data[tile]) continue;
-                if (canvas.is_old.data[tile]) {
-                    const float *const depths = canvas.depth.data + 64 * tile;
-                    float most[8];
-                    for (int c = 0; c < 8; ++c) most[c] = depths[c];
-                    for (int r = 1; r < 8; ++r)
-                        for (int c = 0; c < 8; ++c)
-                            most[c] = most[c] > depths[8 * r + c] ? most[c] : depths[8 * r + c];
-                    for (int c = 1; c < 8; ++c) most[0] = most[0] > most[c] ? most[0] : most[c];
-                    canvas.farthest.data[tile] = most[0] * 1.00001f;
-                    canvas.is_old.data[tile] = 0;
-                }
-                is_hidden = near > canvas.farthest.data[tile];
+    const int columns = right / 8 - left / 8, rows = bottom / 8 - top / 8;
+    bool is_hidden = false;
+    if ((right - left + 1) * (bottom - top + 1) <= 8) {
+        is_hidden = true;
+        for (int y = top; y <= bottom && is_hidden; ++y)
+            for (int x = left; x <= right; ++x) {
+                const int tile = y / 8 * canvas.across + x / 8;
+                is_hidden &= near > canvas.depth.data[64 * tile + y % 8 * 8 + x % 8];
             }
-        if (is_hidden) continue;
+    } else if ((columns + 1) * (rows + 1) <= 16) {
+        is_hidden = true;
+        for (int tile = top / 8 * canvas.across + left / 8, i = 0; i <= rows && is_hidden; ++i)
+            for (int j = 0; j <= columns && is_hidden; ++j) {
+                const int here = tile + i * canvas.across + j;
+                if (near <= canvas.farthest.data[here]) {
+                    if (canvas.is_old.data[here]) {
+                        const float *const depths = canvas.depth.data + 64 * here;
+                        float most[8];
+                        for (int c = 0; c < 8; ++c) most[c] = depths[c];
+                        for (int r = 1; r < 8; ++r)
+                            for (int c = 0; c < 8; ++c)
+                                most[c] = most[c] > depths[8 * r + c] ? most[c] : depths[8 * r + c];
+                        for (int c = 1; c < 8; ++c) most[0] = most[0] > most[c] ? most[0] : most[c];
+                        canvas.farthest.data[here] = most[0] * 1.00001f;
+                        canvas.is_old.data[here] = 0;
+                    }
+                    is_hidden = near > canvas.farthest.data[here];
+                }
+            }
     }
+    if (is_hidden) continue;
 """
 """Skips node `at` unless one of the pixels from `left` to `right` and from `top` to `bottom` may
 show a part of it."""
@@ -351,66 +361,74 @@ show a part of it."""
 _LEAF = """
     const int slot = leaf + at - (leaves - 1);
     const float *const v = triangles.corners.data + 72 * slot;
-    float ui[8], uj[8], u1[8], vi[8], vj[8], v1[8], wi[8], wj[8], w1[8];
-    float ni[8], nj[8], n1[8], plane[8], least[8];
-    float lefts[8], rights[8], tops[8], bottoms[8];
+    float ai[8], aj[8], a1[8], bi[8], bj[8], b1[8], ci[8], cj[8], c1[8];
+    float lefts[8], rights[8], tops[8], bottoms[8], least[8];
+#pragma clang loop vectorize(enable) interleave(disable)
     for (int k = 0; k < 8; ++k) {
         const float ax = v[k] - ex, ay = v[8 + k] - ey, az = v[16 + k] - ez;
         const float bx = v[24 + k] - ex, by = v[32 + k] - ey, bz = v[40 + k] - ez;
         const float cx = v[48 + k] - ex, cy = v[56 + k] - ey, cz = v[64 + k] - ez;
-        const float ai = x0 * ax + x1 * ay + x2 * az, bi = x0 * bx + x1 * by + x2 * bz;
-        const float aj = y0 * ax + y1 * ay + y2 * az, bj = y0 * bx + y1 * by + y2 * bz;
-        const float a1 = z0 * ax + z1 * ay + z2 * az, b1 = z0 * bx + z1 * by + z2 * bz;
-        const float ci = x0 * cx + x1 * cy + x2 * cz, cj = y0 * cx + y1 * cy + y2 * cz;
-        const float c1 = z0 * cx + z1 * cy + z2 * cz;
-        const float pi = ci - bi, pj = cj - bj, p1 = c1 - b1, si = ci + bi, sj = cj + bj;
-        const float qi = ai - ci, qj = aj - cj, q1 = a1 - c1, ti = ai + ci, tj = aj + cj;
-        const float ri = bi - ai, rj = bj - aj, r1 = b1 - a1, mi = bi + ai, mj = bj + aj;
-        const float s1 = c1 + b1, t1 = a1 + c1, m1 = b1 + a1;
-        ui[k] = pj * s1 - p1 * sj, uj[k] = p1 * si - pi * s1, u1[k] = pi * sj - pj * si;
-        vi[k] = qj * t1 - q1 * tj, vj[k] = q1 * ti - qi * t1, v1[k] = qi * tj - qj * ti;
-        wi[k] = rj * m1 - r1 * mj, wj[k] = r1 * mi - ri * m1, w1[k] = ri * mj - rj * mi;
-        ni[k] = qj * r1 - q1 * rj, nj[k] = q1 * ri - qi * r1, n1[k] = qi * rj - qj * ri;
-        plane[k] = ai * ni[k] + aj * nj[k] + a1 * n1[k];
-        const float ab = a1 < b1 ? a1 : b1, near = ab < c1 ? ab : c1;
+        const float aw = z0 * ax + z1 * ay + z2 * az, bw = z0 * bx + z1 * by + z2 * bz;
+        const float au = x0 * ax + x1 * ay + x2 * az, bu = x0 * bx + x1 * by + x2 * bz;
+        const float av = y0 * ax + y1 * ay + y2 * az, bv = y0 * bx + y1 * by + y2 * bz;
+        const float cu = x0 * cx + x1 * cy + x2 * cz, cv = y0 * cx + y1 * cy + y2 * cz;
+        const float cw = z0 * cx + z1 * cy + z2 * cz;
+        ai[k] = au, aj[k] = av, a1[k] = aw, bi[k] = bu, bj[k] = bv, b1[k] = bw;
+        ci[k] = cu, cj[k] = cv, c1[k] = cw;
+        const float ab = aw < bw ? aw : bw, near = ab < cw ? ab : cw;
+        const float a_per = 1.0f / aw, b_per = 1.0f / bw, c_per = 1.0f / cw;
+        const float as = au * a_per, bs = bu * b_per, cs = cu * c_per;
+        const float at = av * a_per, bt = bv * b_per, ct = cv * c_per;
+        const float ab_left = as < bs ? as : bs, ab_right = as < bs ? bs : as;
+        const float most = ab_right > cs ? ab_right : cs;
+        const float ab_top = at < bt ? at : bt, ab_bottom = at < bt ? bt : at;
+        const float area = (bs - as) * (ct - at) - (bt - at) * (cs - as);
+        const bool is_cut = near <= front, is_back = !is_cut & (area > 1e-3f);
+        lefts[k] = is_cut ? -1e9f : (ab_left < cs ? ab_left : cs) + canvas.x0 - slack;
+        rights[k] = is_back ? -1e9f : (is_cut ? 1e9f : most + canvas.x0 + slack);
+        tops[k] = is_cut ? -1e9f : (ab_top < ct ? ab_top : ct) + canvas.y0 - slack;
+        bottoms[k] = is_cut ? 1e9f : (ab_bottom > ct ? ab_bottom : ct) + canvas.y0 + slack;
         least[k] = near;
-        const float a_per = 1.0f / a1, b_per = 1.0f / b1, c_per = 1.0f / c1;
-        const float au = ai * a_per, bu = bi * b_per, cu = ci * c_per;
-        const float av = aj * a_per, bv = bj * b_per, cv = cj * c_per;
-        const float ab_left = au < bu ? au : bu, ab_right = au < bu ? bu : au;
-        const float ab_top = av < bv ? av : bv, ab_bottom = av < bv ? bv : av;
-        const bool is_cut = near <= front;
-        lefts[k] = is_cut ? -1e9f : (ab_left < cu ? ab_left : cu) + canvas.x0 - slack;
-        rights[k] = is_cut ? 1e9f : (ab_right > cu ? ab_right : cu) + canvas.x0 + slack;
-        tops[k] = is_cut ? -1e9f : (ab_top < cv ? ab_top : cv) + canvas.y0 - slack;
-        bottoms[k] = is_cut ? 1e9f : (ab_bottom > cv ? ab_bottom : cv) + canvas.y0 + slack;
     }
     for (int k = 0; k < 8; ++k) {
-        if (!(plane[k] < 0.0f)) continue;
         const int from = lefts[k] > left ? (int)ceilf(wp::min(lefts[k], 1e6f)) : left;
         const int to = rights[k] < right ? (int)floorf(wp::max(rights[k], -1e6f)) : right;
         const int begin = tops[k] > top ? (int)ceilf(wp::min(tops[k], 1e6f)) : top;
         const int end = bottoms[k] < bottom ? (int)floorf(wp::max(bottoms[k], -1e6f)) : bottom;
-        if (from > to) continue;
-        for (int row = begin / 8; row <= end / 8 && begin <= end; ++row)
+        if (from > to || begin > end) continue;
+        const float pi = ci[k] - bi[k], pj = cj[k] - bj[k], p1 = c1[k] - b1[k];
+        const float qi = ai[k] - ci[k], qj = aj[k] - cj[k], q1 = a1[k] - c1[k];
+        const float ri = bi[k] - ai[k], rj = bj[k] - aj[k], r1 = b1[k] - a1[k];
+        const float ni = qj * r1 - q1 * rj, nj = q1 * ri - qi * r1, n1 = qi * rj - qj * ri;
+        const float height = ai[k] * ni + aj[k] * nj + a1[k] * n1;
+        if (!(height < 0.0f)) continue;
+        const float si = ci[k] + bi[k], sj = cj[k] + bj[k], s1 = c1[k] + b1[k];
+        const float ti = ai[k] + ci[k], tj = aj[k] + cj[k], t1 = a1[k] + c1[k];
+        const float mi = bi[k] + ai[k], mj = bj[k] + aj[k], m1 = b1[k] + a1[k];
+        const float ui = pj * s1 - p1 * sj, uj = p1 * si - pi * s1, u1 = pi * sj - pj * si;
+        const float vi = qj * t1 - q1 * tj, vj = q1 * ti - qi * t1, v1 = qi * tj - qj * ti;
+        const float wi = rj * m1 - r1 * mj, wj = r1 * mi - ri * m1, w1 = ri * mj - rj * mi;
+        const int triangle = 8 * slot + k;
+        for (int row = begin / 8; row <= end / 8; ++row)
             for (int column = from / 8; column <= to / 8; ++column) {
                 const int tile = row * canvas.across + column;
                 if (least[k] > canvas.farthest.data[tile]) continue;
-                const int top_row = begin > 8 * row ? begin - 8 * row : 0;
+                const int first_row = begin > 8 * row ? begin - 8 * row : 0;
                 const int last_row = end < 8 * row + 7 ? end - 8 * row : 7;
                 const float i0 = 8 * column - canvas.x0;
                 canvas.is_old.data[tile] = 1;
-                for (int r = top_row; r <= last_row; ++r) {
-                    const float j = 8 * row + r - canvas.y0;
-                    const float u0 = u1[k] + j * uj[k], v0 = v1[k] + j * vj[k];
-                    const float w0 = w1[k] + j * wj[k], n0 = n1[k] + j * nj[k];
-                    float *const depths = canvas.depth.data + 64 * tile + 8 * r;
-                    int *const owners = canvas.owner.data + 64 * tile + 8 * r;
-                    int *const parts = canvas.part.data + 64 * tile + 8 * r;
+                for (int y = first_row; y <= last_row; ++y) {
+                    const float j = 8 * row + y - canvas.y0;
+                    const float u0 = u1 + j * uj, v0 = v1 + j * vj;
+                    const float w0 = w1 + j * wj, n0 = n1 + j * nj;
+                    float *const __restrict depths = canvas.depth.data + 64 * tile + 8 * y;
+                    int *const __restrict owners = canvas.owner.data + 64 * tile + 8 * y;
+                    int *const __restrict parts = canvas.part.data + 64 * tile + 8 * y;
+#pragma clang loop vectorize(enable) interleave(disable)
                     for (int c = 0; c < 8; ++c) {
                         const float i = i0 + c;
-                        const float u = u0 + i * ui[k], v = v0 + i * vi[k], w = w0 + i * wi[k];
-                        const float along = plane[k] / (n0 + i * ni[k]);
+                        const float u = u0 + i * ui, v = v0 + i * vi, w = w0 + i * wi;
+                        const float along = height / (n0 + i * ni);
                         const float before = depths[c];
                         const float same = SAME * (before > 1.0f ? before : 1.0f);
                         const float limit = number >= owners[c] ? before + same : before - same;
@@ -419,7 +437,7 @@ _LEAF = """
                         const bool is_shown = is_in & is_near;
                         depths[c] = is_shown ? along : before;
                         owners[c] = is_shown ? number : owners[c];
-                        parts[c] = is_shown ? 8 * slot + k : parts[c];
+                        parts[c] = is_shown ? triangle : parts[c];
                     }
                 }
             }
@@ -433,11 +451,10 @@ _LEAF = """
 const float x0 = x_scale * m[0][0], x1 = x_scale * m[1][0], x2 = x_scale * m[2][0];
 const float y0 = -y_scale * m[0][1], y1 = -y_scale * m[1][1], y2 = -y_scale * m[2][1];
 const float z0 = -m[0][2], z1 = -m[1][2], z2 = -m[2][2];
-const float far = canvas.far, front = {float(NEAR)}f, slack = 0.01f;
+const float far = canvas.far, front = {float(NEAR)}f, slack = 0.002f;
 const int root = triangles.node.data[mesh], leaf = triangles.leaf.data[mesh];
 const int leaves = 1 << triangles.depth.data[mesh];
-const wp::vec_t<3, float> *const low = triangles.low.data + root;
-const wp::vec_t<3, float> *const high = triangles.high.data + root;
+const float *const boxes = triangles.boxes.data + 6 * root;
 int stack[64], depth = 1;
 stack[0] = 0;
 while (depth > 0) {{
@@ -447,9 +464,8 @@ while (depth > 0) {{
         {_LEAF}
     }}
     const int one = 2 * at + 1, other = 2 * at + 2;
-    const float apart = z0 * (low[other][0] + high[other][0] - low[one][0] - high[one][0])
-        + z1 * (low[other][1] + high[other][1] - low[one][1] - high[one][1])
-        + z2 * (low[other][2] + high[other][2] - low[one][2] - high[one][2]);
+    const float *const a = boxes + 6 * one, *const b = boxes + 6 * other;
+    const float apart = z0 * (b[0] - a[0]) + z1 * (b[1] - a[1]) + z2 * (b[2] - a[2]);
     stack[depth++] = apart > 0.0f ? other : one;
     stack[depth++] = apart > 0.0f ? one : other;
 }}""")

@@ -15,6 +15,9 @@ mujoco: Any = _mujoco
 _CREASE = 0.8
 """Cosine of the angle beyond which OpenGL shows a mesh without texture coordinates flat."""
 
+_WIDER = 1 + 1e-5
+"""Factor of the half extents of boxes, against rounding."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Mesh:
@@ -89,8 +92,7 @@ def make_triangles(meshes: list[Mesh]) -> Triangles:
         "is_mapped": ([mesh.texcoords is not None for mesh in meshes], int),
     }
     kinds: dict[str, Any] = {
-        "low": wp.vec3,
-        "high": wp.vec3,
+        "boxes": float,
         "normals": wp.vec3,
         "texcoords": wp.vec2,
         "corners": float,
@@ -114,12 +116,13 @@ def _build(mesh: Mesh) -> dict[str, Any]:
     for level in range(depth):
         starts = _starts(count, level)
         segment = np.repeat(np.arange(1 << level), np.diff(starts))
-        sorted_middles = middles[order]
-        spread = np.maximum.reduceat(sorted_middles, starts[:-1]) - np.minimum.reduceat(
-            sorted_middles, starts[:-1]
-        )
-        along = sorted_middles[np.arange(count), spread.argmax(1)[segment]]
-        order = order[np.lexsort((along, segment))]
+        placed = middles[order]
+        least = np.minimum.reduceat(placed, starts[:-1])
+        spread = np.maximum.reduceat(placed, starts[:-1]) - least
+        rows, axis = np.arange(1 << level), spread.argmax(1)
+        scale = np.maximum(spread[rows, axis], 1e-30).astype(float)
+        along = placed[np.arange(count), axis[segment]] - least[rows, axis][segment]
+        order = order[np.argsort(2.0 * segment + along / scale[segment])]
     leaves = 1 << depth
     starts = _starts(count, depth)
     slots = starts[:-1, None] + np.arange(WIDTH)
@@ -131,11 +134,11 @@ def _build(mesh: Mesh) -> dict[str, Any]:
     while len(levels_low[0]) > 1:
         levels_low.insert(0, levels_low[0].reshape(-1, 2, 3).min(1))
         levels_high.insert(0, levels_high[0].reshape(-1, 2, 3).max(1))
+    low, high = np.concatenate(levels_low), np.concatenate(levels_high)
     texcoords = np.zeros((count, 3, 2)) if mesh.texcoords is None else mesh.texcoords
     return {
         "depth": depth,
-        "low": np.concatenate(levels_low),
-        "high": np.concatenate(levels_high),
+        "boxes": np.concatenate([(low + high) / 2, (high - low) / 2 * _WIDER], 1).ravel(),
         "corners": corners.transpose(0, 2, 3, 1).reshape(leaves * 9 * WIDTH),
         "normals": _fill(mesh.normals, of_slot).reshape(-1, 3),
         "texcoords": _fill(texcoords, of_slot).reshape(-1, 2),

@@ -25,9 +25,8 @@ class Triangles:
     """First node of each mesh."""
     leaf: wp.array[int]
     """First leaf of each mesh."""
-    low: wp.array[wp.vec3]
-    """Corner of each node's box."""
-    high: wp.array[wp.vec3]
+    boxes: wp.array[float]
+    """Of each node: its centre and its half extents."""
     corners: wp.array[float]
     """Of each leaf: x of all first corners, y, z, then the second and third corners."""
     normals: wp.array[wp.vec3]
@@ -62,8 +61,7 @@ front is seen, `along`, and twice the weights i, j, m of its corners, by the sam
 @wp.func_native(f"""
 const int root = triangles.node.data[mesh], leaf = triangles.leaf.data[mesh];
 const int leaves = 1 << triangles.depth.data[mesh];
-const wp::vec_t<3, float> *const low = triangles.low.data + root;
-const wp::vec_t<3, float> *const high = triangles.high.data + root;
+const float *const boxes = triangles.boxes.data + 6 * root;
 const float x = origin[0], y = origin[1], z = origin[2];
 const float u = ray[0], w = ray[1], h = ray[2];
 float per[3];
@@ -103,11 +101,10 @@ while (depth > 0) {{
         const int child = 2 * at + 1 + side;
         float in = 0.0f, out = (float)nearest;
         for (int c = 0; c < 3; ++c) {{
-            const float a = (low[child][c] - origin[c]) * per[c];
-            const float b = (high[child][c] - origin[c]) * per[c];
-            const float less = a < b ? a : b, more = a < b ? b : a;
-            in = less > in ? less : in;
-            out = more < out ? more : out;
+            const float middle = (boxes[6 * child + c] - origin[c]) * per[c];
+            const float half = boxes[6 * child + 3 + c] * wp::abs(per[c]);
+            in = middle - half > in ? middle - half : in;
+            out = middle + half < out ? middle + half : out;
         }}
         enter[side] = in <= out * 1.000001f ? in : 3e38f;
     }}
