@@ -143,9 +143,10 @@ class Terms:
 
         return decorate
 
-    def declare(self, name: str, weight: float, **parameters: float) -> None:
-        """Register a shipped term whose function `implement` adds."""
-        settings = _settings_class(name, {"weight": weight, **parameters})
+    def declare(self, name: str, weight: float | None = None, **parameters: float) -> None:
+        """Register a shipped term whose function `implement` adds; only rewards have a weight."""
+        own = {} if weight is None else {"weight": weight}
+        settings = _settings_class(name, {**own, **parameters})
         self.by_name[name] = Term(name, None, settings, tuple(parameters), is_exact=False)
 
     def implement(self, name: str) -> Callable[[F], F]:
@@ -202,6 +203,9 @@ for _name, _weight in {
 }.items():
     REWARDS.declare(_name, _weight)
 REWARDS.declare("altitude", -0.01, height=2.5)
+ENDS.declare("contact")
+ENDS.declare("out_of_bounds")
+SUCCESSES.declare("all_goals")
 _Read = dict[str, TermSettings]
 Rewards = Annotated[_Read, REWARDS, BeforeValidator(REWARDS.read)]
 """Terms of a reward by name, each with a weight and parameters of its own."""

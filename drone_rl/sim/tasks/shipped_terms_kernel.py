@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from drone_rl.config.terms import REWARDS, end, event, success
+from drone_rl.config.terms import ENDS, REWARDS, SUCCESSES, event
 from drone_rl.sim.tasks.step_kernel import Mover, Step
 
 
@@ -55,19 +55,19 @@ def altitude(step: Step, height: float) -> float:
     return wp.abs(step.position[2] - height)
 
 
-@end("contact")
+@ENDS.implement("contact")
 def touches(step: Step) -> bool:
     """The drone touches an obstacle, the ground or the scene."""
     return step.contact
 
 
-@end("out_of_bounds")
+@ENDS.implement("out_of_bounds")
 def is_out_of_bounds(step: Step) -> bool:
     """The drone leaves the task's bounds."""
     return step.out_of_bounds
 
 
-@success("all_goals")
+@SUCCESSES.implement("all_goals")
 def has_all_goals(step: Step) -> bool:
     """The drone has reached every goal."""
     return step.remaining == 0
