@@ -104,6 +104,18 @@ class Frames:
         mujoco.mju_mulQuat(relative, back, whole)
         return frame, there, relative
 
+    def place_light(self, light: int) -> tuple[int, NDArray, NDArray]:
+        """Return the frame of a light, and its position and direction in it.
+
+        A light that follows something, or points at it, stays as it is at the start.
+        """
+        data, body = self._data, int(self._model.light_bodyid[light])
+        frame = int(self._of_body[body])
+        root = self._model.body_rootid[body] if frame else 0
+        back = data.xmat[root].reshape(3, 3).T
+        position = data.light_xpos[light] - data.xpos[root]
+        return frame, back @ position, back @ data.light_xdir[light]
+
 
 def make_view(scene: Scene, frames: Frames, view: View, device: str) -> structs.ViewArrays:
     """Return a view for the kernels; the caller sets its modalities, `what`."""

@@ -6,7 +6,7 @@ from drone_rl.sim.rendering.raytrace import canvas_kernel as canvases
 from drone_rl.sim.rendering.raytrace import structs_kernel as structs
 from drone_rl.sim.rendering.raytrace.cast_kernel import MESH, Hit, World, complete_hit
 from drone_rl.sim.rendering.raytrace.intersection_kernel import PLANE
-from drone_rl.sim.rendering.raytrace.light_kernel import Look, shade, sky
+from drone_rl.sim.rendering.raytrace.light_kernel import Look, Shot, shade, sky, start_image
 from drone_rl.sim.rendering.raytrace.projection_kernel import frame_attitude, product, rotation
 from drone_rl.sim.rendering.raytrace.shading_kernel import gray_of, to_bytes
 from drone_rl.sim.rendering.raytrace.structs_kernel import struct
@@ -57,7 +57,8 @@ def render_tiles(
         to_world = rotation(product(turned, camera.attitude))
         canvas = make_canvas(view, camera, scratch, buffer)
         draw(canvas, world, env, eye, to_world, scratch, buffer)
-        write(canvas, view, world, look, env, eye, to_world, scratch.geoms[buffer], images, row)
+        shot = start_image(look, world, view, camera, env, buffer, eye, to_world)
+        write(canvas, view, world, look, shot, to_world, scratch.geoms[buffer], images, row)
         row += 1
 
 
@@ -158,8 +159,7 @@ def write(
     view: structs.ViewArrays,
     world: World,
     look: Look,
-    env: int,
-    eye: wp.vec3,
+    shot: Shot,
     to_world: wp.mat33,
     geoms: wp.array[structs.GeomView],
     images: structs.Images,
@@ -180,7 +180,7 @@ def write(
             cosine = 1.0 / wp.length(ray)
             ray *= cosine
             hit = Hit()
-            hit.env = env
+            hit.env = shot.env
             hit.geom = structs.NO_GEOM
             owner = canvas.owner[at]
             direction = to_world @ ray
@@ -188,7 +188,7 @@ def write(
                 seen = geoms[owner]
                 hit.geom = seen.number
                 hit.distance = canvas.depth[at] / cosine
-                hit.point = eye + hit.distance * direction
+                hit.point = shot.position + hit.distance * direction
                 hit = complete_hit(
                     hit,
                     world,
@@ -200,7 +200,7 @@ def write(
                     seen.eye,
                     seen.into @ ray,
                 )
-            write_pixel(view, images, row, pixel, cosine, direction, world, look, hit)
+            write_pixel(view, images, row, pixel, cosine, direction, world, look, hit, shot)
             pixel += 1
             x += 1
         y += 1
@@ -217,11 +217,12 @@ def write_pixel(
     world: World,
     look: Look,
     hit: Hit,
+    shot: Shot,
 ) -> None:
     """Write all modalities of a pixel. `cosine` is that of its ray to the camera's axis."""
     what = view.what
     if (what & (structs.RGB | structs.GRAY)) != 0:
-        color = _color(look, world, hit, direction)
+        color = _color(look, world, hit, direction, shot)
         if (what & structs.RGB) != 0:
             images.rgb[row, pixel] = color
         if (what & structs.GRAY) != 0:
@@ -230,12 +231,12 @@ def write_pixel(
 
 
 @wp.func
-def _color(look: Look, world: World, hit: Hit, direction: wp.vec3) -> wp.vec3ub:
+def _color(look: Look, world: World, hit: Hit, direction: wp.vec3, shot: Shot) -> wp.vec3ub:
     shown = wp.vec3()
     if hit.geom == structs.NO_GEOM:
-        shown = sky(look, hit.env, direction)
+        shown = sky(look, direction, shot)
     else:
-        shown = shade(look, world, hit, direction)
+        shown = shade(look, world, hit, direction, shot)
     return to_bytes(255.0 * wp.min(wp.max(shown, wp.vec3()), wp.vec3(1.0, 1.0, 1.0)))
 
 

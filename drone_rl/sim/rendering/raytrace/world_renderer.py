@@ -49,7 +49,8 @@ class SceneRaytracer:
         start_warp("cpu")
         self.scene, self.device = scene, torch.device("cpu")
         self._workers = WorkerPool(num_envs, num_shards)
-        self._frames, self._looks = scenes.Frames(scene), LookEncoder(scene)
+        self._frames = scenes.Frames(scene)
+        self._looks = LookEncoder(scene, self._frames, self._workers.size)
         self._triangles, self._mesh_of_geom = _read_triangles(scene)
         self._views: dict[View, tuple[scenes.Cameras, Any, Any]] = {}
         self._poses = scenes.PoseBuffers(self.device)

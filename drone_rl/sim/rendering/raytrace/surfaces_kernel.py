@@ -1,0 +1,236 @@
+"""Surfaces of geoms: their materials, and where a texture lies on them in MuJoCo's OpenGL."""
+
+import warp as wp
+
+from drone_rl.sim.rendering.raytrace.cast_kernel import MESH, Hit, World
+from drone_rl.sim.rendering.raytrace.intersection_kernel import (
+    BOX,
+    CAPSULE,
+    CYLINDER,
+    ELLIPSOID,
+    PLANE,
+    ROUND,
+)
+from drone_rl.sim.rendering.raytrace.structs_kernel import struct
+from drone_rl.sim.rendering.raytrace.texels_kernel import Textures, sample_cube, sample_flat
+from drone_rl.sim.rendering.raytrace.triangles_kernel import triangle_corner
+
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+WRAPPED = wp.constant(0)
+"""Mapping of a texture by coordinates that go around a primitive, or by those of a mesh."""
+PROJECTED = wp.constant(1)
+"""By x and y in the geom's frame."""
+CUBE = wp.constant(2)
+"""A cube map, by direction from the geom's centre."""
+TILED = wp.constant(3)
+"""By metres in the geom's frame, on the side of a box with the most similar normal."""
+
+DOME = wp.constant(0)
+"""Parts of round solids: half a ball, ..."""
+TUBE = wp.constant(1)
+"""... the side of a cylinder, ..."""
+DISK = wp.constant(2)
+"""... and its ends."""
+TURN = wp.constant(6.2831853)
+"""Radians of a full turn."""
+
+
+@struct
+class Surfaces:
+    """Appearance of geoms by index in the model; rows: one for all environments or one each."""
+
+    color: wp.array2d[wp.vec4]
+    """Red, green, blue, opacity, 0 to 1."""
+    shine: wp.array[wp.vec3]
+    """Emission, specular factor and exponent of the highlight."""
+    texture: wp.array2d[int]
+    """-1 for none."""
+    mapping: wp.array2d[int]
+    scale: wp.array2d[wp.vec3]
+    """Factors of texture coordinates."""
+    shift: wp.array[wp.vec2]
+    """Added to texture coordinates."""
+    cells: wp.array[wp.vec4]
+    """Of planes: first grid line and distance of lines, along x, then along y. Metres.
+
+    For an infinite plane, not the first line but the steps in which the grid follows the camera.
+    """
+    counts: wp.array[wp.vec2i]
+    """Of planes: cells between the first and the last line; -1 for an infinite plane."""
+    divisions: int
+    """Parts into which OpenGL divides each side of a box's face."""
+    slices: int
+    """Parts into which it divides round solids, around their axis."""
+    stacks: int
+    """The same along the axis; half of it from the middle of a disk to its edge."""
+
+
+@wp.func
+def sample_surface(
+    surfaces: Surfaces,
+    textures: Textures,
+    world: World,
+    hit: Hit,
+    across: wp.vec3,
+    down: wp.vec3,
+    row: int,
+) -> wp.vec3:
+    """Return the color of a geom's texture, 0 to 1, where a pixel shows it.
+
+    `across` and `down` are the steps on the surface to what the next pixels show, geom's frame, and
+    `row` that of the environment.
+    """
+    texture, mapping = surfaces.texture[row, hit.geom], surfaces.mapping[row, hit.geom]
+    here = _coordinates(surfaces, world, hit, hit.local, row)
+    right = _coordinates(surfaces, world, hit, hit.local + across, row) - here
+    below = _coordinates(surfaces, world, hit, hit.local + down, row) - here
+    if mapping == CUBE:
+        return sample_cube(textures, texture, here, right, below)
+    if mapping == WRAPPED and hit.kind != MESH and hit.part == ROUND:  # across the seam
+        turn = surfaces.scale[row, hit.geom][0]
+        right[0] = right[0] - wp.round(right[0] / turn) * turn
+        below[0] = below[0] - wp.round(below[0] / turn) * turn
+    return sample_flat(textures, texture, here, right, below)
+
+
+@wp.func
+def _coordinates(surfaces: Surfaces, world: World, hit: Hit, place: wp.vec3, row: int) -> wp.vec3:
+    """Return texture coordinates of a place near the point that is hit, geom's frame.
+
+    Those of a cube map are a direction.
+    """
+    mapping, scale = surfaces.mapping[row, hit.geom], surfaces.scale[row, hit.geom]
+    if mapping == CUBE:
+        return wp.cw_mul(_stretch_ends(hit, place), scale)
+    if mapping == PROJECTED:
+        return wp.vec3(place[0] * scale[0] - 0.5, -place[1] * scale[1] - 0.5, 0.0)
+    if mapping == TILED:
+        normal = hit.local_normal
+        axes = face_axes(
+            int(wp.argmax(wp.vec3(wp.abs(normal[0]), wp.abs(normal[1]), wp.abs(normal[2]))))
+        )
+        return wp.vec3(place[axes[0]] * scale[0], -place[axes[1]] * scale[0], 0.0)
+    at = wp.vec2()
+    if hit.kind == MESH:
+        at = _mesh_coordinates(world, hit, place)
+    elif hit.kind == PLANE:
+        at = wp.vec2(_along_plane(place[0], hit.size[0]), 1.0 - _along_plane(place[1], hit.size[1]))
+        if hit.size[1] <= 0.0:
+            at[1] = at[1] - 1.0
+    elif hit.kind == BOX:
+        axes = face_axes(hit.part // 2)
+        one, two = axes[0], axes[1]
+        at = wp.vec2(0.5 + 0.5 * place[one] / hit.size[one], 0.5 - 0.5 * place[two] / hit.size[two])
+    else:
+        at = _round_coordinates(hit, place)
+    shift = surfaces.shift[hit.geom]
+    return wp.vec3(at[0] * scale[0] + shift[0], at[1] * scale[1] + shift[1], 0.0)
+
+
+@wp.func
+def face_axes(axis: int) -> wp.vec2i:
+    """Return the axes along a face of a box, given that of its normal."""
+    if axis == 0:
+        return wp.vec2i(1, 2)
+    if axis == 1:
+        return wp.vec2i(0, 2)
+    return wp.vec2i(0, 1)
+
+
+@wp.func
+def _stretch_ends(hit: Hit, place: wp.vec3) -> wp.vec3:
+    """Stretch the ends of a capsule as OpenGL does for cube maps."""
+    half = hit.size[1]
+    beyond = wp.abs(place[2]) - half
+    if hit.kind != CAPSULE or beyond <= 0.0:
+        return place
+    return wp.vec3(place[0], place[1], wp.sign(place[2]) * half * (1.0 + beyond / hit.size[0]))
+
+
+@wp.func
+def _along_plane(place: float, half: float) -> float:
+    if half > 0.0:
+        return (place + half) / (2.0 * half)
+    return 0.5 * place
+
+
+@wp.func
+def _mesh_coordinates(world: World, hit: Hit, place: wp.vec3) -> wp.vec2:
+    weights, first = mesh_weights(world, hit.part, place), 3 * hit.part
+    return (
+        weights[0] * world.triangles.texcoords[first]
+        + weights[1] * world.triangles.texcoords[first + 1]
+        + weights[2] * world.triangles.texcoords[first + 2]
+    )
+
+
+@wp.func
+def mesh_weights(world: World, triangle: int, place: wp.vec3) -> wp.vec3:
+    """Return the weights of a triangle's corners at a place on its plane."""
+    a = triangle_corner(world.triangles, triangle, 0)
+    one = triangle_corner(world.triangles, triangle, 1) - a
+    two = triangle_corner(world.triangles, triangle, 2) - a
+    at = place - a
+    xx, xy, yy = wp.dot(one, one), wp.dot(one, two), wp.dot(two, two)
+    x, y = wp.dot(at, one), wp.dot(at, two)
+    area = wp.max(xx * yy - xy * xy, 1e-30)
+    second, third = (yy * x - xy * y) / area, (xx * y - xy * x) / area
+    return wp.vec3(1.0 - second - third, second, third)
+
+
+@wp.func
+def _round_coordinates(hit: Hit, place: wp.vec3) -> wp.vec2:
+    part = round_part(hit)
+    if part == DISK:
+        return wp.vec2(0.5 + 0.5 * place[0] / hit.size[0], 0.5 + 0.5 * place[1] / hit.size[0])
+    at = unroll(hit, part, place)
+    if part == TUBE:
+        return wp.vec2(at[0], 1.0 - at[1])
+    if hit.kind != CAPSULE:
+        return wp.vec2(at[0], 0.5 - 0.5 * wp.sign(place[2]) * at[1])
+    if place[2] > 0.0:
+        return wp.vec2(at[0], 1.0 - at[1])
+    return at
+
+
+@wp.func
+def round_part(hit: Hit) -> int:
+    """Return the part of a ball, ellipsoid, capsule or cylinder that is hit."""
+    if hit.kind == CYLINDER:
+        if hit.part == ROUND:
+            return TUBE
+        return DISK
+    if hit.kind == CAPSULE and wp.abs(hit.local[2]) < hit.size[1]:
+        return TUBE
+    return DOME
+
+
+@wp.func
+def radii(hit: Hit) -> wp.vec3:
+    """Return the factors that make a round solid of one with radius 1."""
+    if hit.kind == ELLIPSOID:
+        return hit.size
+    return wp.vec3(hit.size[0], hit.size[0], hit.size[0])
+
+
+@wp.func
+def unroll(hit: Hit, part: int, place: wp.vec3) -> wp.vec2:
+    """Return coordinates on a part of a round solid, each from 0 to 1.
+
+    The first goes around the axis. The second goes along a tube, from the equator of a dome to its
+    pole, or from the middle of a disk to its edge.
+    """
+    unit = wp.cw_div(place, radii(hit))
+    around = wp.atan2(unit[1], unit[0]) / TURN
+    if around < 0.0:
+        around += 1.0
+    flat = wp.sqrt(unit[0] * unit[0] + unit[1] * unit[1])
+    if part == TUBE:
+        return wp.vec2(around, 0.5 + 0.5 * place[2] / hit.size[1])
+    if part == DISK:
+        return wp.vec2(around, flat)
+    up = wp.abs(unit[2])
+    if hit.kind == CAPSULE:
+        up -= hit.size[1] / hit.size[0]
+    return wp.vec2(around, wp.atan2(up, flat) / (0.25 * TURN))
