@@ -45,6 +45,7 @@ from benchmarks.verdicts import bench_verdicts
 from benchmarks.worlds.commands import bench_world_commands
 from benchmarks.worlds.drawing import bench_drawing
 from benchmarks.worlds.judging import bench_world_judging
+from benchmarks.worlds.strangers import bench_strangers
 from benchmarks.worlds.training import bench_world_training
 from drone_rl.utils.errors import InputError
 
@@ -168,6 +169,7 @@ BENCHMARKS: dict[str, Benchmark] = {
         *("trust", "explanations", "flight"),
         *_parts("worlds"),
     ),
+    "world_strangers": _benchmark(bench_strangers, "worlds", *_RENDERING),
     "startup": _benchmark(bench_startup, "system", *_COMMANDS, "trust"),
     "onnx": _benchmark(bench_onnx, "libraries", *_JUDGING),
     "peers": _benchmark(bench_peers, "libraries", *_COMMANDS, *_parts("peers")),

@@ -1,7 +1,16 @@
-"""Images of other people's scene files: the ray tracer's against those of MuJoCo's OpenGL."""
+"""Images of other people's scene files: the ray tracer's against those of MuJoCo's OpenGL.
+
+Run as a program (`python -m benchmarks.worlds.strangers NUMBER`) with MUJOCO_GL=egl, because MuJoCo
+chooses OpenGL's platform when it is imported.
+"""
 
 import importlib.util
+import itertools
+import json
+import logging
 import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,6 +27,7 @@ from drone_rl.sim.rendering.view import to_gray
 from drone_rl.sim.scenes import SceneFile, load_scene
 from drone_rl.utils.errors import InputError
 
+_log = logging.getLogger(__name__)
 mujoco: Any = _mujoco
 """MuJoCo's bindings, which are untyped."""
 FOLDERS = (
@@ -56,30 +66,42 @@ class Likeness(NamedTuple):
 
 
 def bench_strangers(setup: Setup) -> Figures:
-    """Compare at least 40 files, 6 if quick, of two cameras each; print the worst."""
+    """Compare the files of installed packages, 6 if quick, from two cameras each.
+
+    Returns:
+        "world_strangers": number of files; "world_strangers_right": fraction of them whose images
+        are those of OpenGL (None without OpenGL); "world_strangers_geoms", "world_strangers_gray":
+        fractions of the pixels, with neighbours of the same geom, that show another geom, and whose
+        gray is within 8 of 255; "world_strangers_worst": the files that differ most.
+    """
+    process = subprocess.run(
+        [sys.executable, "-m", "benchmarks.worlds.strangers", "6" if setup.quick else "1000"],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "MUJOCO_GL": "egl"},
+        check=True,
+    )
+    return json.loads(process.stdout.splitlines()[-1])
+
+
+def measure(most: int) -> Figures:
+    """Return the figures of `bench_strangers`, of at most some files."""
     if not has_opengl():
-        print("MuJoCo's OpenGL is not available: install EGL (libegl1), and set MUJOCO_GL=egl")
+        _log.warning("MuJoCo's OpenGL is missing: install EGL (libegl1)")
         return {"world_strangers": 0, "world_strangers_right": None}
     found: list[Likeness] = []
-    for path in files():
+    for path in itertools.takewhile(lambda _: len(found) < most, files()):
         try:
-            scene = load_scene(path)
-            likeness = compare(scene)
+            found.append(compare(load_scene(path)))
         except InputError as error:
-            print(f"left out: {error}")
-            continue
-        found.append(likeness)
-        if setup.quick and len(found) == 6:
-            break
-    for one in sorted(found, key=lambda one: one.gray)[:8]:
-        print(f"{one.file}: {one.segmentation:.2%} of geoms differ, gray within 8: {one.gray:.1%}")
-    right = sum(one.is_right for one in found)
-    print(f"{right} of {len(found)} files like MuJoCo's OpenGL")
+            _log.info("left out: %s", error)
+    worst = sorted(found, key=lambda one: one.gray)[:8]
     return {
         "world_strangers": len(found),
-        "world_strangers_right": right / max(len(found), 1),
-        "world_strangers_segmentation": float(np.mean([one.segmentation for one in found])),
+        "world_strangers_right": float(np.mean([one.is_right for one in found])),
+        "world_strangers_geoms": float(np.mean([one.segmentation for one in found])),
         "world_strangers_gray": float(np.mean([one.gray for one in found])),
+        "world_strangers_worst": {one.file: one[1:] for one in worst},
     }
 
 
@@ -92,7 +114,6 @@ def files() -> Iterator[Path]:
 
 def has_opengl() -> bool:
     """Return whether MuJoCo can render with OpenGL."""
-    os.environ.setdefault("MUJOCO_GL", "egl")
     try:
         mujoco.Renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 8, 8).close()
     except Exception:  # whatever a missing library raises
@@ -120,7 +141,7 @@ def compare(file: SceneFile) -> Likeness:
 
 def with_cameras(file: SceneFile) -> Scene:
     """Return a scene file as a scene that never moves, seen by `VIEWS`."""
-    spec = mujoco.MjSpec.from_string(file.mjcf, dict(file.assets))
+    spec = mujoco.MjSpec.from_string(file.mjcf, assets=dict(file.assets))
     center, extent = file.model.stat.center, file.model.stat.extent
     view = file.model.vis.global_
     for name, turn, distance in VIEWS:
@@ -184,3 +205,8 @@ def inner(segmentation: NDArray[np.int32]) -> NDArray[np.bool_]:
             other = segmentation[row : row + middle.shape[0], column : column + middle.shape[1]]
             result[1:-1, 1:-1] &= other == middle
     return result
+
+
+if __name__ == "__main__":
+    logging.basicConfig(level=logging.INFO, stream=sys.stderr)
+    sys.stdout.write(json.dumps(measure(int(sys.argv[1]))) + "\n")

@@ -616,5 +616,13 @@ WORLDS = (
         "{world_placebos_trusted} of {world_placebos_total}; {world_planted_found:%}",
         "0; 90%",
     ),
+    Row(
+        "world_strangers",
+        "scene files of dm_control, Gymnasium, MuJoCo and MuJoCo Warp, and the fraction that looks "
+        "as in MuJoCo's OpenGL; pixels that show another geom; with gray within 8 of 255",
+        "{world_strangers}: {world_strangers_right:.0%}; {world_strangers_geoms:.2%}; "
+        "{world_strangers_gray:.1%}",
+        "40; 1%; 95%",
+    ),
 )
 """Scenes from files."""

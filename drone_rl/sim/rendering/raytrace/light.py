@@ -50,7 +50,7 @@ def make_lighting(scene: Scene, frames: Frames, device: str) -> kernel.Lighting:
         light.direction, light.range = wp.vec3(0.0, 0.0, -1.0), math.inf
         lights.append(light)
         colors.append((head.ambient, head.diffuse, head.specular))
-    for i in np.flatnonzero(model.light_active):
+    for i in np.flatnonzero(model.light_active).tolist():
         if model.light_type[i] != mujoco.mjtLightType.mjLIGHT_IMAGE:
             lights.append(_make_light(model, i, frames))
             colors.append((model.light_ambient[i], model.light_diffuse[i], model.light_specular[i]))

@@ -12,10 +12,10 @@ from drone_rl.sim.rendering.scene import Scene
 
 mujoco: Any = _mujoco
 """MuJoCo's bindings, which are untyped."""
-_PLANE, _SPHERE, _MESH, _HFIELD = (
-    getattr(mujoco.mjtGeom, f"mjGEOM_{name}") for name in ("PLANE", "SPHERE", "MESH", "HFIELD")
+_PLANE, _HFIELD, _SPHERE, _CAPSULE, _CYLINDER, _MESH = (
+    int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}"))
+    for name in ("PLANE", "HFIELD", "SPHERE", "CAPSULE", "CYLINDER", "MESH")
 )
-_TUBES = (mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER)
 _MOST_LINES = 200
 """MuJoCo's `mjMAXPLANEGRID`: grid lines of a plane."""
 
@@ -30,7 +30,7 @@ def make_surfaces(scene: Scene, device: str) -> kernel.Surfaces:
     texture, mapping = np.full(count, -1), np.zeros(count, int)
     scale, shift = np.ones((count, 3)), np.zeros((count, 2))
     role = mujoco.mjtTextureRole.mjTEXROLE_RGB
-    for i in np.flatnonzero(material >= 0):
+    for i in np.flatnonzero(material >= 0).tolist():
         of = material[i]
         shine[i] = model.mat_emission[of], model.mat_specular[of], 128 * model.mat_shininess[of]
         texture[i] = model.mat_texid[of, role]
@@ -61,7 +61,7 @@ def _visual_size(model: Any, geom: int) -> NDArray:
     size = model.geom_size[geom]
     if model.geom_type[geom] == _SPHERE:
         return size[[0, 0, 0]]
-    return size[[0, 0, 1]] if model.geom_type[geom] in _TUBES else size
+    return size[[0, 0, 1]] if model.geom_type[geom] in (_CAPSULE, _CYLINDER) else size
 
 
 def _map_texture(model: Any, geom: int, size: NDArray) -> tuple[int, NDArray, NDArray]:
