@@ -9,6 +9,7 @@ from drone_rl.config.dynamics import COMPUTER_VISION as COMPUTER_VISION
 from drone_rl.config.dynamics import MOVES_SETTINGS as MOVES_SETTINGS
 from drone_rl.config.dynamics import ActionSettings as ActionSettings
 from drone_rl.config.dynamics import DynamicsSettings as DynamicsSettings
+from drone_rl.config.reach import ReachSettings as ReachSettings
 from drone_rl.config.sensors import SensorSettings as SensorSettings
 from drone_rl.config.task import TASKS as TASKS
 from drone_rl.config.task import BaseTaskSettings as BaseTaskSettings

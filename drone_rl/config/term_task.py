@@ -9,11 +9,14 @@ from pydantic import BeforeValidator
 from drone_rl.config.task import BaseTaskSettings, Color, ObjectRegion
 from drone_rl.config.terms import Ends, Events, Rewards, Success
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Listed, OneOf, Real, Several, Span, Whole
+from drone_rl.utils.schema import Listed, OneOf, Real, Several, Span, Text, Whole
 from drone_rl.utils.settings import Settings
 
 Coordinate = Annotated[Any, Span(Real(-1000.0, 1000.0, unit="m"))]
 Size = Real(0.01, 1000.0, unit="m")
+SiteName = Annotated[str, Text(100)]
+ANYWHERE = "anywhere"
+"""Name of the sites of a start in free space."""
 ROLES = ("goal", "obstacle", "decoration")
 SHAPES = ("ball", "cylinder", "box")
 
@@ -53,6 +56,9 @@ class ObjectSettings(Settings):
     """See x."""
     z: Annotated[Any, Span(Real(-1000.0, 1000.0, unit="m"))] | None = None
     """See x; None stands it on the ground."""
+    site: SiteName = ""
+    """Where it is instead of x, y and z: at one of the sites of the scene file whose names begin
+    with this, which each episode draws; anywhere in the site if that is a box."""
     apart: Annotated[float, Real(0.0, 1000.0, unit="m")] = 0.0
     """Least distance between its surface and those of the objects placed before it."""
     event: Events = {}
@@ -95,16 +101,19 @@ class StartSettings(Settings):
     """A number, or the range in which each episode draws it."""
     y: Coordinate = 0.0
     """See x."""
-    z: Coordinate = 2.5
-    """See x."""
+    z: Coordinate | None = 2.5
+    """See x; None for the height of the site, or of the goal if there is no site."""
     heading: Annotated[Any, Span(Real(-360.0, 360.0, unit="deg"))] = 0.0
-    """To the left of the x axis."""
+    """To the left of the x axis, or of that of the site."""
     apart: Annotated[float, Real(0.0, 1000.0, unit="m")] = 1.0
     """Least distance between the drone's surface and those of obstacles and goals."""
+    site: SiteName = ""
+    """Where it starts instead of x and y: at one of the sites of the scene file whose names begin
+    with this, anywhere in the site if that is a box; `anywhere` for all free space."""
 
     def range_of(self, axis: str) -> tuple[float, float]:
         """Return the lowest and highest value of a coordinate or of the heading."""
-        value = getattr(self, axis)
+        value = getattr(self, axis) or 0.0  # a site has the height
         return value if isinstance(value, tuple) else (value, value)
 
 
@@ -180,6 +189,11 @@ class TermTaskSettings(BaseTaskSettings):
         return self.replace(start=changed["start"], objects=objects, curriculum={})
 
     @property
+    def has_sites(self) -> bool:
+        """Whether sites of scene files say where the start or objects are."""
+        return any(of.site for of in (self.start, *self.objects.values()))
+
+    @property
     def low(self) -> tuple[float, ...]:
         """Least coordinates within the bounds."""
         return tuple(low - self.margin for low, _ in map(self._reach, "xyz"))
@@ -194,8 +208,10 @@ class TermTaskSettings(BaseTaskSettings):
         return min(low for low, _ in ranges), max(high for _, high in ranges)
 
     @property
-    def object_region(self) -> ObjectRegion:
-        """Where the objects are; see `BaseTaskSettings`."""
+    def object_region(self) -> ObjectRegion | None:
+        """Where the objects are; see `BaseTaskSettings`. None if a scene file says so."""
+        if self.has_sites:
+            return None
         every = self.objects.values()
         size = 2 * max(max(of.reach[:2]) for of in every)
         color = next(of.color for of in every if of.role == "goal")

@@ -8,7 +8,7 @@ from torch import Tensor
 
 from drone_rl.envs.rollout import Act, Agent, StepContext
 from drone_rl.sim.actions import Actions
-from drone_rl.sim.tasks import Task
+from drone_rl.sim.tasks import OracleRule, Task
 from drone_rl.utils.errors import InputError
 
 _NOTHING = -1.0
@@ -30,13 +30,16 @@ class OracleAgent:
     def act(self, context: StepContext) -> Act:
         """See `Agent`."""
         worlds, rule = context.worlds, context.worlds.task.oracle
-        assert rule is not None
         body = context.state.body
         for action in context.pending:
             body = worlds.dynamics.step(body, action)
-        info = worlds.info(dataclasses.replace(context.state, body=body))
-        if self._only_visible:
-            info["next_cube"] = self._first_visible(context, info["next_cube"])
+        state = dataclasses.replace(context.state, body=body)
+        if not self._only_visible:
+            assert rule is not None
+            return Act(rule.choose(worlds, state))
+        assert isinstance(rule, OracleRule)
+        info = worlds.info(state)
+        info["next_cube"] = self._first_visible(context, info["next_cube"])
         return Act(rule.decide([info[name] for name in rule.reads], context.actions))
 
     def _first_visible(self, context: StepContext, next_cube: Tensor) -> Tensor:

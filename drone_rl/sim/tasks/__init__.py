@@ -5,6 +5,7 @@ from drone_rl.sim.tasks.collect_cubes import FailureReplayTask as FailureReplayT
 from drone_rl.sim.tasks.objects import ObjectState as ObjectState
 from drone_rl.sim.tasks.objects import ObjectTask as ObjectTask
 from drone_rl.sim.tasks.pillars import Pillars as Pillars
+from drone_rl.sim.tasks.reach import ReachSettings as ReachSettings
 from drone_rl.sim.tasks.scene_edits import Grid as Grid
 from drone_rl.sim.tasks.task import EndReason as EndReason
 from drone_rl.sim.tasks.task import Goals as Goals

@@ -11,6 +11,7 @@ from drone_rl.config.term_task import ROLES, SHAPES, ObjectSettings
 from drone_rl.config.terms import REWARDS, Term, TermSettings
 from drone_rl.sim.dynamics import Dynamics, FlightState
 from drone_rl.sim.rendering.devices import on_torch_stream, start_warp
+from drone_rl.sim.scenes.path_kernel import Route, make_paths
 from drone_rl.sim.tasks.geometry_kernel import NOTHING, Objects
 from drone_rl.sim.tasks.rules_kernel import Rules
 from drone_rl.sim.tasks.step_kernel import Step, World
@@ -38,6 +39,7 @@ class AppliedRules:
         low: Sequence[float] = (-torch.inf,) * 3,
         high: Sequence[float] = (torch.inf,) * 3,
         events: Sequence[int] = (),
+        routes: Sequence[Route] = (),
     ) -> None:
         """Take rules and their numbers.
 
@@ -51,16 +53,18 @@ class AppliedRules:
             low: Least coordinates within the task's bounds, metres.
             high: Largest ones.
             events: See `World.events`.
+            routes: To goals at sites of scenes.
         """
         self.compiled, self._settings, self._objects = rules, settings, objects
         own = [getattr(rewards[t.name], n) for t in rules.rewards for n in t.parameters]
         weights: list[Any] = [rewards[term.name] for term in rules.rewards]
         self._lists = [[float(of.weight) for of in weights], [*own, *parameters], [*numbers]]
         self._bounds = wp.vec3d(*low), wp.vec3d(*high)
-        self._events = events
+        self._events, self._routes = events, routes
         self.written = (*WRITTEN, "places") if events else WRITTEN
         """Fields of states that rules write, besides counts."""
         self._kept = dict[tuple[str, float | None], Any]()
+        self._paths = dict[str, Any]()
 
     def begin(self, state: Any) -> None:
         """Choose what is ahead in states, `ObjectState`, in place."""
@@ -170,6 +174,7 @@ class AppliedRules:
         device, timestep = str(state.places.device), getattr(dynamics, "timestep", None)
         world = self._make_constants(device, timestep)
         self._prepare_events(world, state)
+        self._prepare_paths(world, state)
         objects: Any = world.objects
         objects.places = _warp(state.places, wp.vec3d)
         objects.present, objects.touched = _warp(state.present), _warp(state.touched)
@@ -183,9 +188,10 @@ class AppliedRules:
     def _constants(self, state: Any, timestep: float | None, *, is_kept: bool) -> Any:
         """Return the rules' constants, with no more of states than events need."""
         key = device, timestep = str(state.places.device), timestep
-        if self._events or self.compiled.in_torch or not is_kept:
+        if self._routes or self._events or self.compiled.in_torch or not is_kept:
             world = self._make_constants(device, timestep)
             self._prepare_events(world, state)
+            self._prepare_paths(world, state)
             if self.compiled.in_torch:
                 world.seen = wp.zeros(len(state), dtype=Step, device=device)
             return world
@@ -202,6 +208,18 @@ class AppliedRules:
             objects: Any = world.objects
             objects.moved = _warp(torch.zeros_like(state.places), wp.vec3d)
             world.objects = objects
+
+    def _prepare_paths(self, world: Any, state: Any) -> None:
+        """Give the routes, with those of states, whose memory they share."""
+        if self._routes:
+            device, count = str(state.places.device), len(self._objects)
+            if device not in self._paths:
+                self._paths[device] = make_paths(self._routes, device)
+            paths = self._paths[device]
+            after = count if self._events else 0
+            numbers = state.sampled[:, state.sampled.shape[1] - count - after :][:, :count]
+            paths.numbers = wp.from_torch(numbers)
+            world.paths = paths
 
     def _make_constants(self, device: str, timestep: float | None) -> Any:
         start_warp(device)

@@ -362,6 +362,7 @@ class Rules:
                 constants.seen,
                 constants.struck,
                 constants.gaps,
+                constants.paths,
             )
             motion = Motion()
             motion.before = before[env]

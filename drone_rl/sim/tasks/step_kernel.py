@@ -4,6 +4,7 @@ import warp as wp
 
 from drone_rl.sim.dynamics.rigid_body_kernel import Axes
 from drone_rl.sim.rendering.raytrace.structs_kernel import struct
+from drone_rl.sim.scenes.path_kernel import Paths, path_length
 from drone_rl.sim.tasks.geometry_kernel import (
     GOAL,
     NOTHING,
@@ -126,6 +127,8 @@ class World:
     """
     gaps: wp.array[wp.float64]
     """Distance from each drone's centre to the nearest solid, after the step."""
+    paths: Paths
+    """To goals at sites of scenes; no arrays if there are none."""
 
 
 @wp.struct
@@ -220,6 +223,21 @@ def choose_nearest(world: World, env: int, motion: Motion, axes: Axes, step: Ste
             reach = world.objects.sizes[ahead][1] + world.radius
             world.sides[env, ahead] = side_of(aside, reach)
             world.noted[env, ahead] = aside
+    return seen
+
+
+@wp.func
+def choose_on_path(world: World, env: int, motion: Motion, axes: Axes, step: Step) -> Step:
+    """Do the same with progress along the shortest path through free space."""
+    ahead = world.ahead[env]
+    seen = choose_nearest(world, env, motion, axes, step)
+    if ahead != NOTHING:
+        route = int(world.paths.numbers[env, ahead])
+        if route >= 0:
+            place = world.objects.places[env, ahead]
+            seen.exact_progress = path_length(
+                world.paths, route, place, motion.before
+            ) - path_length(world.paths, route, place, motion.now)
     return seen
 
 

@@ -33,19 +33,9 @@ class Strata:
     phrases: dict[str, str]
     """What follows "goals" in a sentence, by the name of each stratum."""
 
-    def __init__(self, settings: TermTaskSettings) -> None:
-        """Choose bounds for the starts and goals that settings allow."""
-        source = np.random.RandomState(0)
-
-        def draw(of: Any, axes: Sequence[str]) -> Tensor:
-            values = [source.uniform(*of.range_of(axis), size=_SAMPLES) for axis in axes]
-            return torch.from_numpy(np.stack(values, -1))
-
-        start = draw(settings.start, START_AXES)
-        start[:, 3].deg2rad_()
-        goals = [of for of in settings.objects.values() if of.role == "goal"]
-        places = [draw(of, "xyz") for of in goals for _ in range(of.count)]
-        bearing, distance = seen_from_start(start, torch.stack(places, 1))
+    def __init__(self, start: Tensor, places: Tensor) -> None:
+        """Choose bounds for examples of starts and goals; see `seen_from_start`."""
+        bearing, distance = seen_from_start(start, places)
         self.degrees = max(_LEAST_DEGREES, float(bearing.abs().quantile(1 / 3).round()))
         low, middle, high = distance.quantile(torch.tensor([0.1, 0.5, 0.9]).double()).tolist()
         self.metres = float(f"{middle:.2g}") if high > _LEAST_RATIO * low else math.inf
@@ -61,6 +51,20 @@ class Strata:
             return side
         is_far = distance > self.metres
         return 2 * side + torch.where(side == Side.LEFT, ~is_far, is_far).long()
+
+
+def drawn(settings: TermTaskSettings) -> tuple[Tensor, Tensor]:
+    """Return examples of the starts and goals that settings allow; see `seen_from_start`."""
+    source = np.random.RandomState(0)
+
+    def draw(of: Any, axes: Sequence[str]) -> Tensor:
+        values = [source.uniform(*of.range_of(axis), size=_SAMPLES) for axis in axes]
+        return torch.from_numpy(np.stack(values, -1))
+
+    start = draw(settings.start, START_AXES)
+    start[:, 3].deg2rad_()
+    goals = [of for of in settings.objects.values() if of.role == "goal"]
+    return start, torch.stack([draw(of, "xyz") for of in goals for _ in range(of.count)], 1)
 
 
 def seen_from_start(start: Tensor, places: Tensor) -> tuple[Tensor, Tensor]:

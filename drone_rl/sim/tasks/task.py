@@ -87,6 +87,28 @@ class Goals(Batch):
     """Initial conditions of the episode; equal values mean the same episode."""
 
 
+class Oracle(Protocol):
+    """Knows the best action given the true state."""
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """Entries of the information that it reads."""
+        ...
+
+    @property
+    def actions(self) -> Actions:
+        """Actions that it can fly."""
+        ...
+
+    def can_fly(self, actions: Actions) -> bool:
+        """Return whether it can act by these actions."""
+        ...
+
+    def choose(self, worlds: Any, state: Any) -> Tensor:
+        """Return actions in states of `Worlds`. Shape: (N,) and then the entry's."""
+        ...
+
+
 class OracleRule(NamedTuple):
     """The best action given the true state."""
 
@@ -110,6 +132,11 @@ class OracleRule(NamedTuple):
             return action
         same = torch.stack([actions.always(name) for name in self.actions.names])
         return same.to(action.device)[self.actions.part(action)]
+
+    def choose(self, worlds: Any, state: Any) -> Tensor:
+        """See `Oracle`."""
+        info = worlds.info(state)
+        return self.decide([info[name] for name in self.reads], worlds.dynamics.actions)
 
 
 class Task(abc.ABC, Generic[S]):
@@ -144,7 +171,7 @@ class Task(abc.ABC, Generic[S]):
     """Baselines that see nothing: "random", and actions that are always taken, by name."""
     scored: tuple[str, ...] = ("sampled", "end_reason")
     """Entries of an episode's last information that `score` reads."""
-    oracle: OracleRule | None = None
+    oracle: Oracle | None = None
     """The best action given the true state; None if it is unknown."""
     curriculum: Any = None
     """Widens ranges of its episodes in a training, `Curriculum`; None if they stay."""

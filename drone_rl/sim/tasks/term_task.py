@@ -4,7 +4,7 @@ import enum
 import math
 import sys
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -14,20 +14,24 @@ from drone_rl.config.term_task import ObjectSettings, TermTaskSettings
 from drone_rl.config.terms import ENDS, EVENTS, SUCCESSES
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.scenes import load_scene
+from drone_rl.sim.scenes import SceneFile, load_scene
 from drone_rl.sim.tasks.applied_rules import AppliedRules, reward_terms
 from drone_rl.sim.tasks.common import Side
 from drone_rl.sim.tasks.geometry_kernel import GOAL
 from drone_rl.sim.tasks.objects import ObjectState, ObjectTask
+from drone_rl.sim.tasks.path_oracle import PathOracle
 from drone_rl.sim.tasks.rules_kernel import RUNNING, SUCCESS, make_rules
 from drone_rl.sim.tasks.scene_edits import Range, SceneEdits
-from drone_rl.sim.tasks.strata import PHRASES, START_AXES, Strata
+from drone_rl.sim.tasks.step_kernel import choose_nearest, choose_on_path
+from drone_rl.sim.tasks.strata import PHRASES, START_AXES, Strata, drawn
 from drone_rl.sim.tasks.task import Goals, register_task
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.utils.errors import InputError
 
 _MOST_TRIES, _TRIES = 1000, 20
 """Most samples of all objects until none is too near to another one; samples of each object."""
+_EXAMPLES = 300
+"""Episodes that show where starts and goals of a scene are."""
 _LAST_ENDS = ("STEP_LIMIT", "LOST_CONTROL")
 
 
@@ -65,6 +69,22 @@ class Curriculum:
         return is_wider
 
 
+def _routes(s: TermTaskSettings, scenes: Sequence[SceneFile]) -> Any:
+    """Return `Routes`, or None without sites."""
+    if not s.has_sites:
+        return None
+    if not scenes:
+        raise InputError("task.scene=null has no sites of starts and goals; give a scene file")
+    if not any(of.site for of in s.objects.values() if of.role == "goal"):
+        raise InputError(
+            f"task.start.site={s.start.site}, but no goal has a site; give one, too, such as "
+            "task.objects.NAME.site=goal"
+        )
+    from drone_rl.sim.tasks.routes import Routes  # noqa: PLC0415 (scipy's graphs are slow to import)
+
+    return Routes(s, scenes)
+
+
 def _named(settings: TermTaskSettings) -> dict[str, ObjectSettings]:
     """Return the objects of a task by name."""
     return {
@@ -85,6 +105,17 @@ def _has_room(
             return False
     gaps = (np.abs(place - other) - reach - np.array(o.reach) for o, other in placed)
     return of.apart == 0 or all(np.linalg.norm(gap.clip(0)) >= of.apart for gap in gaps)
+
+
+class _AtSites(NamedTuple):
+    """What is at sites in an episode."""
+
+    start: list[float] | None = None
+    """x, y, z, metres, and heading, degrees; None for that of the settings."""
+    places: Mapping[tuple[str, int], Any] = {}
+    """Centres by name and number of the object."""
+    numbers: Sequence[int] = ()
+    """Of the scene, the start, and the route to each object, -1 for none."""
 
 
 class TermTask(ObjectTask):
@@ -110,14 +141,22 @@ class TermTask(ObjectTask):
         )
         named = zip((*ends, success, *(term for _, term in events)), given, strict=True)
         objects = _named(s)
+        self.scenes = tuple(load_scene(path, s.scene_up, s.scene_scale) for path in s.scene or ())
+        self.routes = _routes(s, self.scenes)
+        """Starts, goals and paths at sites of the scenes; None without sites."""
+        low, high = s.low, s.high
+        if self.routes is not None:
+            low, high = self.routes.low - s.margin, self.routes.high + s.margin
+        choose = choose_nearest if self.routes is None else choose_on_path
         rules = AppliedRules(
-            make_rules(reward_terms(s.reward), ends, success, events),
+            make_rules(reward_terms(s.reward), ends, success, events, choose=choose),
             s,
             [*objects.values()],
             rewards=s.reward,
             parameters=[getattr(of, name) for term, of in named for name in term.parameters],
-            low=s.low,
-            high=s.high,
+            low=low,
+            high=high,
+            routes=() if self.routes is None else self.routes.routes,
             events=[
                 i if of.event else -1
                 for i, of in enumerate(kinds)
@@ -126,15 +165,16 @@ class TermTask(ObjectTask):
             ],
         )
         super().__init__(s, objects, rules)
-        self.scenes = tuple(load_scene(path, s.scene_up, s.scene_scale) for path in s.scene or ())
         self.num_sampled = 4 + (4 if events else 3) * len(objects) + bool(self.scenes)
-        x, y, z = (sum(s.start.range_of(axis)) / 2 for axis in "xyz")
-        self.origin = (x, y, z)
+        if self.routes is not None:
+            self.num_sampled += 1 + len(objects)
         own = [term.name.upper() for term in ends]
         reasons: Any = enum.IntEnum("End", ["RUNNING", "SUCCESS", *own, *_LAST_ENDS], start=0)
         self.ends = reasons
         self.truncation = self.expected_end = reasons["STEP_LIMIT"]
-        self._strata = Strata(s)
+        starts, goals = self._drawn()
+        self.origin = tuple(starts[0, :3].tolist())
+        self._strata = Strata(starts, goals)
         self.strata = tuple(self._strata.phrases)
         self.vocabulary = TaskVocabulary(
             tested=f"scenes of the task {s.name}",
@@ -143,8 +183,26 @@ class TermTask(ObjectTask):
             labels={"side": "bearing and distance at the start"},
             **({} if success.name == "all_goals" else _own_success(success.name)),
         )
-        self.edits = self._edits()
+        self.edits = self._edits(starts, goals)
         self.curriculum = Curriculum(s) if s.curriculum else None
+        if self.routes is not None:
+            self._follow(self.routes)
+
+    def _follow(self, routes: Any) -> None:
+        """Let an oracle follow the routes, and refuse actions that can't."""
+        self.oracle = PathOracle(
+            routes.routes,
+            routes.clearances,
+            self.routes_of,
+            radius=routes.radius,
+            step=self.settings.step_length,
+        )
+        if not routes.is_level:
+            self.needed_actions = {
+                "up": "starts and goals are at different heights, where drones that keep theirs do "
+                "not arrive; give actions=moves_full, actions.climb_speed=1 (of actions=velocity), "
+                "or a height for all, such as task.start.z=1.2"
+            }
 
     @property
     def goals(self) -> Tensor:
@@ -170,8 +228,9 @@ class TermTask(ObjectTask):
     def sample(self, random_state: np.random.RandomState) -> Tensor:
         """Sample x, y, z (m) and heading (rad) of the start, then the centres. Shape: (K,).
 
-        The scene's number follows if there are scene files. With events, the last P numbers are
-        the objects' phases, see `Mover`.
+        The scene's number follows if there are scene files; then, if they have sites of starts and
+        goals, the number of the start and of the route to each object, see `Routes`. With events,
+        the last P numbers are the objects' phases, see `Mover`.
 
         Raises:
             InputError: A region has no room left for an object.
@@ -179,14 +238,19 @@ class TermTask(ObjectTask):
         s = self.settings if self.curriculum is None else self.curriculum.ranges
         crowded = ""
         for _ in range(_MOST_TRIES):
-            *start, heading = (random_state.uniform(*s.start.range_of(axis)) for axis in START_AXES)
-            placed, crowded = self._placed(s, start, random_state)
+            at_sites = self._at_sites(s, random_state)
+            start = at_sites.start
+            if start is None:
+                start = [random_state.uniform(*s.start.range_of(axis)) for axis in START_AXES]
+            placed, crowded = self._placed(s, start[:3], random_state, at_sites.places)
             if not crowded:
                 phases = random_state.uniform(
                     size=len(self.each) if self.rules.compiled.events else 0
                 )
-                scene = [random_state.randint(len(self.scenes))] if self.scenes else []
-                begun = [*start, math.radians(heading)]
+                scene = at_sites.numbers
+                if self.scenes and not scene:
+                    scene = [random_state.randint(len(self.scenes))]
+                begun = [*start[:3], math.radians(start[3])]
                 numbers = np.concatenate([begun, *placed, scene, phases])
                 return torch.from_numpy(numbers)
         raise InputError(
@@ -195,15 +259,42 @@ class TermTask(ObjectTask):
             "start; give a larger range of x or y, a smaller apart, or fewer objects"
         )
 
+    def _at_sites(self, s: TermTaskSettings, random_state: np.random.RandomState) -> "_AtSites":
+        """Sample what is at sites of a scene."""
+        if self.routes is None:
+            return _AtSites()
+        scene = random_state.randint(len(self.scenes))
+        places, routes, goal = {}, [], None
+        for name, of in s.objects.items():
+            for i in range(of.count):
+                if not of.site:
+                    routes.append(-1)
+                    continue
+                places[name, i], found = self.routes.place(scene, name, random_state)
+                routes.append(-1 if found is None or of.event else found.route)
+                goal = goal or found
+        start, number = None, 0
+        if s.start.site and goal is not None:
+            place, heading, number = self.routes.start(goal, random_state)
+            start = [*place, heading]
+        return _AtSites(start, places, [scene, number, *routes])
+
     def _placed(
-        self, s: TermTaskSettings, start: Any, random_state: np.random.RandomState
+        self,
+        s: TermTaskSettings,
+        start: Any,
+        random_state: np.random.RandomState,
+        given: Mapping[tuple[str, int], Any],
     ) -> tuple[list[Any], str]:
         """Return centres of the objects, and the name of those that found no room, if any."""
         placed: list[Any] = []
         for name, of in s.objects.items():
-            for _ in range(of.count):
+            for i in range(of.count):
                 for _ in range(_TRIES):
-                    place = np.array([random_state.uniform(*of.range_of(axis)) for axis in "xyz"])
+                    place = given.get((name, i))
+                    if place is None:
+                        at = (random_state.uniform(*of.range_of(axis)) for axis in "xyz")
+                        place = np.array([*at])
                     if _has_room(s, of, place, placed, start):
                         placed.append((of, place))
                         break
@@ -226,6 +317,11 @@ class TermTask(ObjectTask):
     def scene_of(self, state: ObjectState) -> Tensor:
         """See `ObjectTask.scene_of`."""
         return state.sampled[:, 4 + 3 * len(self.each)].long()
+
+    def routes_of(self, state: ObjectState) -> Tensor:
+        """Return the number of the route to each object, -1 for none. Shape: (N, P), int64."""
+        first = 6 + 3 * len(self.each)
+        return state.sampled[:, first : first + len(self.each)].long()
 
     def info(self, state: ObjectState) -> dict[str, Tensor]:
         """See `entries`."""
@@ -254,12 +350,24 @@ class TermTask(ObjectTask):
         stratum = self._strata.of(sampled[:, :4], places).where(info["sides"] >= 0, -1)
         return Goals(reached, stratum, sampled.double())
 
-    def _edits(self) -> SceneEdits:
+    def _drawn(self) -> tuple[Tensor, Tensor]:
+        """Return examples of starts and goals, as `seen_from_start` takes them."""
+        if self.routes is None:
+            return drawn(self.settings)
+        source = np.random.RandomState(0)
+        sampled = torch.stack([self.sample(source) for _ in range(_EXAMPLES)])
+        return sampled[:, :4], self._sampled_places(sampled)[:, self.goals]
+
+    def _edits(self, starts: Tensor, places: Tensor) -> SceneEdits:
         """Return changes of its scenes; random goals are as far ahead as goals ever are."""
         s = self.settings
         goals = [of for of in self.each if of.role == "goal"]
         reach = max(of.reach[1] for of in goals) + 0.5 * self.drone_size
         near = reach + 0.5 * s.step_length
+        if self.routes is not None:
+            far = float((places - starts[:, None, :3]).norm(dim=-1).quantile(0.5))
+            far = Range(near, max(far, near + s.step_length), max(far, 2 * reach))
+            return SceneEdits(self, reach, far, far, course=None)
         far, wide = (
             max(
                 abs(a - b)
