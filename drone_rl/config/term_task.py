@@ -15,6 +15,8 @@ from drone_rl.utils.settings import Settings
 Coordinate = Annotated[Any, Span(Real(-1000.0, 1000.0, unit="m"))]
 Size = Real(0.01, 1000.0, unit="m")
 SiteName = Annotated[str, Text(100)]
+_ALTITUDE = 2.5
+"""Height of starts without sites, metres."""
 ANYWHERE = "anywhere"
 """Name of the sites of a start in free space."""
 ROLES = ("goal", "obstacle", "decoration")
@@ -101,8 +103,8 @@ class StartSettings(Settings):
     """A number, or the range in which each episode draws it."""
     y: Coordinate = 0.0
     """See x."""
-    z: Coordinate | None = 2.5
-    """See x; None for the height of the site, or of the goal if there is no site."""
+    z: Coordinate | None = None
+    """See x; None for 2.5, with sites for the height of the start's or else of the goal's."""
     heading: Annotated[Any, Span(Real(-360.0, 360.0, unit="deg"))] = 0.0
     """To the left of the x axis, or of that of the site."""
     apart: Annotated[float, Real(0.0, 1000.0, unit="m")] = 1.0
@@ -113,7 +115,8 @@ class StartSettings(Settings):
 
     def range_of(self, axis: str) -> tuple[float, float]:
         """Return the lowest and highest value of a coordinate or of the heading."""
-        value = getattr(self, axis) or 0.0  # a site has the height
+        value = getattr(self, axis)
+        value = _ALTITUDE if value is None else value
         return value if isinstance(value, tuple) else (value, value)
 
 

@@ -61,13 +61,17 @@ class FreeSpace:
         """Distances of the centres to the nearest solid, metres."""
         self.margin = _MARGIN * cell
         """Least distance of paths from solids besides the radius, metres."""
-        self.is_free: NDArray[np.bool_] = (
-            self.clearance.values.ravel() >= radius + self.margin
-        )
+        self.is_free: NDArray[np.bool_] = self.clearance.values.ravel() >= radius + self.margin
         """Whether a ball fits at each centre. Shape: (X * Y * Z,)."""
 
     def _grid(self, values: NDArray[Any]) -> Grid:
         return Grid(np.ascontiguousarray(values, np.float32), self._origin, self.cell)
+
+    def numbers_of(self, points: Points) -> NDArray[np.int64]:
+        """Return the numbers of the cells that are nearest to points. (n, 3) to (n,)."""
+        shape = self.clearance.values.shape
+        at = np.rint((points - self._origin) / self.cell).astype(np.int64)
+        return np.ravel_multi_index(tuple(at.clip(0, np.array(shape) - 1).T), shape)
 
     @functools.cached_property
     def _graph(self) -> Any:
@@ -125,9 +129,10 @@ class FreeSpace:
         found[self.is_free] = csgraph.dijkstra(whole, indices=count)[:-1]
         is_reached = np.isfinite(found)
         shape = self.clearance.values.shape
-        away, nearest = ndimage.distance_transform_edt(
+        continued: Any = ndimage.distance_transform_edt(
             ~is_reached.reshape(shape), sampling=self.cell, return_indices=True
         )
+        away, nearest = continued
         return self._grid(found.reshape(shape)[tuple(nearest)] + away), is_reached
 
 

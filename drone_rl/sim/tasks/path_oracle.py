@@ -10,7 +10,7 @@ from torch import Tensor
 
 from drone_rl.sim.actions import MOVE_SETS, PARTS, Actions, DiscreteActions
 from drone_rl.sim.continuous_actions import ContinuousActions
-from drone_rl.sim.dynamics import Dynamics, FlightState, Quadrotor
+from drone_rl.sim.dynamics import Dynamics, FlightState
 from drone_rl.sim.dynamics.control import HEADING
 from drone_rl.sim.dynamics.state import heading_of
 from drone_rl.sim.rendering.devices import start_warp
@@ -19,18 +19,24 @@ from drone_rl.sim.tasks.objects import ObjectState
 
 _DIRECTIONS = 24
 """Headings that a drone with continuous actions compares."""
+_SLOPES = (-1.0, 0.0, 1.0)
+"""Slopes that it compares if it climbs."""
 _BETWEEN = (0.25, 0.5, 0.75, 1.0)
 """Where moves are checked for contacts, as fractions of them."""
 _ROOM = 0.02
 """Metres that the oracle keeps from solids where it can."""
 _DANGER = 100.0
 """Metres of path that a metre too near to solids is worth."""
+_FLYING_ROOM, _FLYING_DANGER = 0.3, 5.0
+"""The same for drones with dynamics, besides."""
 _TURN = 0.01
 """Metres of path that a turn is worth, so that drones turn to the nearer side."""
-_LOOK = 0.3
+_LOOK = 0.5
 """Seconds that a flying drone looks ahead."""
-_SLOW, _FASTEST, _HURRY = 0.6, 2.0, 1.5
+_SLOW, _FASTEST, _HURRY = 0.5, 2.0, 1.0
 """Metres a second next to solids and at most; more of them for each metre of room."""
+_SLOWEST = 0.2
+"""Fraction of the speed at which it flies on in another direction than it has to."""
 _CORRECTION = 1.5
 """How much more than the wanted change of velocity a flying drone commands."""
 
@@ -100,50 +106,54 @@ class PathOracle:
         """Return speeds along the path, slow next to solids, and turns to where it leads."""
         actions: Any = dynamics.actions
         forward, left, turn, climb = actions.speeds
-        body, one = state.body, torch.ones(1, dtype=torch.float64)
-        velocity = body.velocity.double() if isinstance(body, FlightState) else 0 * body.position
-        angles = torch.arange(_DIRECTIONS).double() * (2 * math.pi / _DIRECTIONS)
-        slopes = torch.tensor([-1.0, 0.0, 1.0] if climb else [0.0]).double()
-        steps = torch.stack([one, 0 * one, 0 * one], -1) * self._step
-        steps = _level(steps, angles[None])[0, :, 0]  # (directions, 3)
-        steps = torch.stack([steps + s * torch.tensor([0.0, 0.0, self._step]) for s in slopes], 1)
-        steps = steps.flatten(0, 1) / (1 + slopes.repeat(_DIRECTIONS)[:, None] ** 2).sqrt()
-        cost = self._cost(state, steps.expand(len(state), -1, -1), _LOOK * velocity)
-        way = steps[cost.argmin(1)] / self._step
+        body, flies = state.body, isinstance(state.body, FlightState)
+        velocity = body.velocity.double() if flies else torch.zeros_like(body.position)
+        way = self._way(state, _LOOK * velocity, can_climb=climb > 0)
         routes, places = self._goals(state)
         room = self._at(self._rooms, routes, 0 * places, body.position[:, None])[:, 0]
         speed = (_SLOW + _HURRY * (room - self._radius)).clamp(_SLOW, _FASTEST)
-        wanted = speed[:, None] * way
-        wanted = wanted + _CORRECTION * (wanted - velocity) * isinstance(body, FlightState)
-        heading = heading_of(body.attitude)
-        ahead = torch.atan2(way[:, 1], way[:, 0]) - heading
-        ahead = torch.atan2(ahead.sin(), ahead.cos())
-        x, y = wanted[:, 0], wanted[:, 1]
+        now = velocity.norm(dim=-1)
+        agreeing = ((velocity * way).sum(-1) / now.clamp(min=_SLOW)).clamp(_SLOWEST, 1.0)
+        wanted = torch.where(now > _SLOW, speed * agreeing, speed)[:, None] * way
+        heading, seconds = heading_of(body.attitude), dynamics.timestep or 1.0
+        aim = torch.atan2(way[:, 1], way[:, 0]) - heading
+        aim = torch.atan2(aim.sin(), aim.cos())
+        turned = (aim / (turn * seconds)).clamp(-1, 1) if turn else torch.zeros_like(aim)
+        if flies:  # and turns meanwhile
+            wanted = wanted + _CORRECTION * (wanted - velocity)
+            heading = heading + 0.5 * turned * turn * seconds
+        x, y, up = wanted.unbind(-1)
         along = (heading.cos() * x + heading.sin() * y) / forward
         aside = (heading.cos() * y - heading.sin() * x) / left
         back = actions.backward
-        numbers = [
-            2 * (along.clamp(-back, 1) + back) / (1 + back) - 1,
-            aside.clamp(-1, 1),
-            (ahead / (turn * (dynamics.timestep or 1.0))).clamp(-1, 1) if turn else 0 * ahead,
-            wanted[:, 2] / climb if climb else 0 * ahead,
-        ]
+        ahead = 2 * (along.clamp(-back, 1) + back) / (1 + back) - 1
+        numbers = [ahead, aside, turned, up / climb if climb else up]
         return torch.stack(numbers[: actions.entry.shape[0]], -1).clamp(-1, 1).float()
 
-    def _cost(
-        self, state: ObjectState, moves: Tensor, drift: Tensor | float = 0.0
-    ) -> Tensor:
+    def _way(self, state: ObjectState, drift: Tensor, *, can_climb: bool) -> Tensor:
+        """Return unit vectors along the path, after a drift, (N, 3), metres. Shape: (N, 3)."""
+        angles = torch.arange(_DIRECTIONS).double() * (2 * math.pi / _DIRECTIONS)
+        up = torch.tensor(_SLOPES if can_climb else (0.0,)).double()
+        ways = torch.stack([torch.ones_like(up), torch.zeros_like(up), up], -1)
+        ways = _level(ways / ways.norm(dim=-1, keepdim=True), angles[None])[0].flatten(0, 1)
+        cost = self._cost(state, (self._step * ways).expand(len(state), -1, -1), drift)
+        return ways[cost.argmin(1)]
+
+    def _cost(self, state: ObjectState, moves: Tensor, drift: Tensor | float = 0.0) -> Tensor:
         """Return path lengths after moves, world frame, (N, *, 3); more too near to solids."""
         shape = moves.shape[:-1]
         start = (state.body.position + drift)[:, None]
         flat = moves.flatten(1, -2)
         ends = start + flat
-        between = (start[:, :, None] + flat[:, :, None] * torch.tensor(_BETWEEN)[:, None].double())
+        between = start[:, :, None] + flat[:, :, None] * torch.tensor(_BETWEEN)[:, None].double()
         routes, places = self._goals(state)
         room = self._at(self._rooms, routes, 0 * places, between.flatten(1, 2))
         room = room.unflatten(1, (-1, len(_BETWEEN)))
-        lacking = (self._radius + _ROOM - room.amin(-1)).clamp(min=0)
-        return (self._at(self._paths, routes, places, ends) + _DANGER * lacking).reshape(shape)
+        left = room.amin(-1) - self._radius
+        danger = _DANGER * (_ROOM - left).clamp(min=0)
+        if isinstance(state.body, FlightState):
+            danger = danger + _FLYING_DANGER * (_FLYING_ROOM - left).clamp(min=0)
+        return (self._at(self._paths, routes, places, ends) + danger).reshape(shape)
 
     def _goals(self, state: ObjectState) -> tuple[Tensor, Tensor]:
         """Return the number of the route to each drone's goal, (N,), and its centre, (N, 3)."""
@@ -166,7 +176,7 @@ class PathOracle:
 
 def _turn_of(dynamics: Any) -> float:
     """Return the angle of a discrete turn, radians; 0 for none."""
-    if isinstance(dynamics, Quadrotor):
+    if dynamics.timestep is not None:  # a quadrotor, whose heading drifts
         return float(dynamics.steering.drifts[:, HEADING].max()) * dynamics.timestep
     return float(2 * torch.atan2(*dynamics.turns.flip(-1).unbind(-1)).max())
 

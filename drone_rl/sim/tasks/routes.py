@@ -54,6 +54,8 @@ class Goal(NamedTuple):
     """Number of its route."""
     starts: dict[int, Place]
     """By number of the start, see `Routes.start_names`."""
+    most_metres: float
+    """Length of the longest path from a start."""
 
 
 class Routes:
@@ -95,9 +97,7 @@ class Routes:
         goal = goals[random_state.randint(len(goals))]
         return goal.place.draw(random_state), goal
 
-    def start(
-        self, goal: Goal, random_state: np.random.RandomState
-    ) -> tuple[Point, float, int]:
+    def start(self, goal: Goal, random_state: np.random.RandomState) -> tuple[Point, float, int]:
         """Sample a start from where paths lead to a goal: its place, heading (degrees), number."""
         numbers = [*goal.starts]
         number = numbers[random_state.randint(len(numbers))]
@@ -107,6 +107,7 @@ class Routes:
         return place.draw(random_state), at_site + heading, number
 
     def _find(self, number: int, scene: SceneFile) -> None:
+        """Find what is in a scene."""
         s, where = self._settings, f"scene={scene.path}"
         if not any(scene.solid):
             raise InputError(
@@ -121,36 +122,47 @@ class Routes:
         def distances(points: NDArray[np.float64]) -> NDArray[np.float64]:
             return solids.distances(torch.from_numpy(points)).numpy()
 
-        starts = self._starts(scene, where)
-        first = len(self.start_names)
-        self.start_names += [site.name if site else ANYWHERE for site in starts]
-        objects = {name: of for name, of in s.objects.items() if of.site}
-        sites = {n: _sites(scene, of.site, f"task.objects.{n}", where) for n, of in objects.items()}
-        goals = [(n, at) for n, of in objects.items() if of.role == "goal" for at in sites[n]]
-        levels = {at.name: self._altitude(starts, at, objects[name]) for name, at in goals}
-        num_goals = sum(of.count for of in objects.values() if of.role == "goal")
-        if num_goals > 1 and len({*levels.values()}) > 1:
-            levels = dict.fromkeys(levels)
-        spaces = {
-            level: FreeSpace(distances, low, high, self.radius, level)
-            for level in {*levels.values()}
+        first, found = len(self.start_names), self._starts(scene, where)
+        self.start_names += [site.name if site else ANYWHERE for site in found]
+        starts = dict(enumerate(found, first))
+        sites = {
+            name: _sites(scene, of.site, f"task.objects.{name}", where)
+            for name, of in s.objects.items()
+            if of.site
         }
-        for name, of in objects.items():
-            if of.role != "goal":
-                self._others[number, name] = [_region(site) for site in sites[name]]
-        for name, at in goals:
-            space = spaces[levels[at.name]]
-            self.is_level &= space.is_level
-            goal = self._goal(space, distances, at, objects[name], dict(enumerate(starts, first)), where)
+        goals = []
+        for name, of in sites.items():
+            if s.objects[name].role == "goal":
+                goals += [(name, site) for site in of]
+            else:
+                self._others[number, name] = [_region(site) for site in of]
+        levels = self._altitudes(found, goals)
+        spaces = {level: FreeSpace(distances, low, high, self.radius, level) for level in {*levels}}
+        for (name, site), level in zip(goals, levels, strict=True):
+            self.is_level &= level is not None
+            size = s.objects[name].half_size[0]
+            goal = self._goal(spaces[level], distances, site, size, starts, where)
             self.goals.setdefault((number, name), []).append(goal)
-        for start, site in enumerate(starts, first):
-            if not any(start in goal.starts for of in self.goals.values() for goal in of):
+        every = [goal for (scene, _), of in self.goals.items() if scene == number for goal in of]
+        self._check_limit(every, where)
+        for start in starts:
+            if not any(start in goal.starts for goal in every):
                 raise InputError(
                     f"{where}: no path of a drone of {s.drone_size:g} m leads from "
-                    f"{self.start_names[start] if site else 'any free place'} to "
-                    f"{', '.join(at.name for _, at in goals)}; open a wider way, move a site, or "
-                    "give a smaller task.drone_size"
+                    f"{self.start_names[start]} to {' or '.join(site.name for _, site in goals)}; "
+                    "open a wider way, move a site, or give a smaller task.drone_size"
                 )
+
+    def _check_limit(self, goals: Sequence[Goal], where: str) -> None:
+        """Refuse a step limit that is too small for most paths."""
+        s = self._settings
+        steps = [goal.most_metres / s.step_length for goal in goals]
+        if max(steps) > s.step_limit:
+            raise InputError(
+                f"{where}: the way to a goal is up to {max(steps) * s.step_length:.0f} m, "
+                f"{max(steps):.0f} moves of task.step_length={s.step_length:g}, but "
+                f"task.step_limit={s.step_limit}; give more steps or longer ones"
+            )
 
     def _starts(self, scene: SceneFile, where: str) -> list[Site | None]:
         """Return the sites of starts; None stands for all free space."""
@@ -161,10 +173,18 @@ class Routes:
             return [None]
         return [*_sites(scene, prefix, "task.start", where)]
 
+    def _altitudes(
+        self, starts: Sequence[Site | None], goals: Sequence[tuple[str, Site]]
+    ) -> list[float | None]:
+        """Return the heights at which drones reach goals from all starts; None if they climb."""
+        objects = self._settings.objects
+        levels = [self._altitude(starts, site, objects[name]) for name, site in goals]
+        count = sum(objects[name].count for name in {name for name, _ in goals})
+        return levels if count == 1 or len({*levels}) == 1 else [None] * len(levels)
+
     def _altitude(
         self, starts: Sequence[Site | None], goal: Site, of: ObjectSettings
     ) -> float | None:
-        """Return the height at which drones reach a goal from all starts; None if they climb."""
         heights = {round(self._height(start, goal), 6) for start in starts}
         low, high = self._settings.start.range_of("z")
         height = heights.pop()
@@ -185,11 +205,11 @@ class Routes:
         space: FreeSpace,
         distances: Distances,
         site: Site,
-        of: ObjectSettings,
+        size: float,
         starts: dict[int, Site | None],
         where: str,
     ) -> Goal:
-        """Return a goal, with its route and the starts that lead to it."""
+        """Return a goal of a size, with its route and the starts that lead to it."""
         center = np.array(site.position)
         away = np.linalg.norm(space.centers - center, axis=1)
         is_point = not any(site.half_size[:2])
@@ -197,7 +217,7 @@ class Routes:
             room = float(distances(center[None])[0]) - space.radius - space.margin
             is_source = space.is_free & (away <= room)
             if not is_source.any():
-                is_source = space.is_free & (away < space.radius + of.half_size[0])
+                is_source = space.is_free & (away < space.radius + size)
             place, ahead = Place(center[None]), away[is_source]
         else:
             inside = np.append(site.half_size[:2], np.inf)
@@ -221,7 +241,11 @@ class Routes:
             for number, start in starts.items()
         }
         leading = {number: place for number, place in found.items() if len(place.points)}
-        return Goal(place, len(self.routes) - 1, leading)
+        numbers = space.numbers_of(
+            np.concatenate([np.empty((0, 3)), *(of.points for of in leading.values())])
+        )
+        most = float(lengths.values.ravel()[numbers].max(initial=0.0))
+        return Goal(place, len(self.routes) - 1, leading, most)
 
     def _start(
         self,

@@ -80,7 +80,7 @@ def _routes(s: TermTaskSettings, scenes: Sequence[SceneFile]) -> Any:
             f"task.start.site={s.start.site}, but no goal has a site; give one, too, such as "
             "task.objects.NAME.site=goal"
         )
-    from drone_rl.sim.tasks.routes import Routes  # noqa: PLC0415 (scipy's graphs are slow to import)
+    from drone_rl.sim.tasks.routes import Routes  # scipy's graphs are slow to import
 
     return Routes(s, scenes)
 
