@@ -34,7 +34,7 @@ class ReachSettings(TermTaskSettings):
     each episode draws."""
     objects: dict[str, ObjectSettings] = {"goal": _GOAL}
     """Objects by name; the goal is at the sites whose names begin with goal."""
-    start: ReachStartSettings = ReachStartSettings()
+    start: ReachStartSettings = ReachStartSettings()  # pyright: ignore[reportIncompatibleVariableOverride] (settings are frozen)
     """Where the drone starts."""
     reward: Rewards = {"progress": 0.3, "reached": 2.0, "contact": -1.0, "time": -0.01}  # pyright: ignore[reportAssignmentType] (read)
     """Its terms by name, with weights; progress is along the shortest path."""

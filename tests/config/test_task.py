@@ -17,7 +17,10 @@ def test_plain_data_names_its_task_or_is_cube_collection():
         assert BaseTaskSettings.read(settings.values(), "task") == settings
     assert BaseTaskSettings.read({"name": "pillars"}, "task") == PillarsSettings()
     for values, message in (
-        ({"name": "walls"}, r"task\.name='walls': it must be one of collect_cubes, pillars; "),
+        (
+            {"name": "walls"},
+            r"task\.name='walls': it must be one of collect_cubes, pillars, reach; ",
+        ),
         ({"name": "pillars", "num_cubes": 3}, r"task\.num_cubes is unknown; valid names: num_rows"),
         ({"name": "pillars", "num_rows": 0}, r"task\.num_rows=0: it must be a whole number"),
     ):

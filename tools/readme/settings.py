@@ -1,6 +1,7 @@
 """Tables of all settings in Markdown: allowed values, unit, default and meaning."""
 
 import typing
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from drone_rl.cli.main import COMMANDS, find_command
 from drone_rl.config import TASKS, BaseTaskSettings
 from drone_rl.config.configuration import Changes
 from drone_rl.config.parts import Part
+from drone_rl.config.reach import ReachStartSettings
 from drone_rl.config.terms import ALL_TERMS
 from drone_rl.sim.tasks import shipped_terms_kernel as shipped
 from drone_rl.utils.schema import OneOf, Several, Span
@@ -27,6 +29,8 @@ from drone_rl.utils.settings import (
 BAR = "&#124;"
 """A bar within a cell."""
 _TASK = "task"
+_NESTED = (ReachStartSettings,)
+"""Settings inside of others, whose tables contain them."""
 _HEAD = "| setting | values | unit | default | meaning |\n| --- | --- | --- | --- | --- |"
 
 
@@ -107,13 +111,22 @@ def make_table(cls: type[Settings], prefix: str = "") -> str:
         cls: The class.
         prefix: Before the name of each, such as "task.".
     """
-    defaults, words = cls(), meanings(cls)
-    rows = [
-        f"| `{prefix}{name}` | {_may_be(hint)} | {unit_of(hint)} | "
-        f"{_shown(getattr(defaults, name))} | {words[name].replace('|', BAR)} |"
-        for name, hint in hints_of(cls).items()
-    ]
-    return "\n".join([_HEAD, *rows])
+    return "\n".join([_HEAD, *_rows(cls(), prefix)])
+
+
+def _rows(defaults: Settings, prefix: str) -> Iterator[str]:
+    words = meanings(type(defaults))
+    for name, hint in hints_of(type(defaults)).items():
+        value = getattr(defaults, name)
+        inner = {name: value} if isinstance(value, Settings) else value
+        if typing.get_origin(hint) is dict or type(value) in _NESTED:
+            for inside, settings in inner.items():
+                path = inside if inside == name else f"{name}.{inside}"
+                yield from _rows(settings, f"{prefix}{path}.")
+        else:
+            meaning = words[name].replace("|", BAR)
+            range_of = f"{_may_be(hint)} | {unit_of(hint)} | {_shown(value)}"
+            yield f"| `{prefix}{name}` | {range_of} | {meaning} |"
 
 
 def first_comment(path: Path) -> str:

@@ -71,7 +71,7 @@ class FreeSpace:
         """Return the numbers of the cells that are nearest to points. (n, 3) to (n,)."""
         shape = self.clearance.values.shape
         at = np.rint((points - self._origin) / self.cell).astype(np.int64)
-        return np.ravel_multi_index(tuple(at.clip(0, np.array(shape) - 1).T), shape)
+        return np.array(np.ravel_multi_index(tuple(at.clip(0, np.array(shape) - 1).T), shape))
 
     @functools.cached_property
     def _graph(self) -> Any:

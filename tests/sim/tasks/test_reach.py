@@ -1,6 +1,7 @@
 """Reaching goals in scenes: starts, paths by hand, the oracle, and what can't work."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ def reach(*paths, **changes):
     return BaseTaskSettings.read({"name": "reach", "scene": [*map(str, paths)], **changes}, "task")
 
 
-def begun(settings, count, actions=TURNING, dynamics=None):
+def begun(settings, count, actions=TURNING, dynamics=None) -> Any:
     made = Worlds(count, settings, actions=actions, dynamics=dynamics)
     made.reset(torch.arange(count), [np.random.RandomState(i) for i in range(count)])
     return made

@@ -5,15 +5,14 @@ import math
 import torch
 
 from drone_rl.config.term_task import TermTaskSettings
-from drone_rl.sim.tasks.strata import Strata
+from drone_rl.sim.tasks.strata import Strata, drawn
 
 
 def strata(goal, **start):
     objects = {"goal": {"role": "goal", **goal}}
     terms = {"reward": {"reached": 1.0}, "success": ["all_goals"]}
-    return Strata(
-        TermTaskSettings.read({"objects": objects, "start": {"z": 2.0, **start}, **terms})
-    )
+    settings = {"objects": objects, "start": {"z": 2.0, **start}, **terms}
+    return Strata(*drawn(TermTaskSettings.read(settings)))
 
 
 def test_bearing_is_from_the_heading_and_distance_from_the_start():
