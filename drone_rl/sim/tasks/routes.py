@@ -1,5 +1,6 @@
 """Starts and goals at the sites of scene files, and the paths between them."""
 
+import functools
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -12,7 +13,7 @@ from drone_rl.config.term_task import ANYWHERE, ObjectSettings, TermTaskSettings
 from drone_rl.sim.scenes import SceneFile, Site
 from drone_rl.sim.scenes.free_space import Distances, FreeSpace
 from drone_rl.sim.scenes.path_kernel import Grid, Route
-from drone_rl.sim.scenes.solids import Solids
+from drone_rl.sim.scenes.solids import solids_of
 from drone_rl.utils.errors import InputError
 
 Point = NDArray[np.float64]
@@ -117,7 +118,7 @@ class Routes:
         places = [np.array(site.position) for site in scene.sites]
         low, high = np.min([low, *places], 0), np.max([high, *places], 0)
         self.low, self.high = np.minimum(self.low, low), np.maximum(self.high, high)
-        solids = Solids([scene])
+        solids = solids_of((scene,), "cpu")
 
         def distances(points: NDArray[np.float64]) -> NDArray[np.float64]:
             return solids.distances(torch.from_numpy(points)).numpy()
@@ -288,6 +289,12 @@ class Routes:
                 "smaller task.drone_size or task.start.apart"
             )
         return place
+
+
+@functools.lru_cache(8)
+def find_routes(settings: TermTaskSettings, scenes: tuple[SceneFile, ...]) -> Routes:
+    """Return the routes of a task, the same ones for the same settings and scenes."""
+    return Routes(settings, scenes)
 
 
 def _sites(scene: SceneFile, prefix: str, setting: str, where: str) -> list[Site]:

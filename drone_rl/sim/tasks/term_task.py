@@ -80,9 +80,9 @@ def _routes(s: TermTaskSettings, scenes: Sequence[SceneFile]) -> Any:
             f"task.start.site={s.start.site}, but no goal has a site; give one, too, such as "
             "task.objects.NAME.site=goal"
         )
-    from drone_rl.sim.tasks.routes import Routes  # scipy's graphs are slow to import
+    from drone_rl.sim.tasks.routes import find_routes  # scipy's graphs are slow to import
 
-    return Routes(s, scenes)
+    return find_routes(s, scenes)
 
 
 def _named(settings: TermTaskSettings) -> dict[str, ObjectSettings]:
