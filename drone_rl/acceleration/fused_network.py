@@ -16,9 +16,10 @@ from drone_rl.acceleration.packed_layers import (
     Reasons,
     odd_lines,
     packed_layers,
+    starts,
     unsupported,
 )
-from drone_rl.policies.networks import ImageNetwork, PolicyNetwork
+from drone_rl.policies.networks import ImageNetwork, InputsNetwork, PolicyNetwork
 from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
 
 MAX_WEIGHTS = 2**20
@@ -32,7 +33,7 @@ class Recording(NamedTuple):
     """Outputs of all layers for the observations of one batch."""
 
     pixels: Tensor
-    """Observations, by identity. Shape: (k, C, H, W)."""
+    """Observations, by identity: images, then vectors. Shape: (k, *)."""
     version: int
     """Counter of the changes of `pixels` in place."""
     weights: Tensor
@@ -66,7 +67,7 @@ class ActivationRecorder:
             self.recording = Recording(pixels, pixels._version, weights, rows.int())
 
     def find(self, pixels: Tensor, weights: Tensor) -> Tensor | None:
-        """Return the rows in `outputs` of contiguous observations (k, C * H * W), if they have any.
+        """Return the rows in `outputs` of contiguous observations, (k, numbers), if they have any.
 
         `weights` are the packed weights, which must be those that gave the outputs.
         """
@@ -91,14 +92,16 @@ class FusedNetwork(ImageNetwork):
 
     def __init__(
         self,
-        network: PolicyNetwork,
+        network: PolicyNetwork | InputsNetwork,
         num_threads: int = 1,
         *,
         wrt: Wrt = "weights",
         activations: ActivationRecorder | None = None,
+        critic: nn.Linear | None = None,
     ) -> None:
         super().__init__()
         self.network, self.in_shape, self.actions = network, network.in_shape, network.actions
+        self.in_keys, self._critic = network.in_keys, critic
         self._num_threads, self._activations = num_threads, activations
         self._wrt: Wrt = wrt
         self._engine: _Engine | None = None
@@ -114,34 +117,55 @@ class FusedNetwork(ImageNetwork):
         *,
         wrt: Wrt = "weights",
         activations: ActivationRecorder | None = None,
+        critic: nn.Linear | None = None,
     ) -> Self | Reasons:
         """Return the fused network, or the reasons why the kernel does not support the network.
 
         Args:
-            network: Network from pixels to logits.
+            network: Network from inputs to logits.
             num_threads: Threads that share the observations; it affects the rounding of sums.
             wrt: Differentiate with respect to the weights, or to the pixels with fixed weights.
             activations: Those of `FusedEpisodes`, which batches from it need not compute again.
+            critic: A layer on the features of the last one, whose outputs follow the logits.
         """
         reasons = unsupported(network)
-        if not reasons and wrt == "pixels" and not packed_layers(network)[0].has_transpose:
-            reasons.append(f"the first layer's inputs are not a multiple of {WIDTH}")
+        if not reasons and wrt == "pixels":
+            if isinstance(network, InputsNetwork):
+                reasons.append("gradients of several inputs are not fused")
+            elif not packed_layers(network)[0].has_transpose:
+                reasons.append(f"the first layer's inputs are not a multiple of {WIDTH}")
         num_weights = sum(p.numel() for p in network.parameters())
         if num_weights > MAX_WEIGHTS:
             reasons.append(f"{num_weights} weights are more than {MAX_WEIGHTS}")
-        if reasons or not isinstance(network, PolicyNetwork):
+        if reasons or not isinstance(network, PolicyNetwork | InputsNetwork):
             return Reasons(reasons)
-        return cls(network, num_threads, wrt=wrt, activations=activations)
+        return cls(network, num_threads, wrt=wrt, activations=activations, critic=critic)
 
-    def forward(self, pixels: Tensor) -> Tensor:
-        """Return the logits of pixels (*, C, H, W)."""
+    def forward(self, *inputs: Tensor) -> Tensor:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Return the logits of inputs in the order of `in_keys`, each (*, its shape)."""
         if self._engine is None:
-            packed = PackedNetwork(self.network)
+            packed = PackedNetwork(self.network, critic=self._critic)
             self._engine = _Engine(packed, self._num_threads, self._wrt, self._activations)
-        self.network.check(pixels)
-        flat = pixels.reshape(-1, math.prod(self.in_shape)).contiguous()
+        self.network.check(*inputs)
+        shapes = getattr(self.network, "in_shapes", {self.in_keys[0]: self.in_shape})
+        batch = inputs[0].shape[: inputs[0].ndim - len(shapes[self.in_keys[0]])]
+        named = sorted(zip(shapes.values(), inputs, strict=True), key=lambda of: len(of[0]) == 1)
+        flat = joined([values.reshape(-1, math.prod(shape)) for shape, values in named])
         parameters = self._engine.packed.parameters if self._wrt == "weights" else ()
-        return _Logits.apply(self._engine, flat, *parameters).reshape(*pixels.shape[:-3], -1)
+        return _Logits.apply(self._engine, flat, *parameters).reshape(*batch, -1)
+
+
+def joined(parts: list[Tensor]) -> Tensor:
+    """Return parts, (k, sizes), side by side; a view if they are parts of one tensor."""
+    first, sizes = parts[0], [part.shape[1] for part in parts]
+    total, memory = sum(sizes), first.untyped_storage().data_ptr()
+    is_view = all(
+        part.untyped_storage().data_ptr() == memory
+        and part.stride() == (total, 1)
+        and part.storage_offset() == first.storage_offset() + start
+        for part, start in zip(parts, starts(sizes), strict=True)
+    )
+    return first.as_strided((len(first), total), (total, 1)) if is_view else torch.cat(parts, 1)
 
 
 def with_fused_passes(
@@ -202,17 +226,17 @@ class _Engine:
         self.packed, self._activations = packed, activations
         self._has_fixed_weights = wrt == "pixels"
         self._workers = WorkerPool(num_threads, num_threads)
-        convolutions = [layer for layer in packed.layers if layer.is_convolution]
         self._logits_offset, self._size = packed.offsets.outputs[-2:]
         params = self._params = PackedParams()
         params.layers, params.transposed = packed.arrays, packed.transposed
         params.transposed_weights = wp.from_torch(packed.transposed_weights)
-        features_offset = packed.offsets.kept[len(convolutions) - 1]
+        branches = packed.layers[: packed.arrays.num_branch_layers]
+        features_offset = packed.offsets.starts[len(branches) - 1]
         params.inputs_stride = odd_lines(self._logits_offset - features_offset)
         sizes = {
             "deltas": int(BLOCK) * self._size,
             "inputs": int(BLOCK) * params.inputs_stride,
-            "patches": max(c.num_inputs * math.prod(c.output_shape) for c in convolutions),
+            "patches": max(la.num_inputs * math.prod(la.output_shape) for la in branches),
         }
         num_gradients = 0 if self._has_fixed_weights else len(packed.weights)
         self._gradients = torch.empty(self._workers.size, num_gradients)
@@ -248,7 +272,8 @@ class _Engine:
 
     def logits(self, outputs: _Outputs) -> Tensor:
         """Return the outputs of the last layer. Shape: (num_observations, num_actions)."""
-        last = self._logits_offset + torch.arange(len(self.packed.layers[-1].layer.weight))
+        count = sum(len(module.weight) for module in self.packed.layers[-1].modules)
+        last = self._logits_offset + torch.arange(count)
         return outputs.values.take(outputs.rows[:, None].long() * self._size + last)
 
     def gradients(self, pixels: Tensor, outputs: _Outputs, grad_output: Tensor) -> list[Tensor]:

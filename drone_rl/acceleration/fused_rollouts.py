@@ -1,7 +1,5 @@
 """Runs a fixed number of steps of each environment in the fused kernel."""
 
-from typing import Any
-
 import torch
 import warp as wp
 from torch import Tensor
@@ -9,7 +7,6 @@ from torch import Tensor
 from drone_rl.acceleration.fused_episodes import END_REASON, PAID, REWARD, FusedEpisodes
 from drone_rl.envs.drone_env import Entries
 from drone_rl.policies.networks import require_finite
-from drone_rl.sim.rendering.raytrace.structs_kernel import Images
 from drone_rl.sim.tasks import State
 
 
@@ -29,17 +26,15 @@ class FusedRollouts(FusedEpisodes):
 
         Returns:
             The entries of the steps, (N, T, *): `REWARD`, `END_REASON`, `PAID` of several terms,
-            "pixels", ("next", "pixels"), "logits" and the action; and the states after them.
+            the inputs by name, also below "next", "logits" and the action; and the states after
+            them.
         """
         env, rules, count, length = self._env, self._rules, len(state), self._length
         self._prepare(state)
-        self._transforms.begin(starts)
+        self._inputs.begin(starts)
         rollout, opened = self._open(count, 0, ())
-        pixels = opened["pixels"]
-        after = torch.empty_like(pixels)
-        frames: Any = Images()
-        frames.gray = wp.from_torch(after.flatten(2).flatten(0, 1))
-        rollout.next_frames, rollout.next_observations = frames, wp.from_torch(after.flatten(1))
+        after = torch.empty_like(opened["observations"])
+        rollout.next_frames, rollout.next_observations = self._frames(after), wp.from_torch(after)
         begins = torch.zeros(count, dtype=torch.int32)
         rollout.begins = wp.from_torch(begins)
         paid = torch.zeros(count, length, rules.paid(count).shape[1])
@@ -51,24 +46,24 @@ class FusedRollouts(FusedEpisodes):
             if len(ended):
                 paid[ended, begins[ended].long() - 1] = rules.paid(count)[ended]
                 rules.begin(env.start(ended), ended)
-                self._transforms.begin(ended)
+                self._inputs.begin(ended)
                 if env.appearances.varies:
-                    self._look(env.worlds.state)
-                    rollout.camera = self._camera
+                    self._inputs.look(rollout, env, env.worlds.state)
         require_finite(opened["logits"], self._owner)
         by_env = {name: values.unflatten(0, (count, length)) for name, values in opened.items()}
-        end_reason, seen = by_env["end_reason"].long(), by_env["pixels"]
-        if self._num_frames > 1:
-            self.last_observations[:] = seen[:, -1].flatten(1)
+        end_reason, seen = by_env["end_reason"].long(), by_env["observations"]
+        if self._inputs.num_frames > 1:
+            self.last_observations[:] = seen[:, -1]
         after = after.unflatten(0, (count, length))
         following = torch.cat([seen[:, 1:], after[:, -1:]], 1)
         following[end_reason != 0] = after[end_reason != 0]
-        action = by_env["action"]
+        action, inputs = by_env["action"], self._inputs
+        following = inputs.by_name(inputs.seen(following))
         entries: Entries = {
             REWARD: by_env["reward"].clone(),
             END_REASON: end_reason,
-            "pixels": self._seen(seen).clone(),
-            ("next", "pixels"): self._seen(following),
+            **inputs.by_name(inputs.seen(seen).clone()),
+            **{("next", name): values for name, values in following.items()},
             "logits": by_env["logits"].clone(),
             "action": action.clone() if self._is_continuous else action.long(),
         }

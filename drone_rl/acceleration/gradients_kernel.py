@@ -13,8 +13,8 @@ from drone_rl.acceleration.layers_kernel import (
     copy,
     multiply,
     row_size,
-    run_convolutions,
-    run_linear,
+    run_branches,
+    run_trunk,
 )
 
 _TILES = (
@@ -172,7 +172,7 @@ class PackedParams:
     """Of each layer, from gradients of outputs to those of patches, without offsets."""
     transposed_weights: wp.array[float]
     inputs_stride: int
-    """Stride between the linear layers' inputs of two frames in `Workspace.inputs`."""
+    """Stride between the inputs of the trunk of two frames in `Workspace.inputs`."""
 
 
 @wp.struct
@@ -180,7 +180,7 @@ class FrameBatch:
     """Frames with outputs and gradients."""
 
     frames: wp.array2d[float]
-    """Channels first. Shape: (num_frames, channels * pixels)."""
+    """Observations: images, channels first, then vectors. Shape: (num_frames, numbers)."""
     outputs: wp.array[float]
     """Outputs of all layers, row after row, as `forward` writes them."""
     rows: wp.array[int]
@@ -198,9 +198,9 @@ class Workspace:
     deltas: wp.array[float]
     """Gradients with respect to the outputs of all layers."""
     inputs: wp.array[float]
-    """Inputs of the linear layers, side by side."""
+    """Inputs of the trunk's layers, side by side."""
     patches: wp.array[float]
-    """Gradients with respect to the patches of one convolution."""
+    """Gradients with respect to the patches of one layer of a branch."""
     gradients: wp.array[float]
     """Accumulates the gradient with respect to the weights; empty if it is not needed."""
 
@@ -211,14 +211,16 @@ def forward(first: int, last: int, params: PackedParams, batch: FrameBatch) -> N
     for block in range(first, last, BLOCK):
         end = wp.min(block + BLOCK, last)
         for frame in range(block, end):
-            run_convolutions(params.layers, batch.frames[frame], batch.outputs, frame)
-        run_linear(params.layers, batch.outputs, block, end - block)
+            run_branches(params.layers, batch.frames[frame], batch.outputs, frame)
+        run_trunk(params.layers, batch.outputs, block, end - block)
 
 
 @wp.func
-def _stride(layers: Layers, layer: int) -> int:
-    """Numbers of the outputs of a layer after pooling, with padding."""
-    return layers.output_offsets[layer + 1] - layers.kept_offsets[layer]
+def _delta_at(layers: Layers, layer: int, row: int) -> int:
+    """Return where the gradients with respect to a layer's outputs after pooling are."""
+    start = layers.starts[layer]
+    at = BLOCK * start + layers.kept_offsets[layer] - start
+    return at + row * layers.strides[layer]
 
 
 @wp.func
@@ -242,26 +244,26 @@ def backward(
             _begin(params, frame, block, batch, workspace)
         for i in range(layers.geometries.shape[0]):
             layer = layers.geometries.shape[0] - 1 - i
-            if layer >= layers.num_convolutions:
-                _linear(params, layer, end - block, workspace)
+            if layer >= layers.num_branch_layers:
+                _trunk_layer(params, layer, end - block, workspace)
             else:
                 for frame in range(block, end):
-                    _convolution(params, layer, frame, block, batch, workspace)
+                    _branch_layer(params, layer, frame, block, batch, workspace)
 
 
 @wp.func
 def _begin(
     params: PackedParams, frame: int, block: int, batch: FrameBatch, workspace: Workspace
 ) -> None:
-    """Write the inputs of a frame's linear layers, and the logits' gradient padded with zeros."""
+    """Write the inputs of a frame's trunk layers, and the logits' gradient padded with zeros."""
     layers = params.layers
-    inputs_offset = layers.kept_offsets[layers.num_convolutions - 1]
+    inputs_offset = layers.kept_offsets[layers.sources[layers.num_branch_layers]]
     top = layers.geometries.shape[0] - 1
     row = frame - block
     source = batch.rows[frame] * row_size(layers) + inputs_offset
     size = layers.output_offsets[top] - inputs_offset
     copy(batch.outputs, source, workspace.inputs, row * params.inputs_stride, size)
-    at = BLOCK * layers.output_offsets[top] + row * _stride(layers, top)
+    at = _delta_at(layers, top, row)
     for action in range(layers.geometries[top].num_outs):
         gradient = float(0.0)
         if action < batch.grad_output.shape[1]:
@@ -270,27 +272,28 @@ def _begin(
 
 
 @wp.func
-def _linear(params: PackedParams, layer: int, count: int, workspace: Workspace) -> None:
-    """Compute the gradients with respect to a linear layer's weights and inputs."""
+def _trunk_layer(params: PackedParams, layer: int, count: int, workspace: Workspace) -> None:
+    """Compute the gradients with respect to the weights and inputs of a layer of the trunk."""
     layers = params.layers
-    first = layers.kept_offsets[layers.num_convolutions - 1]
-    inputs_offset = layers.kept_offsets[layer - 1] - first
+    source = layers.sources[layer]
+    first = layers.kept_offsets[layers.sources[layers.num_branch_layers]]
+    inputs_offset = layers.kept_offsets[source] - first
     if workspace.gradients.shape[0] > 0:
         g = layers.geometries[layer]  # the frames' inputs, side by side, are its patches
         g.input_offset = inputs_offset
-        g.output_offset = BLOCK * layers.output_offsets[layer]
+        g.output_offset = _delta_at(layers, layer, 0)
         g.num_patches = count
         g.patches_per_row = count
         g.row_stride = 0
         g.column_stride = params.inputs_stride
-        g.output_stride = _stride(layers, layer)
+        g.output_stride = layers.strides[layer]
         add_weight_gradients(workspace.inputs, workspace.deltas, workspace.gradients, g)
     transposed = params.transposed[layer]
-    transposed.input_offset = BLOCK * layers.output_offsets[layer]
-    transposed.output_offset = BLOCK * layers.kept_offsets[layer - 1]
+    transposed.input_offset = _delta_at(layers, layer, 0)
+    transposed.output_offset = _delta_at(layers, source, 0)
     transposed.num_patches = count
-    transposed.row_stride = _stride(layers, layer)
-    transposed.output_stride = _stride(layers, layer - 1)
+    transposed.row_stride = layers.strides[layer]
+    transposed.output_stride = layers.strides[source]
     multiply(workspace.deltas, params.transposed_weights, workspace.deltas, transposed)
     for row in range(count):
         delta = transposed.output_offset + row * transposed.output_stride
@@ -299,7 +302,7 @@ def _linear(params: PackedParams, layer: int, count: int, workspace: Workspace) 
 
 
 @wp.func
-def _convolution(
+def _branch_layer(
     params: PackedParams,
     layer: int,
     frame: int,
@@ -307,38 +310,36 @@ def _convolution(
     batch: FrameBatch,
     workspace: Workspace,
 ) -> None:
-    """Compute the gradients with respect to a convolution's weights and input, for one frame."""
+    """Do the same for a layer of a branch and one frame."""
     layers = params.layers
     row = frame - block
     frame_at = batch.rows[frame] * row_size(layers)
-    input_offset = int(0)
-    if layer > 0:
-        input_offset = frame_at + layers.kept_offsets[layer - 1]
+    source = layers.sources[layer]
     g = layers.geometries[layer]
-    g.input_offset = input_offset
-    kept_delta_at = BLOCK * layers.kept_offsets[layer] + row * _stride(layers, layer)
+    if source >= 0:
+        g.input_offset = frame_at + layers.kept_offsets[source]
+    kept_delta_at = _delta_at(layers, layer, row)
     g.output_offset = kept_delta_at
     if g.pool_size > 0:
-        size = layers.kept_offsets[layer] - layers.output_offsets[layer]
-        g.output_offset = BLOCK * layers.output_offsets[layer] + row * size
+        g.output_offset = BLOCK * layers.output_offsets[layer] + row * g.num_patches * g.num_outs
         outputs_at = frame_at + layers.output_offsets[layer]
         kept_at = frame_at + layers.kept_offsets[layer]
         unpool(batch.outputs, outputs_at, kept_at, workspace.deltas, kept_delta_at, g)
     if workspace.gradients.shape[0] > 0:
-        if layer == 0:
+        if source < 0:
             add_weight_gradients(batch.frames[frame], workspace.deltas, workspace.gradients, g)
         else:
             add_weight_gradients(batch.outputs, workspace.deltas, workspace.gradients, g)
-    if layer == 0 and batch.grad_frames.shape[0] == 0:
+    if source < 0 and batch.grad_frames.shape[0] == 0:
         return
     transposed = params.transposed[layer]
     transposed.input_offset = g.output_offset
     multiply(workspace.deltas, params.transposed_weights, workspace.patches, transposed)
-    if layer == 0:
+    if source < 0:
         fold(workspace.patches, batch.grad_frames[frame], batch.grad_frames.shape[1], g)
         return
-    below = layer - 1
-    g.input_offset = BLOCK * layers.kept_offsets[below] + row * _stride(layers, below)
-    num_inputs = _num_kept(layers.geometries[below])
+    g.input_offset = _delta_at(layers, source, row)
+    num_inputs = _num_kept(layers.geometries[source])
     fold(workspace.patches, workspace.deltas, num_inputs, g)
-    rectify(workspace.deltas, g.input_offset, batch.outputs, input_offset, num_inputs)
+    inputs_at = frame_at + layers.kept_offsets[source]
+    rectify(workspace.deltas, g.input_offset, batch.outputs, inputs_at, num_inputs)

@@ -196,13 +196,19 @@ class Layers:
     """A network, and where the outputs of each layer are in the row of a frame."""
 
     geometries: wp.array[LayerGeometry]
-    """Without the offsets of inputs and outputs, but with that of the first pixel in a frame."""
+    """Without offsets of inputs and outputs, but with those of numbers in an observation."""
     weights: wp.array[float]
     output_offsets: wp.array[int]
     """Offset of each layer's outputs before pooling; last, the size of a row."""
     kept_offsets: wp.array[int]
     """Offset of each layer's outputs after pooling, which are the inputs of the next layer."""
-    num_convolutions: int
+    starts: wp.array[int]
+    """See `OutputOffsets`, also for what follows."""
+    strides: wp.array[int]
+    sources: wp.array[int]
+    """Number of the layer whose outputs are the inputs; -1 for the observation."""
+    num_branch_layers: int
+    """Layers that take one observation at a time; the linear ones of the trunk follow."""
 
 
 @wp.func
@@ -212,18 +218,19 @@ def row_size(layers: Layers) -> int:
 
 
 @wp.func
-def run_convolutions(
-    layers: Layers, frame: wp.array[float], outputs: wp.array[float], row: int
+def run_branches(
+    layers: Layers, observation: wp.array[float], outputs: wp.array[float], row: int
 ) -> None:
-    """Compute the outputs of the convolutions for one frame, channels first."""
+    """Compute the features of one observation: images, channels first, then vectors."""
     at = row * row_size(layers)
-    for layer in range(layers.num_convolutions):
+    for layer in range(layers.num_branch_layers):
         g = layers.geometries[layer]
         g.output_offset = at + layers.output_offsets[layer]
-        if layer == 0:
-            multiply(frame, layers.weights, outputs, g)
+        source = layers.sources[layer]
+        if source < 0:
+            multiply(observation, layers.weights, outputs, g)
         else:
-            g.input_offset = at + layers.kept_offsets[layer - 1]
+            g.input_offset = at + layers.kept_offsets[source]
             multiply(outputs, layers.weights, outputs, g)
         if g.pool_size > 0:
             g.pooled_offset = at + layers.kept_offsets[layer]
@@ -231,12 +238,12 @@ def run_convolutions(
 
 
 @wp.func
-def run_linear(layers: Layers, outputs: wp.array[float], first: int, count: int) -> None:
-    """Compute the outputs of the linear layers for `count` frames, from row `first` on, at once."""
+def run_trunk(layers: Layers, outputs: wp.array[float], first: int, count: int) -> None:
+    """Compute the outputs of the trunk for `count` observations, from row `first` on, at once."""
     size = row_size(layers)
-    for layer in range(layers.num_convolutions, layers.geometries.shape[0]):
+    for layer in range(layers.num_branch_layers, layers.geometries.shape[0]):
         g = layers.geometries[layer]
-        g.input_offset = first * size + layers.kept_offsets[layer - 1]
+        g.input_offset = first * size + layers.kept_offsets[layers.sources[layer]]
         g.output_offset = first * size + layers.output_offsets[layer]
         g.num_patches = count
         g.row_stride = size

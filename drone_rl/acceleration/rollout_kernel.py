@@ -9,12 +9,16 @@ from typing import Any
 
 import warp as wp
 
-from drone_rl.acceleration.layers_kernel import Layers, copy, row_size, run_convolutions, run_linear
+from drone_rl.acceleration.layers_kernel import Layers, copy, row_size, run_branches, run_trunk
+from drone_rl.acceleration.vectors_kernel import Vectors, measure_nothing
 from drone_rl.policies.actor import MAX_ACTION
 from drone_rl.sim.continuous_actions import LEAST_LOG, MOST_LOG, MOST_MEAN, SHIFT
 from drone_rl.sim.rendering.raytrace.effects_kernel import render_image_with_effects
-from drone_rl.sim.rendering.raytrace.plain_kernel import render_image
+from drone_rl.sim.rendering.raytrace.plain_kernel import find_visible, render_image
+from drone_rl.sim.rendering.raytrace.projection_kernel import start_job
 from drone_rl.sim.rendering.raytrace.structs_kernel import (
+    DEPTH,
+    NO_GEOM,
     RGB,
     Effects,
     Geoms,
@@ -34,7 +38,7 @@ wp.set_module_options(_OPTIONS)
 
 @wp.struct
 class CameraView:
-    """What is needed to render a frame and standardize it."""
+    """What is needed to render a frame of an image and standardize it."""
 
     view: ViewArrays
     geoms: Geoms
@@ -44,11 +48,15 @@ class CameraView:
     has_effects: bool
     effects: Effects
     rendered: Images
-    """An image a worker, before `develop`."""
+    """An image a worker, before `develop_gray` or `develop_rgb`."""
     shifts: wp.array2d[int]
     """Pixels down and to the right of each environment, see `fault_models.shift`."""
     num_channels: int
-    """1 for gray, 2 for chromaticities, 3 for colors."""
+    """1 for gray and depth, 2 for chromaticities, 3 for colors."""
+    newest: int
+    """Index of the newest frame in an observation."""
+    maximum: float
+    """Depth that becomes 1, metres."""
     floor: float
     """See `ChromaticityPixels`."""
     mean: float
@@ -62,6 +70,11 @@ class Rollout:
     """Inputs and outputs of one launch; environment i writes rows i * num_steps + t."""
 
     camera: CameraView
+    """Of `show_plain`."""
+    cameras: wp.array[CameraView]
+    """Of each image, for `show_any`."""
+    poses: PoseArrays
+    vectors: Vectors
     layers: Layers
     workspaces: wp.array2d[float]
     """Outputs of all layers for `TOGETHER` frames, one a worker."""
@@ -71,10 +84,13 @@ class Rollout:
     draws: wp.array2d[float]
     """Samples for actions, see `choose` and `squash`. Shape: (num_envs, steps * numbers)."""
     frames: Images
-    """Gray frames, `num_frames` a row: those of an observation, oldest first."""
+    """For `show_plain`, the memory of `observations` as gray frames, `num_frames` a row."""
     num_frames: int
+    """Most frames of an image."""
+    stacks: wp.array2d[int]
+    """Of each image, index of its oldest frame, size and number of its frames."""
     observations: wp.array2d[float]
-    """The same memory, a row an observation."""
+    """A row an observation: the frames of each image, oldest first, then vectors."""
     last_observations: wp.array2d[float]
     """Of each environment, before step 0."""
     next_frames: Images
@@ -161,6 +177,37 @@ def develop_rgb(
     ...
 
 
+@wp.func_native("""
+#pragma clang fp contract(off)
+for (int y = 0; y < height; ++y) {
+    const int from = wp::clamp(y - down, 0, height - 1) * width;
+    float* to = target.data + first + y * width;
+    for (int x = 0; x < width; ++x) {
+        const int at = from + wp::clamp(x - right, 0, width - 1);
+        const float along = nearest.data[at] * cosines.data[at];
+        const bool is_far = owner.data[at] == none || along == 0.0f || along > maximum;
+        to[x] = ((is_far ? maximum : along) / maximum - mean) / deviation;
+    }
+}""")
+def develop_depth(
+    nearest: wp.array[float],
+    owner: wp.array[int],
+    cosines: wp.array[float],
+    none: int,
+    width: int,
+    height: int,
+    down: int,
+    right: int,
+    maximum: float,
+    mean: float,
+    deviation: float,
+    target: wp.array[float],
+    first: int,
+) -> None:
+    """Write depth as a fraction of `maximum`, shifted and standardized, `none` for the sky."""
+    ...
+
+
 @wp.func
 def show_plain(
     rollout: Rollout,
@@ -201,10 +248,38 @@ def show_any(
     row: int,
     worker: int,
 ) -> None:
-    """Do the same with all effects, mountings and transforms."""
-    camera = rollout.camera
+    """Do the same for all images, with all effects, mountings and transforms."""
+    for i in range(rollout.cameras.shape[0]):
+        show_image(rollout.cameras[i], observations[row], env, worker)
+
+
+@wp.func
+def show_image(camera: CameraView, target: wp.array[float], env: int, worker: int) -> None:
+    """Write the newest frame of an image."""
     view = camera.view
     mounted = env % view.cameras.shape[0]
+    first = camera.newest
+    down = camera.shifts[env, 0]
+    right = camera.shifts[env, 1]
+    if view.what == DEPTH:
+        job = start_job(view, camera.poses, camera.scratch, worker, mounted, env, worker)
+        find_visible(job, camera.geoms, camera.poses)
+        develop_depth(
+            job.nearest,
+            job.owner,
+            job.cosines,
+            NO_GEOM,
+            view.width,
+            view.height,
+            down,
+            right,
+            camera.maximum,
+            camera.mean,
+            camera.deviation,
+            target,
+            first,
+        )
+        return
     if camera.has_effects:
         render_image_with_effects(
             view,
@@ -232,10 +307,6 @@ def show_any(
             camera.rendered,
             worker,
         )
-    target = observations[row]
-    first = (rollout.num_frames - 1) * camera.num_channels * view.height * view.width
-    down = camera.shifts[env, 0]
-    right = camera.shifts[env, 1]
     if (view.what & RGB) != 0:
         develop_rgb(
             camera.rendered.rgb[worker],
@@ -321,23 +392,38 @@ def decide_numbers(  # noqa: ANN201 (an array)
 
 
 @wp.func
+def keep_frames(rollout: Rollout, before: wp.array[float], after: wp.array[float]) -> None:
+    """Write the earlier frames of an observation, given the one before."""
+    for i in range(rollout.stacks.shape[0]):
+        first, size, count = rollout.stacks[i, 0], rollout.stacks[i, 1], rollout.stacks[i, 2]
+        copy(before, first + size, after, first, (count - 1) * size)
+
+
+@wp.func
 def stack(rollout: Rollout, env: int, step: int, row: int, is_start: bool) -> None:
     """Write the earlier frames of an observation; at an episode's start all are the newest."""
     seen = rollout.observations[row]
-    size = seen.shape[0] // rollout.num_frames
-    earlier = seen.shape[0] - size
     if is_start:
-        for frame in range(rollout.num_frames - 1):
-            copy(seen, earlier, seen, frame * size, size)
+        for i in range(rollout.stacks.shape[0]):
+            first, size, count = rollout.stacks[i, 0], rollout.stacks[i, 1], rollout.stacks[i, 2]
+            for frame in range(count - 1):
+                copy(seen, first + (count - 1) * size, seen, first + frame * size, size)
     elif step == 0:
-        copy(rollout.last_observations[env], size, seen, 0, earlier)
+        keep_frames(rollout, rollout.last_observations[env], seen)
     else:
-        copy(rollout.observations[row - 1], size, seen, 0, earlier)
+        keep_frames(rollout, rollout.observations[row - 1], seen)
 
 
 @functools.cache
 def make_kernel(  # noqa: C901 (functions that Warp compiles)
-    states: Any, place: Any, move: Any, decide: Any, show: Any, *, looks_ahead: bool = False
+    states: Any,
+    place: Any,
+    move: Any,
+    decide: Any,
+    show: Any,
+    measure: Any = measure_nothing,
+    *,
+    looks_ahead: bool = False,
 ) -> Any:
     """Return the kernel for the rules of a task; see `drone_rl.sim.tasks.fused.fused_rules`.
 
@@ -347,6 +433,7 @@ def make_kernel(  # noqa: C901 (functions that Warp compiles)
         move: Steps an environment: (states, env, action). Returns the reward.
         decide: `decide_move` or `decide_numbers`.
         show: `show_plain` or `show_any`.
+        measure: `measure` or `measure_nothing` of `vectors_kernel`.
         looks_ahead: Whether to write `Rollout.next_observations`.
     """
 
@@ -359,29 +446,30 @@ def make_kernel(  # noqa: C901 (functions that Warp compiles)
     def observe(
         first: int, last: int, step: int, worker: int, rollout: Rollout, envs: states
     ) -> int:
-        """Render running environments, compute the convolutions; return how many are running."""
+        """Observe running environments, compute the features; return how many are running."""
         running = int(0)
         for env in range(first, last):
             if is_running(rollout, envs, env, step):
                 now = rollout.begins[env] + step
                 row = env * rollout.num_steps + now
-                place(envs, env, rollout.camera.poses)
+                place(envs, env, rollout.poses)
                 show(rollout, rollout.frames, rollout.observations, env, row, worker)
                 if rollout.num_frames > 1:
                     stack(rollout, env, now, row, envs.steps[env] == 0)
                 seen = rollout.observations[row]
-                run_convolutions(rollout.layers, seen, rollout.workspaces[worker], running)
+                measure(rollout.vectors, envs, env, seen)
+                run_branches(rollout.layers, seen, rollout.workspaces[worker], running)
                 running += 1
         return running
 
     @wp.func
     def look_ahead(rollout: Rollout, env: int, row: int, worker: int, envs: states) -> None:
         """Observe an environment after its last step."""
-        place(envs, env, rollout.camera.poses)
+        place(envs, env, rollout.poses)
         show(rollout, rollout.next_frames, rollout.next_observations, env, row, worker)
         seen = rollout.next_observations[row]
-        size = seen.shape[0] // rollout.num_frames
-        copy(rollout.observations[row], size, seen, 0, seen.shape[0] - size)
+        measure(rollout.vectors, envs, env, seen)
+        keep_frames(rollout, rollout.observations[row], seen)
 
     @wp.func
     def look_nowhere(rollout: Rollout, env: int, row: int, worker: int, envs: states) -> None:
@@ -426,7 +514,7 @@ def make_kernel(  # noqa: C901 (functions that Warp compiles)
             running = int(1)
             while running > 0:
                 running = observe(group, end, step, worker, rollout, envs)
-                run_linear(rollout.layers, rollout.workspaces[worker], 0, running)
+                run_trunk(rollout.layers, rollout.workspaces[worker], 0, running)
                 act(group, end, step, worker, rollout, envs)
                 step += 1
 

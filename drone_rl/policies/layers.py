@@ -1,11 +1,11 @@
 """The layers of a network, for code that computes with its weights: kernels, bounds and proofs."""
 
 import typing
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from torch import nn
 
-from drone_rl.policies.networks import PolicyNetwork
+from drone_rl.policies.networks import InputsNetwork, PolicyNetwork
 
 Layer = nn.Conv2d | nn.Linear | nn.MaxPool2d | nn.ReLU | nn.Flatten
 """Convolutions without padding, linear layers, both with biases, pooling of squares that do not
@@ -16,11 +16,11 @@ class Branch(NamedTuple):
     """The layers that see one input, up to its flattened features."""
 
     key: str
-    """Name of the input."""
+    """Name of the input, or "vectors" for all vectors."""
     in_shape: tuple[int, ...]
-    """Shape of the input, (C, H, W)."""
+    """Shape of the input, (C, H, W), or of all vectors, (n,)."""
     layers: tuple[Layer, ...]
-    """The last one is Flatten."""
+    """The last one is Flatten, unless they see vectors."""
 
 
 class Layers(NamedTuple):
@@ -45,9 +45,14 @@ class Unsupported(NamedTuple):
     """What it has, such as "network MyNet overrides forward"."""
 
 
-def as_layers(network: nn.Module) -> Layers | Unsupported:
-    """Return the layers of a network, or the first reason why it has others than `Layer`."""
+def as_layers(network: nn.Module, *, several: bool = False) -> Layers | Unsupported:
+    """Return the layers of a network, or the first reason why it has others than `Layer`.
+
+    With `several`, networks of several inputs have layers, too.
+    """
     name = type(network).__name__
+    if several and type(network) is InputsNetwork:
+        return _of_inputs(network)
     if not isinstance(network, PolicyNetwork):
         return Unsupported(f"network {name} is no PolicyNetwork")
     if type(network).forward is not PolicyNetwork.forward:
@@ -60,6 +65,20 @@ def as_layers(network: nn.Module) -> Layers | Unsupported:
         return Unsupported(f"network {name} does not end in flattened features and a linear layer")
     end = kinds.index(nn.Flatten) + 1
     return Layers((Branch("pixels", network.in_shape, layers[:end]),), layers[end:])
+
+
+def _of_inputs(network: InputsNetwork) -> Layers | Unsupported:
+    """Return the layers of a network of several inputs."""
+    shapes = dict(network.in_shapes)
+    images = [name for name, shape in shapes.items() if len(shape) > 1]
+    shapes["vectors"] = (sum(shape[0] for shape in shapes.values() if len(shape) == 1),)
+    names = [*images, "vectors"] if "vectors" in network.branches else images
+    parts: Any = {name: tuple(network.branches[name]) for name in names}  # pyright: ignore[reportArgumentType]
+    if strange := [layer for layers in parts.values() for layer in layers if not _is_plain(layer)]:
+        return Unsupported(f"network {type(network).__name__} has the layer {strange[0]}")
+    branches = tuple(Branch(name, shapes[name], layers) for name, layers in parts.items())
+    trunk: Any = tuple(network.layers)
+    return Layers(branches, trunk)
 
 
 def _is_plain(layer: nn.Module) -> bool:

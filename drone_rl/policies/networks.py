@@ -185,15 +185,20 @@ class InputsNetwork(LayersNetwork):
             if isinstance(layer, nn.Linear):
                 initialise(layer, layer is self.layers[-1])
 
+    def check(self, *inputs: Tensor) -> None:
+        """Raise an `InputError` for an input of another shape than the network's."""
+        for (name, shape), values in zip(self.in_shapes.items(), inputs, strict=True):
+            if (found := tuple(values.shape[-len(shape) :])) != shape:
+                raise InputError(
+                    f"the policy was built for {name} of shape {shape}, not {found}; give the "
+                    "inputs that it was trained with"
+                )
+
     def features(self, *inputs: Tensor) -> Tensor:
         """Return the joined outputs of all branches. Shapes: (N, *) to (N, F)."""
+        self.check(*inputs)
         seen, vectors = [], []
         for (name, shape), values in zip(self.in_shapes.items(), inputs, strict=True):
-            if tuple(values.shape[1:]) != shape:
-                raise InputError(
-                    f"the policy was built for {name} of shape {shape}, not "
-                    f"{tuple(values.shape[1:])}; give the inputs that it was trained with"
-                )
             if len(shape) == 1:
                 vectors.append(values)
             else:

@@ -20,6 +20,21 @@ from drone_rl.config import (
     PillarsSettings,
     TaskSettings,
 )
+from drone_rl.config.inputs import (
+    Altitude,
+    Attitude,
+    DepthImage,
+    Goal,
+    GrayImage,
+    LastAction,
+    Rates,
+    RgbImage,
+    SegmentationImage,
+    Velocity,
+    describe_inputs,
+)
+from drone_rl.config.transforms import Crop
+from drone_rl.config.transforms import Shift as ShiftSettings
 from drone_rl.envs import (
     ChromaticityPixels,
     CropRows,
@@ -32,6 +47,7 @@ from drone_rl.envs import (
 )
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN, make_actor
 from drone_rl.policies.actor import SquashedNormal
+from drone_rl.policies.networks import InputsNetwork
 from drone_rl.sim.dynamics import Quadrotor
 from drone_rl.sim.dynamics.state import LOST
 from drone_rl.sim.tasks.collect_cubes import CubesEnd
@@ -54,6 +70,7 @@ def make(
     dynamics=None,
     actions=None,
     appearance=None,
+    inputs=None,
     **how,
 ):
     made = [transform() for transform in transforms]
@@ -64,12 +81,20 @@ def make(
         actions=actions,
         appearance=appearance,
         transforms=made,
+        inputs=None if inputs is None else describe_inputs(inputs),
     )
     generator = torch.Generator().manual_seed(0)
     if network is None:
-        shape = tuple(env.observation_spec["pixels"].shape[1:])
-        count = env.worlds.dynamics.actions.num_outputs
-        network = SmallCNN(shape, count, channels=(4,), hidden=(8,), generator=generator)
+        names = [*env.observer.sources]
+        shapes = {name: tuple(env.observation_spec[name].shape[1:]) for name in names}
+        count, sizes = env.worlds.dynamics.actions.num_outputs, {"channels": (4,), "hidden": (8,)}
+        images = {
+            name: SmallCNN(shapes[name], count, **sizes, generator=generator)
+            for name in env.observer.images
+        }
+        network = next(iter(images.values()))
+        if inputs is not None:
+            network = InputsNetwork(shapes, images, count, hidden=(8,), generator=generator)
         with torch.no_grad():
             network.layers.logits.weight.mul_(100)
     actor = make_actor(network, env.action_spec, generator)
@@ -410,6 +435,58 @@ def test_colors_shifts_and_visual_randomization_are_fused(look, transforms):
             for key in other.keys(True, True):
                 if key != "logits":
                     assert torch.equal(one[key], other[key]), key
+
+
+SENSES = {"goal": Goal(), "last_action": LastAction(), "altitude": Altitude(scale=3.0)}
+SHIFTED = (Crop(top=3, bottom=23), ShiftSettings(down=2, across=3))[::-1]
+SEVERAL = [
+    ({"gray": GrayImage(), **SENSES}, {}),
+    (
+        {
+            "velocity": Velocity(),
+            "depth": DepthImage(size=(20, 32), maximum=9.0, stack=2),
+            "goal": Goal(),
+            "rates": Rates(),
+            "attitude": Attitude(),
+        },
+        {"dynamics": FLYING, "actions": VELOCITY},
+    ),
+    (
+        {
+            "below": DepthImage(camera="down", size=(16, 20), transforms=SHIFTED[:1]),
+            "goal": Goal(),
+            "rgb": RgbImage(stack=3),
+            "gray": GrayImage(transforms=SHIFTED),
+        },
+        {"appearance": RANDOM, "actions": ActionSettings(kind="moves_full")},
+    ),
+]
+
+
+@pytest.mark.parametrize(("inputs", "how"), SEVERAL)
+def test_several_inputs_are_fused(inputs, how):
+    made = [make(LONG, inputs=inputs, compiled=c, **how) for c in (True, False)]
+    assert isinstance(made[0].fused, FusedEpisodes), made[0].name
+    with set_exploration_type(DETERMINISTIC):
+        for count in (5, 3):
+            one, other = (collector.collect(count) for collector in made)
+            for key in other.keys(True, True):
+                is_rounded = key == "logits" or one["action"].is_floating_point()
+                exactly = {"rtol": 0.0, "atol": 1e-4 if is_rounded else 0.0}
+                torch.testing.assert_close(one[key], other[key], **exactly, msg=str(key))
+
+
+@pytest.mark.parametrize(
+    ("inputs", "reason"),
+    [
+        ({"gray": GrayImage(noise=0.1)}, "transform Noise is not fused"),
+        ({"gray": GrayImage(), "goal": Goal(loss=0.1)}, "errors of input goal are not fused"),
+        ({"segmentation": SegmentationImage()}, "input segmentation is not fused"),
+        ({"goal": Goal()}, "a policy without images is not fused"),
+    ],
+)
+def test_log_states_why_inputs_are_not_fused(inputs, reason):
+    assert reason in make(inputs=inputs, network=SmallCNN((1, 25, 64), 3)).name
 
 
 def test_kernel_ends_the_episode_of_a_lost_drone():

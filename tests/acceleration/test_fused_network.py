@@ -6,6 +6,7 @@ import torch
 from drone_rl.acceleration.fused_network import FusedNetwork
 from drone_rl.acceleration.packed_layers import Reasons
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN
+from drone_rl.policies.networks import InputsNetwork, InputsTrunk
 from tests.policies.halves import draw_weights, forward_backward, halves, make_network
 
 
@@ -47,6 +48,29 @@ def test_gradients_equal_torch(shape, options, num_threads):
         expected = assert_equal_torch(network, fused, count, shape)
         assert expected[0].any() or count < 3
         draw_weights(network)
+
+
+@pytest.mark.parametrize("num_threads", [1, 2])
+@pytest.mark.parametrize("pooled", [SmallCNN, OriginalCNN])
+def test_gradients_of_several_inputs_and_of_a_critic_equal_torch(pooled, num_threads):
+    shapes = {"goal": (3,), "gray": (2, 12, 20), "depth": (1, 17, 19), "altitude": (1,)}
+    images = {"gray": SmallCNN((2, 12, 20), 3, channels=(5, 6)), "depth": pooled((1, 17, 19), 3)}
+    network = InputsNetwork(shapes, images, 3, hidden=(9,))
+    critic = torch.nn.Linear(9, 1)
+    draw_weights(network)
+    trunk, wanted = InputsTrunk(network), [*network.parameters(), *critic.parameters()]
+    fused = FusedNetwork.try_create(network, num_threads, critic=critic)
+    inputs, weights = [halves(70, *shape) for shape in shapes.values()], halves(70, 4)
+    features = trunk(*inputs)
+    expected = torch.cat([network.layers[-1](features), critic(features)], 1)
+    found = fused(*inputs)
+    torch.testing.assert_close(found, expected)
+    gradients, others = (
+        torch.autograd.grad((out * weights).sum(), wanted) for out in (found, expected)
+    )
+    for gradient, other in zip(gradients, others, strict=True):
+        torch.testing.assert_close(gradient, other, rtol=1e-5, atol=1e-5)
+    assert all(other.any() for other in others)
 
 
 @pytest.mark.parametrize("num_threads", [1, 2])

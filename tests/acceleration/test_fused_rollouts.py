@@ -12,7 +12,15 @@ from drone_rl.collectors import RolloutCollector
 from drone_rl.envs import CropRows, GrayPixels, Shift, StandardizePixels
 from drone_rl.envs.rollout import Act, Recording
 from drone_rl.training.restore import check_fits
-from tests.acceleration.test_fused_episodes import FLYING, RANDOM, SHORT, STACK, VELOCITY, make
+from tests.acceleration.test_fused_episodes import (
+    FLYING,
+    RANDOM,
+    SEVERAL,
+    SHORT,
+    STACK,
+    VELOCITY,
+    make,
+)
 
 PAYING = SHORT.replace(reward={"reached": 1.0, "progress": 0.5})
 
@@ -47,6 +55,7 @@ def assert_equal(one, other):
             "appearance": RANDOM,
             "transforms": (GrayPixels, partial(Shift, 4, 6), STACK, partial(CropRows, 3, 23)),
         },
+        *({"inputs": inputs, **how} for inputs, how in SEVERAL),
     ],
 )
 def test_rollouts_equal_single_steps(how):
@@ -60,7 +69,8 @@ def test_rollouts_equal_single_steps(how):
         assert {*batch.keys(True, True)} == {*stepped.keys(True, True), "logits"}
         assert_equal(batch, stepped)
     assert fused.episodes == stepping.episodes > 4
-    outputs = fused.actor.network(batch["pixels"])
+    network = fused.actor.network
+    outputs = network(*(batch[name] for name in network.in_keys))
     torch.testing.assert_close(outputs, batch["logits"], atol=1e-4, rtol=1e-4)
 
 

@@ -5,7 +5,7 @@ import torch
 import warp as wp
 from torch import nn
 
-from drone_rl.acceleration.layers_kernel import WIDTH, Layers, run_convolutions, run_linear
+from drone_rl.acceleration.layers_kernel import WIDTH, Layers, run_branches, run_trunk
 from drone_rl.acceleration.packed_layers import (
     PackedNetwork,
     packed_layers,
@@ -23,8 +23,8 @@ def infer_kernel(
     layers: Layers, images: wp.array2d(dtype=float), workspace: wp.array(dtype=float), count: int
 ) -> None:
     for row in range(count):
-        run_convolutions(layers, images[row], workspace, row)
-    run_linear(layers, workspace, 0, count)
+        run_branches(layers, images[row], workspace, row)
+    run_trunk(layers, workspace, 0, count)
 
 
 def infer(packed, images, num_actions):
@@ -83,7 +83,7 @@ def test_logits_equal_those_of_a_network_with_pooling(shape, options):
 @pytest.mark.parametrize("channels", [1, 2])
 def test_rows_of_larger_frames_are_skipped(channels):
     network = SmallCNN((channels, 12, 20), 3, generator=torch.Generator().manual_seed(0))
-    packed = PackedNetwork(network, first_pixel=3 * 20, hidden_pixels=5 * 20)
+    packed = PackedNetwork(network, [(3 * 20, 5 * 20)])
     packed.pack()
     images = torch.randn(2, channels, 17, 20)
     assert torch.allclose(infer(packed, images, 3), network(images[:, :, 3:15]), atol=1e-5)
