@@ -43,6 +43,7 @@ from benchmarks.sweeps import bench_kills, bench_sweeps
 from benchmarks.training import bench_experiment, bench_large, bench_seeds, bench_solve
 from benchmarks.verdicts import bench_verdicts
 from benchmarks.worlds.commands import bench_world_commands
+from benchmarks.worlds.contacts import bench_contacts
 from benchmarks.worlds.drawing import bench_drawing
 from benchmarks.worlds.judging import bench_world_judging
 from benchmarks.worlds.strangers import bench_strangers
@@ -158,6 +159,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "world_drawing": _benchmark(
         bench_drawing, "worlds", *_COLLECTING, "acceleration", *_parts("worlds/house")
     ),
+    "world_contacts": _benchmark(bench_contacts, "worlds", "sim"),
     "world_training": _benchmark(bench_world_training, "worlds", *_SOLVING, "acceleration"),
     "world_judging": _benchmark(
         bench_world_judging, "worlds", *_EXPLAINING, *_parts("maps", "worlds/training")

@@ -280,7 +280,10 @@ def _crosses(point: wp.vec3d, a: wp.vec3d, b: wp.vec3d) -> int:
 
 @wp.func
 def _is_inside(mesh: wp.uint64, point: wp.vec3d, top: wp.float64) -> bool:
-    """Return whether the surface above a point turns more often to one side than to the other."""
+    """Return whether the surface above a point faces up more often than down.
+
+    So a shell that faces its inside, such as a room, leaves it free.
+    """
     narrow = wp.vec3(1.0e-6, 1.0e-6, 0.0)
     at = wp.vec3(point)
     slack = wp.cw_mul(narrow, wp.vec3(wp.abs(at[0]), wp.abs(at[1]), 0.0)) + narrow
@@ -297,7 +300,7 @@ def _is_inside(mesh: wp.uint64, point: wp.vec3d, top: wp.float64) -> bool:
             normal = wp.cross(b - a, c - a)
             if wp.dot(normal, a - point) * normal[2] > _ZERO:
                 winding += turns
-    return winding != 0
+    return winding > 0
 
 
 @wp.func

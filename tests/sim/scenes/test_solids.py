@@ -3,7 +3,9 @@
 import math
 import pickle
 from pathlib import Path
+from typing import Any
 
+import mujoco as _mujoco
 import numpy as np
 import pytest
 import torch
@@ -12,6 +14,7 @@ from drone_rl.sim.scenes.scene_file import load_scene
 from drone_rl.sim.scenes.solids import Solids, Triangles, closed_parts
 from drone_rl.utils.errors import InputError
 
+mujoco: Any = _mujoco
 _HALF = math.sqrt(0.5)
 _CORNERS = "0 0 0  2 0 0  2 1 0  1 1 0  1 2 0  0 2 0"
 _FLOOR = ((0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 5))
@@ -49,8 +52,11 @@ def l_shape() -> str:
     return world('type="mesh" mesh="l"', before=mesh)
 
 
-def room() -> str:
-    """Return four single walls of a room of 4 x 4 m and height 2 around the origin, as one mesh."""
+def room(*, is_whole: bool = False) -> str:
+    """Return four single walls of a room of 4 x 4 m and height 2 around the origin, as one mesh.
+
+    With floor and ceiling if it is whole; all face the inside.
+    """
     corners = ((-2, -2), (2, -2), (2, 2), (-2, 2))
     vertices = " ".join(f"{x} {y} {z}" for z in (0, 2) for x, y in corners)
     faces = [
@@ -58,6 +64,9 @@ def room() -> str:
         for i in range(4)
         for f in ((i, (i + 1) % 4, i + 4), ((i + 1) % 4, (i + 1) % 4 + 4, i + 4))
     ]
+    if is_whole:
+        faces += [(0, 2, 1), (0, 3, 2), (4, 5, 6), (4, 6, 7)]
+    faces = [(c, b, a) for a, b, c in faces]
     numbers = " ".join(str(i) for face in faces for i in face)
     mesh = f'<asset><mesh name="r" vertex="{vertices}" face="{numbers}" inertia="shell"/></asset>'
     return world('type="mesh" mesh="r"', before=mesh)
@@ -103,6 +112,12 @@ def test_single_walls_are_solid_at_their_surface_alone(tmp_path: Path) -> None:
     assert way.fraction.tolist() == pytest.approx((1.75 / 4, 1.75 / 4), abs=1e-5)
 
 
+def test_a_room_that_faces_its_inside_is_free(tmp_path: Path) -> None:
+    """Although its walls, floor and ceiling enclose a volume."""
+    walls = solids(tmp_path, room(is_whole=True))
+    assert walls.distances(points((0, 0, 1), (1.5, 0, 1))).tolist() == pytest.approx((1.0, 0.5))
+
+
 def test_all_that_is_below_a_height_field_is_inside(tmp_path: Path) -> None:
     """A ramp that rises by 2 m over 4 m; its surface is 1 m high in the middle."""
     field = (
@@ -113,6 +128,22 @@ def test_all_that_is_below_a_height_field_is_inside(tmp_path: Path) -> None:
     heights = points((0, 0, 2), (0, 0, 0.5), (0, 0, -5))
     wanted = (steep, -0.5 * steep, -2.0)
     assert ramp.distances(heights).tolist() == pytest.approx(wanted, abs=1e-5)
+
+
+def test_a_height_field_is_where_mujoco_casts_its_rays(tmp_path: Path) -> None:
+    """Cells are split into triangles along the same diagonal."""
+    field = '<asset><hfield name="h" nrow="3" ncol="3" size="2 3 1 1" elevation="{}"/></asset>'
+    bumpy = world('type="hfield" hfield="h"', before=field.format("0 0 0 0 1 0 0 0 0.5"))
+    ground = solids(tmp_path, bumpy)
+    model = load_scene(tmp_path / "0.xml").model
+    data, down = mujoco.MjData(model), np.array([0.0, 0.0, -1.0])
+    mujoco.mj_kinematics(model, data)
+    for x, y in np.random.default_rng(0).uniform((-2, -3), (2, 3), (50, 2)):
+        start = np.array([x, y, 5.0])
+        length = mujoco.mj_rayHfield(model, data, 0, start, down, None)
+        begin = torch.from_numpy(start)[None]
+        found = ground.sweep(begin, begin + torch.from_numpy(down) * 10.0)
+        assert 10.0 * float(found.fraction) == pytest.approx(length, abs=1e-6)
 
 
 def test_a_wall_thinner_than_a_step_stops_a_ball(tmp_path: Path) -> None:
