@@ -1,7 +1,7 @@
-"""Scenes of the server as tasks: cubes, blocks, pillars, an empty field, and MJCF files."""
+"""Scenes of the server as tasks: cubes, blocks, pillars, an empty field, and scene files."""
 
 import dataclasses
-import math
+import logging
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,15 +12,20 @@ from torch import Tensor
 
 from drone_rl.config import TaskSettings
 from drone_rl.sim.dynamics import BodyState, Obstacles
-from drone_rl.sim.entities import Field, Pillar, VisualEntity
+from drone_rl.sim.entities import Pillar, SceneEntity, VisualEntity
 from drone_rl.sim.quiet_dm_control import mjcf
-from drone_rl.sim.rendering.scene import SemanticClass, compiled
+from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.scenes import SceneFile, load_scene, scene_names
+from drone_rl.sim.scenes.solids import PlacedSolids, solids_of
 from drone_rl.sim.tasks import CollectCubes, Task, as_task
 from drone_rl.utils.errors import InputError, did_you_mean
 
+_log = logging.getLogger(__name__)
 SCENES = ("cubes", "blocks", "pillars", "empty")
 _BLOCK = (4.0, 4.0)
 """Width and height of a block, metres."""
+_HIGHEST = 100.0
+"""Metres that a start of a file may be above the ground."""
 
 
 class _Fixed(Task[Any]):
@@ -31,6 +36,7 @@ class _Fixed(Task[Any]):
     """
 
     name = "scene"
+    scenes: tuple[SceneFile, ...] = ()
 
     def __init__(
         self,
@@ -67,54 +73,35 @@ class _Fixed(Task[Any]):
         return dataclasses.replace(state, body=body), reward
 
 
-class _File(VisualEntity):
-    """A model from an MJCF file."""
+class _InFile(_Fixed):
+    """A scene file, placed so that its first site start* is above the vehicles' start.
 
-    semantic_class = SemanticClass.OBSTACLE
+    Without such a site vehicles start at the file's origin.
+    """
 
-    def _build(self, path: Path) -> None:
-        try:
-            self._mjcf_root = mjcf.from_path(str(path), escape_separators=True)
-        except (OSError, SyntaxError, ValueError, KeyError, AttributeError, TypeError) as error:
-            reason = str(error).strip().splitlines()[0] if str(error) else type(error).__name__
-            raise InputError(
-                f"scene={path} can't be read as a MuJoCo model ({reason}); give a valid MJCF file"
-            ) from error
-        if self._mjcf_root.model in ("", "unnamed_model"):
-            self._mjcf_root.model = "scene"
-        _use_radians(self._mjcf_root)
-        for section in ("option", "statistic", "visual"):  # those of the field apply
-            getattr(self._mjcf_root, section).remove()
-        whole = mjcf.RootElement()
-        whole.attach(self._mjcf_root)
-        compiled(whole, f"scene={path}")
-        self._mjcf_root.detach()
-        field: Any = Field()
-        try:
-            field.mjcf_model.attach(self._mjcf_root)
-        except ValueError as error:
-            raise InputError(f"scene={path}: {error}; remove this attribute") from error
-        self._mjcf_root.detach()
+    def __init__(self, path: str) -> None:
+        scene = load_scene(path)
+        for warning in scene.warnings:
+            _log.warning("scene=%s: %s", path, warning)
+        self.scenes = (scene,)
+        self.solids = solids_of(self.scenes, "cpu")
+        place = torch.zeros(1, 3, dtype=torch.float64)
+        starts = [site.position for site in scene.sites if site.name.startswith("start")]
+        if starts:
+            start = torch.tensor(starts[:1], dtype=torch.float64)
+            deep = start - start.new_tensor([0.0, 0.0, _HIGHEST])
+            fraction = float(self.solids.sweep(start, deep).fraction)
+            place = -(torch.lerp(start, deep, fraction) if fraction <= 1.0 else start)
+        super().__init__([SceneEntity(scene, name=scene.name)], place, None)
 
-
-def _use_radians(root: Any) -> None:
-    """Convert angles from degrees, MuJoCo's default, to radians, the field's unit."""
-    if root.compiler.angle == "radian":
-        return
-    root.compiler.angle = "radian"
-    elements = [root]
-    while elements:
-        element = elements.pop()
-        elements += element.all_children()
-        if getattr(element, "euler", None) is not None:
-            element.euler = np.radians(element.euler)
-        if getattr(element, "axisangle", None) is not None:
-            *axis, angle = element.axisangle
-            element.axisangle = [*axis, math.radians(angle)]
+    def obstacles(self, state: Any) -> Obstacles | None:
+        """Return the solids of the file."""
+        placed = PlacedSolids(self.solids, state.sampled, 0.5 * self.drone_size)
+        return Obstacles(state.sampled[:, :0], (0.0, 0.0, 0.0), placed)
 
 
 def make_task(scene: str) -> Task[Any]:
-    """Return the task that a name, or the path of an MJCF file, means.
+    """Return the task that a name, or the path of a scene file, means.
 
     Raises:
         InputError: There is no such scene, or the file can't be read.
@@ -127,14 +114,12 @@ def make_task(scene: str) -> Task[Any]:
         return _Fixed([], torch.zeros(0, 3, dtype=torch.float64), None)
     if scene == "blocks":
         return _blocks()
-    path = Path(scene)
-    if path.suffix == ".xml" and not path.exists():
-        raise InputError(f"scene={scene} does not exist; give the path of an MJCF file")
-    if path.suffix == ".xml" and path.is_file():
-        return _Fixed([_File(path)], torch.zeros(1, 3, dtype=torch.float64), None)
+    if scene in scene_names() or Path(scene).suffix or Path(scene).exists():
+        return _InFile(scene)
+    known = (*SCENES, *scene_names())
     raise InputError(
-        f"scene={scene} is unknown; give {', '.join(SCENES)}, or the path of an MJCF file, *.xml"
-        f"{did_you_mean(scene, SCENES)}"
+        f"scene={scene} is unknown; give {', '.join(known)}, or the path of an MJCF file or a mesh"
+        f"{did_you_mean(scene, known)}"
     )
 
 

@@ -124,7 +124,7 @@ class Simulation:
             raise InputError(f"vehicle {name!r} is there already; give another name")
         if len(self.vehicles) >= _MOST_VEHICLES:
             raise InputError(f"there are {_MOST_VEHICLES} vehicles; no more can be added")
-        names, home = self.stage.names[1:], self.settings.home
+        names, home = self.stage.touchable, self.settings.home
         vehicle = Vehicle(
             name,
             choice,

@@ -68,13 +68,15 @@ class Stage:
     """
 
     def __init__(self, scene: str, seed: int, *, renderer: str | None = None) -> None:
-        """Make a scene; by default the ray tracer renders it, or MuJoCo Warp's a file's meshes."""
+        """Make a scene; by default the ray tracer renders it."""
         self.task = make_task(scene)
         self.scene_name = scene
-        chosen = renderer or ("mujoco_warp" if scene.endswith(".xml") else "raytrace")
+        self._is_file = bool(getattr(self.task, "scenes", ()))
         usual = Capture()
         camera = CameraSettings(width=usual.width, height=usual.height, horizontal_fov=usual.fov)
-        self.worlds = Worlds(1, self.task, camera, renderer=chosen, distractors=SPARE)
+        self.worlds = Worlds(
+            1, self.task, camera, renderer=renderer or "raytrace", distractors=SPARE
+        )
         self._random = np.random.RandomState(np.random.PCG64(seed))
         self._names = [self._name_of(entity) for entity in self.task.make_props()]
         self._spawned: dict[str, _Spawned] = {}
@@ -146,13 +148,19 @@ class Stage:
         return ["Ground", *self._names, *self._of_file, *self._spawned, SKY]
 
     @property
+    def touchable(self) -> list[str]:
+        """Names of what the task's obstacles are, in their order."""
+        solids = getattr(self.task, "solids", ()) if self._is_file else ()
+        return [solids.name(i) for i in range(len(solids))] if solids else self.names[1:]
+
+    @property
     def movable(self) -> list[str]:
         """Names of the scene's and spawned objects, parts of a file excepted."""
         return [*self._names, *self._spawned]
 
     def _read_file(self) -> dict[str, Pose]:
         """Return the poses of a file's geoms, by their names."""
-        if not self.scene_name.endswith(".xml"):
+        if not self._is_file:
             return {}
         model = self.worlds.scene.model
         data = mujoco.MjData(model)

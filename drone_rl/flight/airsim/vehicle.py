@@ -40,6 +40,7 @@ from drone_rl.sim.dynamics.state import (
     VELOCITY,
 )
 from drone_rl.sim.rendering.appearance import rotate
+from drone_rl.sim.scenes.solids import PlacedSolids
 from drone_rl.sim.sensors import Sensors
 from drone_rl.sim.tasks.common import first_contact
 from drone_rl.sim.worlds import Worlds
@@ -390,10 +391,15 @@ class Vehicle(Pilot):
         solids = self._solids(others := [*others])
         if not ignore_collision:
             there, hit = solids.sweep(self.body.position[0], there, radius)
+            there, first = self._sweep_scene(there)
+            hit = first or hit
         self.body = self.body.moved(there[None], messages.attitude_to_world(pose.attitude)[None])
         self._place, self._coasting = None, 0
         self.trajectory.append(self.time, self.body)
-        gaps = zip(solids.names, solids.gaps(there, radius).tolist(), strict=True)
+        gaps = [*zip(solids.names, solids.gaps(there, radius).tolist(), strict=True)]
+        if self._scene_solids is not None:
+            name, distance, _ = self._nearest_of_scene(there)
+            gaps.append((name, distance - radius))
         self.collisions.move([name for name, gap in gaps if gap <= _STANDS], self.time)
         self._hover()
         if hit is not None:
@@ -424,8 +430,9 @@ class Vehicle(Pilot):
 
     def _solids(self, others: Iterable["Vehicle"]) -> Solids:
         """Return what stops a teleport: the scene's obstacles, other vehicles and the ground."""
-        rows = [("Ground", [0.0, 0.0, -_EARTH], (math.inf, math.inf, _EARTH), 0.0)]
-        if self._around is not None:
+        below = -_EARTH if self._scene_solids is None else -3 * _EARTH  # a scene has its own
+        rows = [("Ground", [0.0, 0.0, below], (math.inf, math.inf, _EARTH), 0.0)]
+        if self._around is not None and self._scene_solids is None:
             centers, half = self._around.centers[0].tolist(), self._around.half_sizes
             rows += [(name, at, half, 0.0) for name, at in zip(self.names, centers, strict=False)]
         for other in others:
@@ -433,3 +440,30 @@ class Vehicle(Pilot):
             rows.append((other.name, at, (0.0, 0.0, 0.0), radius))
         names, *parts = zip(*rows, strict=True)
         return Solids(names, *(torch.tensor(part, dtype=torch.float64) for part in parts))
+
+    @property
+    def _scene_solids(self) -> PlacedSolids | None:
+        around = self._around
+        return None if around is None else around.scene
+
+    def _sweep_scene(
+        self, there: torch.Tensor
+    ) -> tuple[torch.Tensor, tuple[str, torch.Tensor] | None]:
+        """Move to a place up to the first solid of a scene file; see `Solids.sweep`."""
+        if (scene := self._scene_solids) is None:
+            return there, None
+        here, radius = self.body.position[:1], self.settings.radius
+        sweep = scene.solids.sweep_at(here, there[None], radius, scene.places)
+        fraction = float(sweep.fraction)
+        if fraction > 1.0:
+            return there, None
+        there = torch.lerp(here[0], there, fraction)
+        _, distance, normal = self._nearest_of_scene(there)
+        return there, (self.names[int(sweep.solid)], there - distance * normal)
+
+    def _nearest_of_scene(self, place: torch.Tensor) -> tuple[str, float, torch.Tensor]:
+        """Return name, distance and outer normal of a file's solid that is nearest to a place."""
+        scene: Any = self._scene_solids
+        found = scene.solids.nearest_at(place[None], scene.places)
+        name = self.names[int(found.solid)] if int(found.solid) >= 0 else ""
+        return name, float(found.distance), found.normal[0]

@@ -58,9 +58,9 @@ class SingleQuadrotor(Quadrotor):
         if obstacles is not None:
             self._centers = torch.empty_like(obstacles.centers)
             around = dataclasses.replace(obstacles, centers=self._centers)
+        kernel, solids = kernel_among(around, "cpu")  # starts Warp
         held = FlightGoals(goals.modes, self._values, self._drifts)
         command = flight_kernel.make_command(self.frame, held, ticks, around)
         arrays = [wp.from_torch(numbers) for numbers in (self._before, self._after)]
-        kernel, solids = kernel_among(around, "cpu")
         inputs = [0, command, *solids, *arrays]
         self._launch = wp.launch(kernel, 1, inputs=inputs, device="cpu", record_cmd=True)

@@ -4,8 +4,12 @@ import math
 
 import pytest
 
+from drone_rl.flight.airsim.messages import Pose
+from drone_rl.flight.airsim.settings_file import AirsimSettings
+from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.stage import Stage
 from drone_rl.flight.image_types import ImageType
+from drone_rl.flight.settings import ServeSettings
 from drone_rl.utils.errors import InputError
 from tests.flight.airsim.looking import look
 
@@ -46,14 +50,10 @@ def test_blocks_can_be_touched_and_a_file_is_shown(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("<mujoco><", "can't be read"),
+        ("<mujoco><", "is no XML"),
         (
             '<mujoco><worldbody><geom type="mesh" mesh="tree"/></worldbody></mujoco>',
-            r"^scene=.*bad\.xml can't be compiled .*Error: mesh 'scene/tree' not found in geom 0\)",
-        ),
-        (
-            '<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>',
-            r"free joint can only be used on top level\); correct it$",
+            r"^scene=.*bad\.xml: line 1 of bad\.xml.*mesh 'tree' not found in geom 0",
         ),
     ],
 )
@@ -61,10 +61,29 @@ def test_crafted_files_are_refused(tmp_path, text, message):
     (tmp_path / "bad.xml").write_text(text)
     with pytest.raises(InputError, match=message):
         Stage(str(tmp_path / "bad.xml"), 0)
-    with pytest.raises(InputError, match=r"scene=no\.xml does not exist; give the path of an MJCF"):
+    with pytest.raises(InputError, match=r"scene=no\.xml: it does not exist; give indoor"):
         Stage("no.xml", 0)
     with pytest.raises(InputError, match=r"scene=blokcs is unknown; give cubes.*blocks"):
         Stage("blokcs", 0)
+
+
+def test_vehicles_collide_with_a_file_and_start_below_its_start(tmp_path):
+    path = tmp_path / "house.xml"
+    path.write_text(
+        '<mujoco><worldbody><geom name="floor" type="plane" size="9 9 1" pos="0 0 5"/>'
+        '<geom name="wall" type="box" size=".1 4 4" pos="4 0 8" euler="0 0 30"/>'
+        '<site name="start" pos="2 0 6"/></worldbody></mujoco>'
+    )
+    simulation = Simulation(AirsimSettings(), ServeSettings(scene=str(path), clock="lockstep"))
+    assert simulation.stage.object_pose("wall").position == pytest.approx((2.0, 0.0, -3.0))
+    (vehicle,) = simulation.vehicles.values()
+    there = Pose((9.0, 0.0, -3.0), vehicle.pose.attitude)
+    vehicle.set_airsim_pose(Pose((0.0, 0.0, -3.0), there.attitude), ignore_collision=False)
+    vehicle.set_airsim_pose(there, ignore_collision=False)
+    reach = vehicle.settings.radius + 0.1
+    assert vehicle.pose.position[0] == pytest.approx(2.0 - reach / math.cos(math.pi / 6), abs=0.01)
+    assert vehicle.collision()["object_name"] == "wall"
+    simulation.close()
 
 
 @pytest.mark.parametrize(
