@@ -1,9 +1,10 @@
 """Figures of the documentation that no command writes.
 
 `python -m tools.figures placebos FOLDER` plots the tests of the heat maps in a folder of `drone-rl
-explain`.
+explain`; `python -m tools.figures house` renders the indoor scene.
 """
 
+import dataclasses
 import json
 import sys
 from collections.abc import Mapping
@@ -55,6 +56,40 @@ def plot_placebos(truth: Mapping[str, Any], path: Path, policy: str) -> None:
     figure.savefig(path, dpi=120)
 
 
+INSIDE = ((1.0, 3.4, 1.3, -25.0), (3.4, 5.4, 1.3, 140.0), (5.2, 5.4, 1.2, 25.0))
+"""Where the drone is in each room of the indoor scene: x, y, z in metres, heading in degrees."""
+
+
+def render_house(path: Path) -> None:
+    """Render the indoor scene from above and from inside of its rooms."""
+    import numpy as np
+    import torch
+    from PIL import Image
+
+    from drone_rl.config import BaseTaskSettings
+    from drone_rl.sim.worlds import Worlds
+
+    worlds = Worlds(1, BaseTaskSettings.read({"name": "reach", "scene": ["indoor"]}, "task"))
+
+    worlds.reset(torch.arange(1), [np.random.RandomState(0)])
+
+    def render(camera: str, pose: tuple[float, ...], size: tuple[int, int], fov: float) -> Any:
+        *place, heading = pose
+        half = torch.deg2rad(torch.tensor(heading)) / 2
+        worlds.state.body.position[:] = torch.tensor(place)
+        worlds.state.body.attitude[:] = torch.tensor([half.cos(), 0.0, 0.0, half.sin()])
+        view = worlds.view(camera, width=2 * size[0], height=2 * size[1])
+        view = dataclasses.replace(view, horizontal_fov=fov)
+        image = Image.fromarray(worlds.render(worlds.state, view)[0].numpy())
+        return image.resize(size, Image.Resampling.LANCZOS)
+
+    whole = Image.new("RGB", (1000, 564), "white")
+    whole.paste(render("bottom_center", (5.0, 4.0, 11.0, 90.0), (694, 564), 58.0))
+    for row, pose in enumerate(INSIDE):
+        whole.paste(render("front_center", pose, (300, 184), 100.0), (700, 190 * row))
+    whole.quantize(192).save(path, optimize=True)
+
+
 def _title(name: str) -> str:
     """Return a name as a label."""
     text = name.replace("_", " ").replace("grad cam", "Grad-CAM")
@@ -68,8 +103,10 @@ def main(arguments: list[str], docs: Path = DOCS) -> int:
             (file,) = Path(folder).rglob("explanation.json")
             found = json.loads(file.read_text())
             plot_placebos(found["truth"], docs / "placebos.png", found["name"])
+        case ["house"]:
+            render_house(docs / "house.png")
         case _:
-            print("error: give placebos and a folder of drone-rl explain")
+            print("error: give house, or placebos and a folder of drone-rl explain")
             return 2
     return 0
 
