@@ -41,6 +41,8 @@ BOTTOM_CENTER = CameraSpec("bottom_center", (0, 0, -0.1), (0, -1, 0, 1, 0, 0))
 BACK_CENTER = CameraSpec("back_center", (-0.4, 0, 0), (0, 1, 0, 0, 0, 1))
 DRONE_CAMERAS = (FRONT_CENTER, FRONT_RIGHT, FRONT_LEFT, BOTTOM_CENTER, BACK_CENTER)
 """In the order of AirSim's camera numbers 0 to 4."""
+CARRIER = 2 * FRONT_CENTER.pos[0]
+"""Size in metres of a drone on whose surface the front camera is."""
 CHASE = CameraSpec("chase", (-7.0, 0, 3.5), (0, -1, 0, 0.34, 0, 0.94))
 
 
@@ -178,8 +180,13 @@ class DroneEntity(composer.Entity):
 
     semantic_class = SemanticClass.DRONE
 
-    def _build(self, size: float, camera: CameraSettings, name: str = "drone") -> None:
-        """Make the drone, with a bounding box of so many metres, and its cameras."""
+    def _build(
+        self, size: float, camera: CameraSettings, mount: float = 1.0, name: str = "drone"
+    ) -> None:
+        """Make the drone, with a bounding box of so many metres, and its cameras.
+
+        The cameras are at `mount` times their distances from the centre.
+        """
         self._mjcf_root: Any = mjcf.RootElement(model=name)
         self.body: Any = self._mjcf_root.worldbody.add("body", name="body")
         visual = {"group": BODY_GROUP, "contype": 0, "conaffinity": 0}
@@ -191,9 +198,11 @@ class DroneEntity(composer.Entity):
                 place = (x * size * 0.3, y * size * 0.3, size * 0.12)
                 rotor_place = {"name": f"rotor_{end}_{side}", "pos": place, "rgba": _DARK, **rotor}
                 self.body.add("geom", type="cylinder", **rotor_place)
-        for spec in DRONE_CAMERAS:
-            add_camera(self.body, spec, camera.vertical_fov)
-        add_camera(self.body, CHASE, vertical_fov=60.0)
+        fields = dict.fromkeys(DRONE_CAMERAS, camera.vertical_fov)
+        for spec, vertical_fov in {**fields, CHASE: 60.0}.items():
+            x, y, z = spec.pos
+            place = spec._replace(pos=(mount * x, mount * y, mount * z))
+            add_camera(self.body, place, vertical_fov)
 
     @property
     def mjcf_model(self) -> Any:

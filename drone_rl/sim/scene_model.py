@@ -20,7 +20,9 @@ class SceneModel:
         self.field = entities.Field(next(iter(scenes), None))
         model: Any = self.field.mjcf_model
         model.option.gravity = (0, 0, 0)
-        self.drone = entities.DroneEntity(size=task.drone_size, camera=camera)
+        # a small drone's camera must not look through a wall that the drone can't pass
+        mount = min(1.0, task.drone_size / entities.CARRIER) if scenes else 1.0
+        self.drone = entities.DroneEntity(size=task.drone_size, camera=camera, mount=mount)
         self.field.add_free_entity(self.drone)
         with errors_of(self.name, place_of(task.make_props)):
             props = task.make_props()

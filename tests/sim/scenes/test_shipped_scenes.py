@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 import drone_rl
+from drone_rl.config import BaseTaskSettings
 from drone_rl.sim.scenes.scene_file import load_scene
+from drone_rl.sim.worlds import Worlds
 
 FILES = Path(drone_rl.__file__).parent / "sim" / "scenes" / "files"
 
@@ -52,3 +54,12 @@ def test_outdoor_trees_stand_on_the_ground():
         above = data.xpos[body] + [0.0, 0.0, 20.0]
         deep = mujoco.mj_ray(model, data, above, down, None, 1, body, geom)
         assert geom[0] == ground and 20.0 - deep == pytest.approx(0.2, abs=0.15)
+
+
+def test_the_camera_is_on_the_surface_of_a_small_drone():
+    """It would look through walls that the drone can't pass."""
+    worlds = Worlds(1, BaseTaskSettings.read({"name": "reach", "drone_size": 0.3}, "task"))
+    model = worlds.scene.model
+    assert model.cam_pos[model.camera("drone/front_center").id].tolist() == pytest.approx(
+        [0.15, 0.0, 0.0]
+    )
