@@ -28,7 +28,6 @@ from drone_rl.policies import ImageNetwork, RecurrentNetwork, make_actor
 from drone_rl.policies.environment import EnvOptions
 from drone_rl.policies.recurrent import Memory
 from drone_rl.policies.zoo import PolicyDescription, SavedPolicy, find_policy, read_policy
-from drone_rl.policies.zoo.description import TaskDescription
 from drone_rl.sim.rendering.devices import check_defaults
 from drone_rl.sim.tasks import Task
 from drone_rl.utils.display import table
@@ -251,7 +250,7 @@ class Policy(BasePolicy):
         """See `BasePolicy`."""
         changed_task = changed(self.task, task, changes, "task")
         with prefixed_errors("task"):
-            described = TaskDescription.of(changed_task)
+            described = self.description.task.changed(changed_task)
         return self._described(task=described)
 
     def in_dynamics(self, dynamics: Mapping[str, Any] | None = None, /, **changes: Any) -> "Policy":

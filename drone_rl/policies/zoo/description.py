@@ -4,6 +4,7 @@ Checkpoints, exported files and run folders contain the same description. It is 
 to build a policy, and all that a file can request.
 """
 
+import functools
 import hashlib
 import logging
 import math
@@ -50,7 +51,8 @@ from drone_rl.policies import ImageNetwork
 from drone_rl.policies.environment import EnvOptions, check_names
 from drone_rl.policies.networks import InputsNetwork
 from drone_rl.sim.actions import Actions
-from drone_rl.sim.dynamics import Dynamics, make_dynamics
+from drone_rl.sim.dynamics import ComputerVision, Dynamics, make_dynamics
+from drone_rl.sim.scenes import load_scene, scene_names
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.models import Model
@@ -87,6 +89,19 @@ def source_of(task: type[BaseTaskSettings]) -> Source | None:
     return Source(name=Path(file).name, hash=hashlib.sha256(content).hexdigest())
 
 
+def scenes_of(task: BaseTaskSettings) -> tuple[Source, ...] | None:
+    """Return the scene files of a task; None if it composes its scene.
+
+    Raises:
+        InputError: One can't be read.
+    """
+    files = getattr(task, "scene", None)
+    if not files:
+        return None
+    scenes = [load_scene(file, task.scene_up, task.scene_scale) for file in files]  # type: ignore[attr-defined]
+    return tuple(Source(name=scene.path.name[:200], hash=scene.sha256) for scene in scenes)
+
+
 class TaskDescription(Model):
     """A task: its registered name, its settings, and what else it is built from."""
 
@@ -95,20 +110,47 @@ class TaskDescription(Model):
     """Its settings, those of its reward by default: a policy is judged without it."""
     rewards: dict[Name, float] = {}
     """Weights of the reward's terms in training; empty for a task without terms."""
-    scene: Source | None = None
-    """The scene's file; None for a scene that the task composes."""
+    scene: Annotated[tuple[Source, ...], MaxLen(16)] | None = None
+    """The files of the scenes in training; None for a scene that the task composes."""
     code: Source | None = None
     """The user's file that registers the task; None for a shipped one."""
 
     @classmethod
-    def of(cls, settings: BaseTaskSettings) -> Self:
-        """Return the description of a task with some settings."""
+    def of(cls, settings: BaseTaskSettings, scene: tuple[Source, ...] | None = None) -> Self:
+        """Return the description of a task with some settings; `scene` is that of its files now."""
         terms: Mapping[str, Any] = getattr(settings, "reward", {})
         weights = {name: term.weight for name, term in terms.items()}
         if weights:
             settings = settings.replace(reward=type(settings).model_fields["reward"].default)
         code = source_of(type(settings))
-        return cls(name=settings.name, parameters=settings, rewards=weights, code=code)
+        values = {"parameters": settings, "rewards": weights, "code": code}
+        return cls(name=settings.name, scene=scene or scenes_of(settings), **values)
+
+    def changed(self, settings: BaseTaskSettings) -> Self:
+        """Return the description with other settings, of training's scenes unless they change."""
+        files = [getattr(of, "scene", None) for of in (self.parameters, settings)]
+        return self.of(settings, self.scene if files[0] == files[1] else None)
+
+    def check_scenes(self) -> None:
+        """Warn about scene files that are not those of the training.
+
+        Raises:
+            InputError: One is missing, or can't be read.
+        """
+        if self.scene is None:
+            return
+        files = self.parameters.scene  # type: ignore[attr-defined]
+        for file in files:
+            if not (Path(file).exists() or file in scene_names()):
+                raise InputError(
+                    f"scene={file}, the scene of this policy's training, is not there; give its "
+                    "path, task.scene=PATH"
+                )
+        for file, known, now in zip(
+            files, self.scene, scenes_of(self.parameters) or (), strict=True
+        ):
+            if known.hash != now.hash:
+                _warn_of_change(file, str(known.hash), str(now.hash))
 
     @pydantic.model_validator(mode="before")
     @classmethod
@@ -140,8 +182,9 @@ class TaskDescription(Model):
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> Self:
-        if self.scene is not None:
-            raise InputError("scene is not supported; use the version of drone_rl that wrote it")
+        count = len(getattr(self.parameters, "scene", None) or ())
+        if count != len(self.scene or ()):
+            raise InputError(f"scene has {len(self.scene or ())} files, its settings {count}")
         if self.code is not None and self.code != source_of(type(self.parameters)):
             _log.warning(
                 "%s, which registers task=%s, is not the file of this policy's training; it is "
@@ -150,6 +193,18 @@ class TaskDescription(Model):
                 self.name,
             )
         return self
+
+
+@functools.cache
+def _warn_of_change(file: str, known: str, now: str) -> None:
+    """Log a changed scene once."""
+    _log.warning(
+        "scene=%s has changed since this policy's training (its hash was %.8s, now %.8s); "
+        "results are of the present scene",
+        file,
+        known,
+        now,
+    )
 
 
 class ActionSpace(Model):
@@ -269,6 +324,7 @@ class PolicyDescription(Model):
         `task` is the same task with other starts of episodes. Without `pixels`: no transforms.
         """
         check_names(self.build_env, options)
+        self.task.check_scenes()
         parts: Any = {"appearance": self.appearance, **options}
         parts["dynamics"] = options.get("dynamics") or self.dynamics
         if isinstance(parts["dynamics"], DynamicsSettings):  # others have actions of their own
@@ -289,7 +345,10 @@ class PolicyDescription(Model):
 
     def make_dynamics(self) -> Dynamics:
         """Return the vehicle dynamics."""
-        default = as_task(self.task.parameters).make_dynamics
+        task = self.task.parameters
+        default = as_task(task).make_dynamics if not self.task.scene else None
+        if default is None:  # its scene may be missing, which task.scene=PATH then replaces
+            default = functools.partial(ComputerVision, task.step_length)  # type: ignore[attr-defined]
         return make_dynamics(default, self.dynamics, self.actions.settings)
 
     def make_transforms(self) -> list[TorchrlTransform]:
