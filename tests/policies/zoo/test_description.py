@@ -7,13 +7,20 @@ from pathlib import Path
 import pytest
 import torch
 
-from drone_rl.config import COMPUTER_VISION, ActionSettings, AppearanceSettings, TaskSettings
+from drone_rl.config import (
+    COMPUTER_VISION,
+    TASKS,
+    ActionSettings,
+    AppearanceSettings,
+    TaskSettings,
+)
 from drone_rl.config.registry import register_network, register_transform
 from drone_rl.envs.transforms import PixelTransform
 from drone_rl.policies import SmallCNN
 from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.policies.zoo.description import ActionSpace, TaskDescription
 from drone_rl.sim.dynamics import ComputerVision
+from drone_rl.sim.scenes import load_scene
 from drone_rl.sim.tasks import as_settings
 from drone_rl.utils.errors import InputError
 from tests.fake_flight import FLIGHT, floating
@@ -214,7 +221,7 @@ def test_image_shape_is_predicted(camera, transforms, shape):
         ("task.parameters.spacing", float("nan"), "spacing=nan"),
         ("task.parameters.wind", 1.0, "task.parameters.wind is unknown"),
         ("task.parameters.vertical_bound", 3.0, "into the floor; give at least 4.25"),
-        ("task.scene", {"name": "house.xml"}, "task.scene is not supported"),
+        ("task.scene", {"name": "house.xml"}, r"task\.scene=.*must be a list"),
         ("task.code", {"name": "a", "hash": "0" * 63}, "task.code.hash"),
         ("inputs", {}, "inputs=.* at least 1 item"),
         (f"{IMAGE}.kind", "vector", "vector.quantity is missing"),
@@ -374,3 +381,23 @@ def test_the_file_of_a_users_task_is_named_and_another_one_reported(caplog):
     assert "older.py" in caplog.text
     shipped = TaskDescription.of(TaskSettings())
     assert shipped.code is None and shipped.rewards == {"reached": 1.0}
+
+
+def test_a_scene_is_named_by_its_hash_and_missed_when_it_is_needed(tmp_path, caplog):
+    file = tmp_path / "hall.xml"
+    text = '<mujoco><worldbody><geom type="plane" size="9 9 1"/>{}</worldbody></mujoco>'
+    file.write_text(text.format('<site name="goal" pos="3 0 1"/><site name="start" pos="0 0 1"/>'))
+    task = TASKS["reach"](scene=(str(file),), start={"z": 1.0})
+    described = TaskDescription.of(task)
+    (scene,) = described.scene
+    assert (scene.name, scene.hash) == ("hall.xml", load_scene(file).sha256)
+    assert "plane" not in described.model_dump_json()
+    file.write_text(text.format('<site name="goal" pos="4 0 1"/><site name="start" pos="0 0 1"/>'))
+    again = TaskDescription.read(described.model_dump(mode="json"))
+    again.changed(task.replace(step_limit=5)).check_scenes()
+    assert "has changed since this policy's training" in caplog.text
+    assert again.changed(task.replace(scene=("indoor",))).scene[0].name == "indoor.xml"
+    file.unlink()
+    missing = TaskDescription.read(described.model_dump(mode="json"))
+    with pytest.raises(InputError, match=r"hall\.xml.*is not there; give its path, task\.scene="):
+        missing.check_scenes()
