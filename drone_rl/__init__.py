@@ -117,7 +117,7 @@ _HOMES = {name: module for _, module, _, name, *_ in _FOUND}
 
 __all__ = [*_HOMES]  # pyright: ignore[reportUnsupportedDunderAll] (aliases above are public)
 
-for _task in ("collect_cubes", "pillars"):  # those of `drone_rl.sim.tasks`, imported later
+for _task in ("collect_cubes", "pillars", "reach"):  # those of `drone_rl.sim.tasks`, imported later
     register_environment(_task)
 
 
