@@ -585,6 +585,12 @@ WORLDS = (
         "3",
     ),
     Row(
+        "world_contacts",
+        "largest error of distances to what is solid, 1,000 points in each of six scenes",
+        "{contact_error_mm:.4f} mm",
+        "1 mm",
+    ),
+    Row(
         "world_training",
         "`reach` indoors, by moves and in flight: seconds until a verdict's success is 90% (median "
         "of 3 seeds)",

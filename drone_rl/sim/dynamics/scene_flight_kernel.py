@@ -26,7 +26,7 @@ _CORNERS = wp.constant(4)
 _STANDS = wp.constant(0.7)
 """Upward part of a normal from which a drone stands on the solid."""
 _ROUNDED = wp.constant(1e-5)
-"""Metres by which a drone that a solid stops may keep off it."""
+"""Metres by which a drone that a solid has stopped or pushed back may keep off it, or overlap."""
 
 
 @wp.struct
@@ -76,7 +76,7 @@ def encountered(
             after.free = 0.0
         else:
             count = _CORNERS
-        least = 0.0
+        least = _ROUNDED
     return after
 
 
