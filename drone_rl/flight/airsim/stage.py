@@ -25,6 +25,7 @@ from drone_rl.sim.entities import KINDS
 from drone_rl.sim.rendering import Appearance, Distractors
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.rendering.view import Modality
+from drone_rl.sim.scenes.compiling import UNNAMED
 from drone_rl.sim.tasks import ObjectTask
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.worlds import Worlds
@@ -90,7 +91,7 @@ class Stage:
         """Segmentation ids of all geoms and the sky, and those without the clients' own."""
         self._own_ids: dict[str, int] = {}
         self._of_file = self._read_file()
-        """Poses in NED of the named geoms of a file, relative to its model."""
+        """Poses in NED of the geoms and named bodies of a file, relative to its model."""
         self.reset()
 
     @staticmethod
@@ -159,7 +160,7 @@ class Stage:
         return [*self._names, *self._spawned]
 
     def _read_file(self) -> dict[str, Pose]:
-        """Return the poses of a file's geoms, by their names."""
+        """Return the poses of a file's geoms and bodies, by their names; geoms precede bodies."""
         if not self._is_file:
             return {}
         model = self.worlds.scene.model
@@ -173,6 +174,11 @@ class Stage:
             if name:
                 place = torch.tensor(data.geom_xpos[geom])
                 poses[name] = Pose.of(place, torch.tensor(attitude))
+        for body in range(model.nbody):
+            whole, _, name = model.body(body).name.partition("/")
+            if whole == self._names[0] and name and not name.startswith(UNNAMED):
+                attitude = torch.tensor(data.xquat[body])
+                poses.setdefault(name, Pose.of(torch.tensor(data.xpos[body]), attitude))
         return poses
 
     def find(self, pattern: str) -> list[str]:
@@ -333,8 +339,10 @@ class Stage:
         elif name in self._spawned:
             index = len(self._names) + self._spawned[name].number
         elif name in self._of_file:
-            names = [scene.model.geom(i).name.partition("/")[2] for i in range(scene.model.ngeom)]
-            return [i for i, of in enumerate(names) if of == name]
+            model, whole = scene.model, f"{self._names[0]}/{name}"
+            geoms = range(model.ngeom)
+            named = [i for i in geoms if model.geom(i).name == whole]
+            return named or [i for i in geoms if whole in _bodies_around(model, i)]
         else:
             return []
         return [i for i, of in enumerate(scene.props) if of == index]
@@ -414,6 +422,15 @@ class Stage:
     def close(self) -> None:
         """Close the renderer."""
         self.worlds.close()
+
+
+def _bodies_around(model: Any, geom: int) -> list[str]:
+    """Return the names of the bodies that a geom belongs to."""
+    body, names = int(model.geom_bodyid[geom]), []
+    while body:
+        names.append(model.body(body).name)
+        body = int(model.body_parentid[body])
+    return names
 
 
 def png(image: Tensor) -> bytes:

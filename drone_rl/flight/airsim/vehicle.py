@@ -194,11 +194,19 @@ class Vehicle(Pilot):
 
     def _hover(self) -> None:
         """Let an armed vehicle that was put into the air fly: it holds its place there."""
-        height = float(self.body.position[0, 2]) - self.settings.radius
-        if self._is_armed and not self._is_flying and height > _STANDS:
+        if self._is_armed and not self._is_flying and not self._stands():
             self._settle()
             self._landed = LandedState.FLYING
             self.collisions.forget()
+
+    def _stands(self) -> bool:
+        """Return whether the ground, or a solid of a scene file, is right below it."""
+        scene, radius = self._scene_solids, self.settings.radius
+        if scene is None:
+            return float(self.body.position[0, 2]) - radius <= _STANDS
+        here = self.body.position
+        below = here - here.new_tensor([0.0, 0.0, _STANDS])
+        return float(scene.solids.sweep_at(here, below, radius, scene.places).fraction) <= 1.0
 
     @property
     def sensors(self) -> Sensors:
@@ -242,10 +250,11 @@ class Vehicle(Pilot):
     # Frames
 
     def world(self, position: Sequence[float]) -> tuple[float, float, float]:
-        """Convert a position to our world; below the ground counts as on it."""
+        """Convert a position to our world; below bare ground counts as on it."""
         x, y, z = to_world(position)
         home = self.home.tolist()
-        return home[0] + x, home[1] + y, max(0.0, home[2] + z)
+        lowest = 0.0 if self._scene_solids is None else -math.inf
+        return home[0] + x, home[1] + y, max(lowest, home[2] + z)
 
     def height(self, z: float | None) -> float | None:
         """Convert a z coordinate, if there is one, to a height in our world."""
@@ -310,6 +319,9 @@ class Vehicle(Pilot):
         """
         here = self.body.position[0] if start is None else self.from_geo(start)
         there, around = self.from_geo(place), self._around
+        if (scene := self._scene_solids) is not None:
+            sweep = scene.solids.sweep_at(here[None], there[None], 0.0, scene.places)
+            return float(sweep.fraction) > 1.0
         if min(float(there[2]), float(here[2])) < 0.0:
             return False
         if around is None:

@@ -27,7 +27,7 @@ class SingleQuadrotor(Quadrotor):
         self._before = torch.zeros(1, NUMBERS, dtype=double)
         self._after = torch.zeros(1, NUMBERS, dtype=double)
         self._values, self._drifts = torch.zeros(2, 1, 4, dtype=double)
-        self._centers = torch.zeros(1, 0, 3, dtype=double)
+        self._centers = self._places = torch.zeros(1, 0, 3, dtype=double)
         self._prepared: Any = None
         """What the launch depends on apart from these tensors."""
         self._launch: Any = None
@@ -40,7 +40,8 @@ class SingleQuadrotor(Quadrotor):
             return super().fly(body, goals, ticks, obstacles)
         around = None
         if obstacles is not None:
-            around = (obstacles.centers.shape, obstacles.half_sizes, obstacles.scene)
+            solids = obstacles.scene and obstacles.scene.solids
+            around = (obstacles.centers.shape, obstacles.half_sizes, solids)
         wanted = (goals.modes, ticks, around)
         if wanted != self._prepared:
             self._prepare(goals, ticks, obstacles)
@@ -50,6 +51,8 @@ class SingleQuadrotor(Quadrotor):
         self._drifts.copy_(goals.drifts)
         if obstacles is not None:
             self._centers.copy_(obstacles.centers)
+            if obstacles.scene is not None:
+                self._places.copy_(obstacles.scene.places)
         self._launch.launch()
         return FlightState(self._after.clone())
 
@@ -57,7 +60,11 @@ class SingleQuadrotor(Quadrotor):
         around = None
         if obstacles is not None:
             self._centers = torch.empty_like(obstacles.centers)
-            around = dataclasses.replace(obstacles, centers=self._centers)
+            scene = obstacles.scene
+            if scene is not None:
+                self._places = torch.empty_like(scene.places)
+                scene = dataclasses.replace(scene, places=self._places)
+            around = dataclasses.replace(obstacles, centers=self._centers, scene=scene)
         kernel, solids = kernel_among(around, "cpu")  # starts Warp
         held = FlightGoals(goals.modes, self._values, self._drifts)
         command = flight_kernel.make_command(self.frame, held, ticks, around)

@@ -15,6 +15,8 @@ from drone_rl.utils.errors import InputError
 
 mujoco: Any = _mujoco
 """MuJoCo's bindings, which are untyped."""
+UNNAMED = "unnamed_"
+"""First part of the names of elements that have none in the file."""
 _SECTIONS = {"statistic", "visual", "default", "asset", "worldbody"}
 
 
@@ -129,7 +131,7 @@ def _place_light(element: Element, model: Any, data: Any, number: int) -> None:
 
 def _name(element: Element, number: int) -> None:
     """Name an element as dm_control would, which takes a time of the square of their number."""
-    element.attributes.setdefault("name", f"unnamed_{element.tag}_{number}")
+    element.attributes.setdefault("name", f"{UNNAMED}{element.tag}_{number}")
 
 
 def _set(element: Element, **values: NDArray[np.float64]) -> None:

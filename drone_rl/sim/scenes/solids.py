@@ -14,6 +14,7 @@ from torch import Tensor
 
 from drone_rl.sim.rendering.devices import WorkerPool, on_torch_stream, start_warp
 from drone_rl.sim.scenes import solids_kernel as kernel
+from drone_rl.sim.scenes.compiling import UNNAMED
 from drone_rl.sim.scenes.scene_file import SceneFile
 from drone_rl.utils.errors import InputError
 
@@ -115,13 +116,12 @@ class Solids:
         return len(self.geoms)
 
     def name(self, solid: int) -> str:
-        """Return the name of a solid's geom, else of its body, else the kind of geom."""
+        """Return the name of a solid's geom in the file, else of its body, else a number's."""
         scene, geom = self.geoms[solid].tolist()
         model = self._scenes[scene].model
-        name = model.geom(geom).name or (model.body(model.geom_bodyid[geom]).name)
-        if name and name != "world":
-            return name
-        return mujoco.mjtGeom(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
+        own, body = model.geom(geom).name, model.body(model.geom_bodyid[geom]).name
+        has_own = own and not own.startswith(UNNAMED)
+        return own if has_own or body == "world" or body.startswith(UNNAMED) else body
 
     def at(self, places: Tensor) -> Any:
         """Return `SolidArrays` for kernels, with groups at places, (N, G, 3), metres, float64.

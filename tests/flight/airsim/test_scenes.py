@@ -10,8 +10,12 @@ from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.stage import Stage
 from drone_rl.flight.image_types import ImageType
 from drone_rl.flight.settings import ServeSettings
+from drone_rl.sim.coordinates import GeoPoint
 from drone_rl.utils.errors import InputError
+from tests.flight.airsim.flying import fly
 from tests.flight.airsim.looking import look
+
+SAME = (math.nan,) * 4
 
 
 def test_blocks_can_be_touched_and_a_file_is_shown(tmp_path):
@@ -83,6 +87,38 @@ def test_vehicles_collide_with_a_file_and_start_below_its_start(tmp_path):
     reach = vehicle.settings.radius + 0.1
     assert vehicle.pose.position[0] == pytest.approx(2.0 - reach / math.cos(math.pi / 6), abs=0.01)
     assert vehicle.collision()["object_name"] == "wall"
+    assert vehicle.sees(GeoPoint(*vehicle.geo_point().values()))
+    simulation.close()
+
+
+def test_vehicles_fly_into_the_walls_of_a_file_and_land_on_its_floor(tmp_path):
+    """The wall is one mesh with single triangles; the floor is 3 m deeper behind an edge."""
+    path = tmp_path / "house.xml"
+    path.write_text(
+        '<mujoco><asset><mesh name="wall" inertia="shell" face="0 1 2 0 2 3" '
+        'vertex="5 -9 -9  5 9 -9  5 9 9  5 -9 9"/></asset><worldbody>'
+        '<geom name="step" type="box" size="1 1 1" pos="0 0 -1"/>'
+        '<geom name="floor" type="plane" size="9 9 1" pos="0 0 -3"/>'
+        '<body name="house"><geom type="mesh" mesh="wall"/></body></worldbody></mujoco>'
+    )
+    simulation = Simulation(AirsimSettings(), ServeSettings(scene=str(path), clock="lockstep"))
+    (vehicle,) = simulation.vehicles.values()
+    vehicle.has_api_control = True
+    assert vehicle.set_armed(True)
+    fly(vehicle, vehicle.take_off())
+    assert not vehicle.collision()["has_collided"]
+    fly(vehicle, vehicle.move_by_velocity(4.0, 0.0, 0.0, 4.0))
+    found, radius = vehicle.collision(), vehicle.settings.radius
+    assert found["has_collided"] and found["object_name"] == "house"
+    assert found["object_id"] == simulation.stage.get_id("house") > 0
+    assert found["impact_point"]["x_val"] == pytest.approx(5.0, abs=0.02)
+    assert vehicle.pose.position[0] <= 5.0 - radius + 1e-4
+    there = GeoPoint(*vehicle.geo_point().values())
+    vehicle.set_airsim_pose(Pose((2.0, 0.0, -1.0), SAME), ignore_collision=False)
+    assert vehicle.sees(there)
+    fly(vehicle, vehicle.land())
+    assert float(vehicle.body.position[0, 2]) == pytest.approx(radius - 3.0, abs=0.01)
+    assert vehicle.collision()["object_name"] == "floor"
     simulation.close()
 
 
