@@ -1,5 +1,6 @@
 """A critic next to a policy network: it estimates the value of a state."""
 
+from collections.abc import Callable
 from typing import Any
 
 import torch
@@ -30,6 +31,19 @@ class _Actor(KeepsModes, ProbabilisticTensorDictSequential):
     pass
 
 
+class _Outputs(nn.Module):
+    """A linear layer whose outputs another network has computed, among its own."""
+
+    def __init__(self, layer: nn.Module, columns: slice) -> None:
+        super().__init__()
+        self.weight, self.bias = layer.get_parameter("weight"), layer.get_parameter("bias")
+        self._columns = columns
+
+    def forward(self, outputs: torch.Tensor) -> torch.Tensor:
+        """Return the outputs of the layer. Shapes: (*, all) to (*, those of the layer)."""
+        return outputs[..., self._columns]
+
+
 class ActorCritic(nn.Module):
     """A policy network, split before its last layer, and a critic.
 
@@ -42,6 +56,7 @@ class ActorCritic(nn.Module):
         network: ImageNetwork,
         own: ImageNetwork | None = None,
         generator: torch.Generator | None = None,
+        fuse: Callable[[nn.Module | None], nn.Module | None] = lambda critic: None,
     ) -> None:
         """Add a critic to a policy.
 
@@ -49,6 +64,8 @@ class ActorCritic(nn.Module):
             network: The policy's; an `InputError` unless it is a `PolicyNetwork` of layers in turn.
             own: Of the critic, with one output; None for a linear layer on the policy's features.
             generator: Source of that layer's initial weights.
+            fuse: From that layer, or None, to a faster module for the policy's outputs, followed
+                by the layer's; None for none.
         """
         super().__init__()
         if isinstance(network, InputsNetwork):
@@ -64,20 +81,27 @@ class ActorCritic(nn.Module):
         *_, last = network.layers
         self.inputs = network.in_keys
         """Names of the inputs."""
+        critic = own or _one_number(last, generator)
+        head: nn.Module = last
+        fused = fuse(None if own else critic)
+        if fused is not None:
+            count = len(last.get_parameter("weight"))
+            trunk, head = fused, _Outputs(last, slice(0, count))
+            critic = own or _Outputs(critic, slice(count, None))
         self.trunk = TensorDictModule(trunk, in_keys=[*self.inputs], out_keys=[FEATURES])
-        """Inputs to "features"."""
-        head = ProbabilisticTensorDictModule(
+        """Inputs to "features"; with `fuse` to the outputs of policy and critic."""
+        policy = ProbabilisticTensorDictModule(
             in_keys=["logits"],
             out_keys=["action"],
             distribution_class=distribution_of(network.actions.entry.dtype),
             return_log_prob=True,
             log_prob_key=LOG_PROB,
         )
-        modules: Any = (TensorDictModule(last, in_keys=[FEATURES], out_keys=["logits"]), head)
+        modules: Any = (TensorDictModule(head, in_keys=[FEATURES], out_keys=["logits"]), policy)
         self.actor = _Actor(*modules)
         """"features" to "logits" and the distribution of "action"."""
         self.critic = TensorDictModule(
-            own or _one_number(last, generator),
+            critic,
             in_keys=[FEATURES] if own is None else [*own.in_keys],
             out_keys=[VALUE],
         )

@@ -9,10 +9,11 @@ from typing import Any
 import torch
 from tensordict import TensorDict, TensorDictBase
 from tensordict.utils import NestedKey
-from torch import Tensor
+from torch import Tensor, nn
 from torchrl.envs.utils import exploration_type
 from torchrl.objectives import A2CLoss, ClipPPOLoss
 
+from drone_rl.acceleration import FusedNetwork, with_fused_passes
 from drone_rl.collectors import RolloutCollector, ThreadedCollector
 from drone_rl.config.learning import A2c, Ppo, Rollouts, WithCritic
 from drone_rl.config.parts import locate
@@ -192,7 +193,16 @@ def _actor_critic_learner(
     assert isinstance(objective, WithCritic)
     weights = torch_generator(settings.seed, Stream.CRITIC_INIT)
     critic = None if objective.shares_trunk else describe(settings).build_critic(weights)
-    model = ActorCritic(components.network, critic, weights).to(settings.device)
+    limits = settings.trainer
+
+    def fuse(layer: Any) -> nn.Module | None:
+        network, threads = components.network, limits.num_threads
+        made = FusedNetwork.try_create(network, threads, critic=layer) if limits.compiled else ()
+        return made if isinstance(made, nn.Module) else None
+
+    if limits.compiled and critic is not None:
+        critic = with_fused_passes(critic, limits.num_threads)
+    model = ActorCritic(components.network, critic, weights, fuse).to(settings.device)
     loss = locate(objective.target)(model.actor, model.critic, functional=False, **options)
     loss.deterministic_sampling_mode = exploration_type()  # see `ReinforceLoss`
     optimizer = settings.optimizer.make(model.parameters())
@@ -204,8 +214,10 @@ def _actor_critic_learner(
         optimizer=optimizer,
         generator=torch_generator(settings.seed, Stream.MINIBATCHES),
         scheduler=settings.scheduler.make(optimizer),
-        max_grad_norm=settings.trainer.max_grad_norm,
-        chunk_frames=settings.trainer.chunk_frames,
+        max_grad_norm=limits.max_grad_norm,
+        chunk_frames=limits.chunk_frames,
+        # the fused kernel has threads of its own
+        num_threads=1 if isinstance(model.trunk.module, FusedNetwork) else None,
         **objective.passes,
     )
     components.collector.postproc = learner.estimate

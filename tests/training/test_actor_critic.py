@@ -12,6 +12,7 @@ from torchrl.objectives.value import GAE
 import drone_rl
 from drone_rl.acceleration.fused_network import FusedNetwork
 from drone_rl.config import TaskSettings
+from drone_rl.config.inputs import Goal, GrayImage
 from drone_rl.config.learning import A2c, Episodes, Ppo, Rollouts, Sgd
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.config.transforms import EpisodeReward, Gray, Stack
@@ -42,23 +43,31 @@ def checkpoint(training):
     return load_checkpoint(training.folder / "checkpoints" / "last.pt")
 
 
-def test_kernel_gradients_give_the_same_updates_as_torch():
+@pytest.mark.parametrize(
+    "more",
+    [
+        {},
+        {"objective": A2c(entropy_coeff=0.01)},
+        {"objective": A2c(shares_trunk=False), "inputs": {"gray": GrayImage(), "goal": Goal()}},
+    ],
+)
+def test_kernel_gradients_give_the_same_updates_as_torch(more):
     learned = {}
     for is_compiled in (True, False):
         limits = TrainerSettings(compiled=is_compiled, chunk_frames=40)
-        settings = TrainSettings(task=TASK, trainer=limits, optimizer=Sgd(lr=1.0))
+        settings = TrainSettings(task=TASK, trainer=limits, optimizer=Sgd(lr=1.0)).replace(**more)
         made = make_collector(settings)
         learner = settings.objective.make(settings, made)
-        network = learner.loss.actor_network.module[0].module
-        assert isinstance(network, FusedNetwork) is is_compiled
-        before = [p.detach().clone() for p in made.network.parameters()]
+        learns = [made.network, *([learner.model.critic] if more else [])]
+        module = (learner.model.trunk if more else learner.loss.actor_network.module[0]).module
+        assert isinstance(module, FusedNetwork) is is_compiled
+        weights = [p for network in learns for p in network.parameters()]
+        before = [p.detach().clone() for p in weights]
         batch = next(iter(made.collector))
-        assert len(batch) > 2 * limits.chunk_frames
+        assert batch.numel() > 2 * limits.chunk_frames
         learner.update(batch)
         made.collector.shutdown()
-        learned[is_compiled] = [
-            p.detach() - b for p, b in zip(made.network.parameters(), before, strict=True)
-        ]
+        learned[is_compiled] = [p.detach() - b for p, b in zip(weights, before, strict=True)]
     for by_kernel, by_torch in zip(learned[True], learned[False], strict=True):
         assert by_torch.any()
         assert (by_kernel - by_torch).norm() < 0.01 * by_torch.norm()  # ReLU inputs near 0
