@@ -1,16 +1,19 @@
 """Settings of appearance; each value is fixed or a range that is sampled at every reset."""
 
+import dataclasses
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 import pydantic
 import yaml
+from annotated_types import MaxLen
 from pydantic_core import PydanticCustomError
 
 from drone_rl.config.camera import FRONT, CameraSettings
 from drone_rl.config.task import Color, ObjectRegion
 from drone_rl.config.values import Fraction
 from drone_rl.utils.errors import InputError, did_you_mean
-from drone_rl.utils.schema import Listed, Real, Several, Span, Whole
+from drone_rl.utils.schema import Annotation, Listed, Real, Several, Span, Text, Whole
 from drone_rl.utils.settings import Settings, conf_dir
 
 NumberOrRange = float | tuple[float, float]
@@ -24,6 +27,19 @@ Names = str | tuple[str, ...]
 """A name or several; stored as a tuple."""
 NO_TEXTURE = "none"
 """The name for no texture, which a list of textures to sample from may contain."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ByName(Annotation):
+    """The kind of a mapping from names to settings."""
+
+    of: type[Settings]
+
+    @property
+    def hint(self) -> Any:
+        """See `Annotation`."""
+        return Annotated[dict[Annotated[str, Text(80)], self.of], MaxLen(64)]
+
 
 _Tint = Span(Several(Real(0.0, 1.0), 3, 3))
 _Light = Span(Real(0.0, 10.0))
@@ -44,6 +60,26 @@ def _read_preset(name: str) -> dict[str, Any]:
         raise PydanticCustomError("name", "{reason}", {"reason": reason})
     values = yaml.safe_load(files[name].read_text("utf-8"))
     return {**_read_preset(values.pop("defaults")[0]), **values}
+
+
+class ObjectAppearance(Settings):
+    """Color and texture of objects of a scene file; null for the file's own."""
+
+    color: Annotated[ColorOrRange, _Tint] | None = None
+    """Red, green, blue."""
+    texture: Annotated[Names, _Textures] | None = None
+    """Texture, or a list of them; the same values as for the ground."""
+    tile: Annotated[NumberOrRange, _Tile] = 2.0
+    """Edge length of a tile of the texture, in metres."""
+
+
+class LightAppearance(Settings):
+    """Strength and color of lights of a scene file."""
+
+    strength: Annotated[NumberOrRange, _Light] = 1.0
+    """Factor of the light that the file gives."""
+    color: Annotated[ColorOrRange, _Tint] = (1.0, 1.0, 1.0)
+    """Red, green, blue that this light is multiplied by."""
 
 
 class AppearanceSettings(Settings):
@@ -101,6 +137,13 @@ class AppearanceSettings(Settings):
     """Degrees added to `camera.horizontal_fov`; negative values narrow the field of view."""
     exposure: Annotated[NumberOrRange, Span(Real(0.01, 100.0))] = 1.0
     """Factor by which the camera multiplies all colors."""
+    objects: Annotated[Mapping[str, ObjectAppearance], ByName(ObjectAppearance)] = {}
+    """Color and texture of objects of a scene file by name, as in
+    {wall*: {color: [[0, 0, 0], [1, 1, 1]], texture: [bricks, none]}}: names of geoms, bodies or
+    materials, where * stands for any text."""
+    lights: Annotated[Mapping[str, LightAppearance], ByName(LightAppearance)] = {}
+    """Strength and color of lights of a scene file by name, as in {lamp*: {strength: [0.5, 1.5]}};
+    the light at the camera is headlight."""
 
     @pydantic.model_validator(mode="before")
     @classmethod
@@ -115,11 +158,17 @@ class AppearanceSettings(Settings):
     @property
     def varies(self) -> bool:
         """Whether it differs between episodes: a value is sampled, or distractors are placed."""
-        values = {n: v for n, v in self.values().items() if not n.startswith("distractor")}
-        ranges = [v for v in values.values() if isinstance(v, list) and len(v) == 2]
+        values = {n: v for n, v in self if not n.startswith("distractor")}
+        named = [*self.objects.values(), *self.lights.values()]
+        every = [*values.values(), *(value for one in named for _, value in one)]
+        textures = (
+            self.ground_texture,
+            self.object_texture,
+            *(o.texture for o in self.objects.values()),
+        )
         return (
-            any(low != high for low, high in ranges)
-            or any(len(names or ()) > 1 for names in (self.ground_texture, self.object_texture))
+            any(_is_range(value) for value in every)
+            or any(len(names or ()) > 1 for names in textures)
             or 0.0 < self.shadows < 1.0
             or _ends(self.distractors)[1] > 0
         )
@@ -136,9 +185,15 @@ _NARROWEST, _WIDEST = 1.0, 170.0
 
 
 def check_appearance(
-    settings: AppearanceSettings, camera: CameraSettings, region: ObjectRegion | None, task: str
+    settings: AppearanceSettings,
+    camera: CameraSettings,
+    region: ObjectRegion | None,
+    task: str,
+    has_scene: bool = False,
 ) -> None:
     """Check that appearance, camera and object positions (None if unknown) are compatible.
+
+    `has_scene`: whether the task takes place in scene files.
 
     Raises:
         InputError: Distractors can't be placed, the camera starts inside an object, or its field of
@@ -151,11 +206,13 @@ def check_appearance(
                 f"appearance.camera_widening={widening:g} makes a field of view of "
                 f"{fov + widening:g} degrees; give {_NARROWEST - fov:g} to {_WIDEST - fov:g}"
             )
-    if region is None:
+    _check_names(settings, task, has_scene)
+    if region is None or has_scene:
         if _ends(settings.distractors)[1]:
+            reason = "is in a scene file" if has_scene else "does not define object positions"
             raise InputError(
-                f"appearance.distractors={_ends(settings.distractors)[1]}: task={task} does not "
-                "define object positions, so distractors can't be placed; give distractors=0"
+                f"appearance.distractors={_ends(settings.distractors)[1]}: task={task} {reason}, "
+                "so distractors can't be placed; give distractors=0"
             )
         return
     (_, forward), (most_right, most_left), (lowest, _) = low_and_high(settings.camera_offset)
@@ -177,6 +234,19 @@ def check_appearance(
             f"appearance.camera_offset={aside:g} sideways puts the camera into a distractor; give "
             f"less than {limit:g}, or a greater distractor_distance"
         )
+
+
+def _check_names(settings: AppearanceSettings, task: str, has_scene: bool) -> None:
+    for name in () if has_scene else {**settings.objects, **settings.lights}:
+        raise InputError(
+            f"appearance: {name!r} is named in a scene file, and task={task} has none; give "
+            "task.scene=FILE, or leave appearance.objects and appearance.lights out"
+        )
+
+
+def _is_range(value: Any) -> bool:
+    is_pair = isinstance(value, tuple) and len(value) == 2 and not isinstance(value[0], str)
+    return is_pair and value[0] != value[1]
 
 
 def _ends(value: Any) -> tuple[float, float]:

@@ -148,7 +148,8 @@ class TrainSettings(Settings):
         if self.renderer != "raytrace" and not self.appearance.is_minimal:
             self.refuse("renderer", "supports only appearance=minimal; give renderer=raytrace")
         self.dynamics.check_air()
-        check_appearance(self.appearance, self.camera, self.task.object_region, self.task.name)
+        task, has_scene = self.task, bool(getattr(self.task, "scene", None))
+        check_appearance(self.appearance, self.camera, task.object_region, task.name, has_scene)
         seen = {"camera": CameraSettings(), "transforms": DEFAULT_TRANSFORMS}
         unused = [name for name, default in seen.items() if getattr(self, name) != default]
         if unused and not any(isinstance(one, CameraPixels) for one in self.inputs.values()):

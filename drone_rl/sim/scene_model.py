@@ -16,6 +16,7 @@ class SceneModel:
         """Compose the model; raise an `InputError` if the task's props fail."""
         self.name = f"task={task.name}"
         scenes = getattr(task, "scenes", ())
+        self._is_file = bool(scenes)
         self._sky = (0.0, 0.0, 0.0) if scenes else entities.SKY_COLOR
         self.field = entities.Field(next(iter(scenes), None))
         model: Any = self.field.mjcf_model
@@ -41,4 +42,4 @@ class SceneModel:
         for number, entity in [(-1, self.drone), *enumerate(self.props)]:
             for geom in physics.bind(entity.mjcf_model.find_all("geom")).element_id:
                 classes[geom], props[geom] = entity.semantic_class, number
-        return Scene(model, tuple(classes), tuple(props), self._sky)
+        return Scene(model, tuple(classes), tuple(props), self._sky, self._is_file)

@@ -4,9 +4,11 @@ Each environment samples from a stream of its own: episodes are the same for any
 """
 
 import copy
+import dataclasses
 import functools
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,10 +16,17 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import AppearanceSettings, BaseTaskSettings, CameraSettings
-from drone_rl.config.appearance import NO_TEXTURE, Names, check_appearance, low_and_high
+from drone_rl.config.appearance import (
+    MINIMAL,
+    NO_TEXTURE,
+    Names,
+    ObjectAppearance,
+    check_appearance,
+    low_and_high,
+)
 from drone_rl.config.task import ObjectRegion
 from drone_rl.sim.rendering import Appearance, Distractors, Mounting, Texture, textures
-from drone_rl.sim.rendering.appearance import product, turned, zoom_for_fov
+from drone_rl.sim.rendering.appearance import Lamp, ObjectLook, product, turned, zoom_for_fov
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
@@ -105,7 +114,7 @@ def _color(
 _OBJECTS = (SemanticClass.TARGET, SemanticClass.OBSTACLE)
 _APART = 7919
 """Separates the random stream of an appearance from that of the task."""
-_STILL = (0.0, 0.0, 0.0)
+_STILL = _BLACK = (0.0, 0.0, 0.0)
 _OF_CAMERA = 7
 """Numbers of a camera mounting."""
 
@@ -129,11 +138,15 @@ class AppearanceSampler:
         """
         task, self._camera = as_task(task), camera or CameraSettings()
         self._region = object_region_of(task)
-        check_appearance(settings, self._camera, self._region, task.name)
+        self._has_scene = bool(getattr(task, "scenes", ()))
+        check_appearance(settings, self._camera, self._region, task.name, self._has_scene)
         self.settings, self._device = settings, device
         self.distractors = most_distractors(settings)
         """Largest number of distractors."""
-        for name in {*(settings.ground_texture or ()), *(settings.object_texture or ())}:
+        named = [one.texture for one in settings.objects.values()]
+        for name in {
+            n for of in (settings.ground_texture, settings.object_texture, *named) for n in of or ()
+        }:
             if name != NO_TEXTURE:
                 textures.load(name)
         middle = self._sample(None)
@@ -202,7 +215,7 @@ class AppearanceSampler:
         mounting = self._mounting(torch.stack([number() for _ in range(_OF_CAMERA)], -1))
         level = -torch.cos(up)
         direction = [level * torch.cos(around), level * torch.sin(around), -torch.sin(up)]
-        return Appearance(
+        whole = Appearance(
             colors=colors,
             ambient=ambient,
             sun=sun,
@@ -213,8 +226,11 @@ class AppearanceSampler:
             exposure=None if settings.exposure == 1.0 else exposure,
             textures={of: cover for of, cover in covers.items() if cover is not None},
             camera=mounting,
+            objects={n: _object(one, color, number) for n, one in settings.objects.items()},
+            lamps={n: Lamp(color=number()[..., None] * color()) for n in settings.lights},
             distractors=self._distractors(list(columns)),
         )
+        return _of_scene(whole, settings) if self._has_scene else whole
 
     def _mounting(self, values: Tensor) -> Mounting | None:
         s = self.settings
@@ -262,17 +278,46 @@ def _sample_numbers(
     numbers += [*color(s.sun_color), number(s.ambient_strength), float(share <= s.shadows)]
     numbers += [*color(s.sky_horizon), *color(s.sky_zenith or s.sky_horizon)]
     numbers += [math.inf if fog is None else number(fog), *color(s.ground_color)]
-    numbers += [*color(s.object_color or (0.0, 0.0, 0.0)), number(s.exposure)]
+    numbers += [*color(s.object_color or _BLACK), number(s.exposure)]
     numbers += [texture(s.ground_texture), number(s.ground_tile)]
     numbers += [texture(s.object_texture), number(s.object_tile)]
     camera = (*low_and_high(s.camera_offset), *low_and_high(s.camera_turn), s.camera_widening)
-    return [*numbers, *(float(_uniform(pair, source, ())) for pair in camera)]
+    numbers += [float(_uniform(pair, source, ())) for pair in camera]
+    objects = [
+        [*color(one.color or _BLACK), texture(one.texture), number(one.tile)]
+        for one in s.objects.values()
+    ]
+    lamps = [[number(lamp.strength), *color(lamp.color)] for lamp in s.lights.values()]
+    return [*numbers, *itertools.chain(*objects, *lamps)]
 
 
 def _appearance_stream(random_state: np.random.RandomState) -> np.random.RandomState:
     """Return a stream seeded by another one, which is not advanced."""
     ahead = copy.deepcopy(random_state)
     return np.random.RandomState([_APART, *ahead.randint(0, 2**32, 4, dtype=np.uint32)])
+
+
+def _of_scene(whole: Appearance, settings: AppearanceSettings) -> Appearance:
+    """Leave out what settings don't change, so that it stays as in the scene file."""
+
+    def is_set(*names: str) -> bool:
+        return any(getattr(settings, name) != getattr(MINIMAL, name) for name in names)
+
+    kept = {SemanticClass.SKY: is_set("sky_horizon", "sky_zenith"), SemanticClass.GROUND: False}
+    return dataclasses.replace(
+        whole,
+        colors={of: color for of, color in whole.colors.items() if kept.get(of, True)},
+        ambient=whole.ambient if is_set("ambient_strength") else None,
+        sun=whole.sun if is_set("sun_strength", "sun_color") else None,
+        sun_direction=whole.sun_direction if is_set("sun_elevation", "sun_azimuth") else None,
+    )
+
+
+def _object(
+    settings: ObjectAppearance, color: Callable[[], Tensor], number: Callable[[], Tensor]
+) -> ObjectLook:
+    own, cover = color(), _cover(settings.texture, number(), number())
+    return ObjectLook(color=None if settings.color is None else own, texture=cover)
 
 
 def _cover(names: Names | None, choice: Tensor, tile: Tensor) -> Texture | None:

@@ -14,7 +14,7 @@ from drone_rl.config.task import ObjectRegion
 from drone_rl.envs.fault_models import FaultModel, Sample
 from drone_rl.envs.observer import Pipeline, Stage
 from drone_rl.sim.rendering import Appearance, Distractors, Scene
-from drone_rl.sim.rendering.appearance import Colors, moved, turned
+from drone_rl.sim.rendering.appearance import AMBIENT, SUN, SUN_DIRECTION, Colors, moved, turned
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.rendering.view import LUMA
 from drone_rl.sim.visual_randomization import stand
@@ -110,6 +110,8 @@ def scene_appearance(scene: Scene) -> Appearance:
     classes = {*scene.semantic_classes} - {SemanticClass.DISTRACTOR}
     by_class = {m: {*map(tuple, scene.colors[scene.geoms(m), :3].tolist())} for m in classes}
     colors = {m: next(iter(shades)) for m, shades in by_class.items() if len(shades) == 1}
+    if scene.is_file:
+        return Appearance(colors=colors, ambient=(AMBIENT, AMBIENT, AMBIENT), sun=(SUN, SUN, SUN))
     model = scene.model
     lights = (model.light_ambient[0], model.light_diffuse[0], model.light_dir[0])
     ambient, sun, direction = (tuple(light.tolist()) for light in lights)
@@ -136,11 +138,11 @@ def whiten(classes: Sequence[SemanticClass], fraction: float) -> AppearanceChang
 
 
 def sun_at(degrees: float) -> AppearanceChange:
-    """Set the elevation of the sun above the horizon and keep its azimuth."""
+    """Set the elevation of the sun above the horizon and keep its azimuth, or the tasks' own."""
 
     def change(appearance: Appearance, variation: Tensor) -> Appearance:
-        assert appearance.sun_direction is not None
-        ahead = _tensor(appearance.sun_direction)[..., :2]
+        direction = appearance.sun_direction
+        ahead = _tensor(SUN_DIRECTION if direction is None else direction)[..., :2]
         ahead = ahead / ahead.norm(dim=-1, keepdim=True)
         angle = math.radians(degrees)
         down = torch.full_like(ahead[..., :1], -math.sin(angle))

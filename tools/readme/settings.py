@@ -10,6 +10,7 @@ import yaml
 from drone_rl.cli.hydra.composition import CHOSEN, GROUPS, PARTS, SEVERAL
 from drone_rl.cli.main import COMMANDS, find_command
 from drone_rl.config import TASKS, BaseTaskSettings
+from drone_rl.config.appearance import ByName
 from drone_rl.config.configuration import Changes
 from drone_rl.config.parts import Part
 from drone_rl.config.reach import ReachStartSettings
@@ -127,6 +128,9 @@ def _rows(defaults: Settings, prefix: str) -> Iterator[str]:
             meaning = words[name].replace("|", BAR)
             range_of = f"{_may_be(hint)} | {unit_of(hint)} | {_shown(value)}"
             yield f"| `{prefix}{name}` | {range_of} | {meaning} |"
+            (kind, *_) = inner_types(hint)
+            if isinstance(kind, ByName):
+                yield from _rows(kind.of(), f"{prefix}{name}.NAME.")
 
 
 def first_comment(path: Path) -> str:
@@ -151,6 +155,8 @@ def _may_be(hint: Any) -> str:
     (kind, *_) = inner_types(hint)
     if type(None) in typing.get_args(hint):
         return f"{_may_be(kind)}; or null"
+    if isinstance(kind, ByName):
+        return "settings by name"
     of = getattr(kind, "of", kind)
     if isinstance(kind, Changes):
         return f"changes to the policy's {_link(kind.of or BaseTaskSettings)}"

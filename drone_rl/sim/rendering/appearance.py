@@ -19,6 +19,12 @@ Scalars = float | Tensor
 AXES = {"roll": (1.0, 0.0, 0.0), "pitch": (0.0, 1.0, 0.0), "yaw": (0.0, 0.0, 1.0)}
 """Axes that a camera rotates about, drone frame: x forward, y left, z up."""
 _LIGHTS = ("ambient", "sun", "sun_direction")
+AMBIENT = 0.35
+"""Ambient light of the tasks' own scenes."""
+SUN = 0.75
+"""Their sunlight on a surface that faces the sun."""
+SUN_DIRECTION = (0.35, -0.45, -0.82)
+"""Direction in which it travels, world frame."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -88,6 +94,22 @@ class Texture:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class ObjectLook:
+    """Changes to how some objects of a scene file look; None for what stays as in the file."""
+
+    color: Colors | None = None
+    texture: Texture | None = None
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Lamp:
+    """Changes to lights of a scene file."""
+
+    color: Colors
+    """Factor of its color; may be above 1."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Distractors:
     """Distractors, the same for all environments or one set each."""
 
@@ -116,7 +138,11 @@ class Distractors:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Appearance:
-    """Changes to how a scene looks; what is not given stays as in the model."""
+    """Changes to how a scene looks; what is not given stays as in the model.
+
+    In scenes from files, `ambient` and `sun` are relative to `AMBIENT` and `SUN`, and change the
+    light of all lamps; `sun_direction` is that of each file's first directional light.
+    """
 
     colors: Mapping[SemanticClass, Colors] = dataclasses.field(default_factory=dict)
     """Of the geoms of a class, and of the sky."""
@@ -135,6 +161,11 @@ class Appearance:
     """Factor of all colors before they are clipped at white."""
     textures: Mapping[SemanticClass, Texture] = dataclasses.field(default_factory=dict)
     """Of the geoms of a class; the sky has none."""
+    objects: Mapping[str, ObjectLook] = dataclasses.field(default_factory=dict)
+    """Of objects of a scene file by the names of their geoms, bodies or materials; * stands for any
+    text. Later ones take precedence."""
+    lamps: Mapping[str, Lamp] = dataclasses.field(default_factory=dict)
+    """Of lights of a scene file by name, as in `objects`."""
     camera: Mounting | None = None
     """How a camera differs from the model's."""
     distractors: Distractors | None = None
@@ -161,7 +192,7 @@ class Appearance:
         if other is None:
             return self
         fields = {name: value for name, value in vars(self).items() if value is not None}
-        for name in ("colors", "textures"):
+        for name in ("colors", "textures", "objects", "lamps"):
             fields[name] = {**getattr(other, name), **fields[name]}
         return dataclasses.replace(other, **fields)
 
@@ -190,7 +221,7 @@ def _select(value: Any, worlds: slice | Tensor, shared: int = 1) -> Any:
     """Select environments; a tensor of at most `shared` dimensions is kept whole."""
     if isinstance(value, Mapping):
         return {semantic_class: _select(of, worlds) for semantic_class, of in value.items()}
-    if isinstance(value, Distractors | Appearance | Texture | Mounting):
+    if isinstance(value, Distractors | Appearance | Texture | Mounting | ObjectLook | Lamp):
         shares = {**_SHARED_DIMENSIONS, "colors": 2 if isinstance(value, Distractors) else 1}
         fields = {n: _select(v, worlds, shares.get(n, 1)) for n, v in vars(value).items()}
         return type(value)(**fields)

@@ -63,6 +63,8 @@ class Scene:
     distractors; -1 for none."""
     sky: tuple[float, float, float]
     """Background color: red, green, blue in [0, 1]."""
+    is_file: bool = False
+    """Whether the scene is from a file, so that its sky and lights are the file's own."""
 
     def geoms(self, semantic_class: SemanticClass) -> list[int]:
         """Return the indices of the geoms of a class."""

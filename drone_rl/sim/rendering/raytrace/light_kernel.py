@@ -34,6 +34,8 @@ _OFF = wp.constant(1e-4)
 """How far off a surface rays to lights start, relative to the distance from the shot."""
 _FROM_BEHIND = wp.constant(0.3)
 """Factor of the opacity of planes that are seen from behind."""
+_MOST_LIGHTS = wp.constant(8)
+"""Lights that OpenGL has: later ones are off."""
 _GLOBAL = wp.constant(0.3)
 """Ambient light of a scene without lights, as MuJoCo has it."""
 
@@ -56,6 +58,8 @@ class Light:
     """Metres; the light ends there. Infinite for none."""
     casts: int
     """Whether it casts shadows."""
+    is_sun: int
+    """Whether it is the first directional light of its frame."""
 
 
 @struct
@@ -90,6 +94,12 @@ class Lighting:
     horizon: wp.array[wp.vec3]
     """Color of the sky, 0 to 1; red below 0 for the scene's own."""
     zenith: wp.array[wp.vec3]
+    sun: wp.array[wp.vec3]
+    """Direction of light that travels from the sun; 0 for the model's."""
+    haze: wp.array[wp.vec3]
+    """Color of fog, 0 to 1."""
+    extinction: wp.array[float]
+    """Of fog, per metre; 0 for clear air."""
     exposure: wp.array[float]
     """Factor of all light."""
 
@@ -162,7 +172,11 @@ def start_image(
             turn = rotation(frame_attitude(frame, world.poses.attitudes[env]))
             placed.position = world.poses.positions[env, frame] + turn @ placed.position
             placed.direction = turn @ placed.direction
-        if frame == CAMERA_FRAME or not _is_hidden(world, env, frame):
+            sun = look.lighting.sun[env % look.lighting.sun.shape[0]]
+            if look.lighting.lights[light].is_sun != 0 and wp.length_sq(sun) > 0.0:
+                placed.direction = sun
+        is_on = frame == CAMERA_FRAME or not _is_hidden(world, env, frame)
+        if is_on and shot.count < _MOST_LIGHTS:
             shot.lights[shot.count] = placed
             shot.count += 1
             if placed.kind != POINT:
@@ -206,16 +220,17 @@ def _place_light(lighting: Lighting, number: int, env: int) -> PlacedLight:
 def sky(look: Look, direction: wp.vec3, shot: Shot) -> wp.vec3:
     """Return the color, 0 to 1, of a ray that hits nothing. `direction`: world frame."""
     lighting = look.lighting
-    horizon = lighting.horizon[shot.env % lighting.horizon.shape[0]]
-    if horizon[0] < 0.0:
-        if shot.skybox < 0:
-            return wp.vec3()
-        ray = direction / wp.max(wp.dot(direction, shot.forward), 1e-6)
-        return sample_cube(
-            look.textures, shot.skybox, _turn_sky(ray), _turn_sky(shot.right), _turn_sky(shot.down)
-        )
-    zenith = lighting.zenith[shot.env % lighting.zenith.shape[0]]
-    return horizon + wp.max(direction[2], 0.0) * (zenith - horizon)
+    color = lighting.horizon[shot.env % lighting.horizon.shape[0]]
+    if color[0] >= 0.0:
+        zenith = lighting.zenith[shot.env % lighting.zenith.shape[0]]
+        color += wp.max(direction[2], 0.0) * (zenith - color)
+    elif shot.skybox >= 0:
+        ray = direction / wp.dot(direction, shot.forward)
+        right, down = _turn_sky(shot.right), _turn_sky(shot.down)
+        color = sample_cube(look.textures, shot.skybox, _turn_sky(ray), right, down)
+    else:
+        color = wp.vec3()
+    return _clip(lighting.exposure[shot.env % lighting.exposure.shape[0]] * color)
 
 
 @wp.func
@@ -288,8 +303,14 @@ def _shade_surface(
             look.surfaces, look.textures, world, hit, back @ right, back @ below, row
         )
         total = wp.cw_mul(total, texel)
-    exposure = look.lighting.exposure[shot.env % look.lighting.exposure.shape[0]]
-    return _clip(exposure * total)
+    lighting = look.lighting
+    total = _clip(lighting.exposure[shot.env % lighting.exposure.shape[0]] * total)
+    extinction = lighting.extinction[shot.env % lighting.extinction.shape[0]]
+    if extinction > 0.0:
+        haze = lighting.haze[shot.env % lighting.haze.shape[0]]
+        clear = wp.exp(-extinction * wp.length(hit.point - shot.position))
+        total = haze + clear * (total - haze)
+    return total
 
 
 @wp.func

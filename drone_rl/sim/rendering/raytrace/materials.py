@@ -15,7 +15,7 @@ from drone_rl.sim.rendering.scene import Scene, SemanticClass
 
 _LIGHTS = {"ambient": "ambient", "sun": "diffuse", "sun_direction": "direction"}
 """The kernels' names of an appearance's lights."""
-_EXTINCTION = math.log(20.0)
+EXTINCTION = math.log(20.0)
 """Optical depth of air in which 5% of a contrast is left."""
 _NO_TEXTURE = np.zeros((1, 3), np.uint8)
 """Keeps the array of texels from being empty."""
@@ -102,7 +102,7 @@ class MaterialsEncoder:
         shadows = 0 if appearance.shadows is None else appearance.shadows
         values = {
             "zenith": (zenith * 255).floor().float(),
-            "extinction": (_EXTINCTION / expand_scalar(visibility, count)).float(),
+            "extinction": (EXTINCTION / expand_scalar(visibility, count)).float(),
             "shadows": expand_scalar(shadows, count).int(),
             "texture": texture,
             "tiles": tiles,

@@ -43,6 +43,8 @@ _TRIANGLES = (
 def why_not_simple(scene: Scene) -> str | None:
     """Return a geom or light that only `SceneRaytracer` renders; None if `Raytracer` can."""
     model = scene.model
+    if scene.is_file:
+        return "the scene is from a file"
     for geom in range(model.ngeom):
         if model.geom_type[geom] not in HALF_EXTENTS:
             kind = mujoco.mjtGeom(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
@@ -104,13 +106,17 @@ class Frames:
         mujoco.mju_mulQuat(relative, back, whole)
         return frame, there, relative
 
+    def frame_of(self, body: int) -> int:
+        """Return the frame that a body is fixed to."""
+        return int(self._of_body[body])
+
     def place_light(self, light: int) -> tuple[int, NDArray, NDArray]:
         """Return the frame of a light, and its position and direction in it.
 
         A light that follows something, or points at it, stays as it is at the start.
         """
         data, body = self._data, int(self._model.light_bodyid[light])
-        frame = int(self._of_body[body])
+        frame = self.frame_of(body)
         root = self._model.body_rootid[body] if frame else 0
         back = data.xmat[root].reshape(3, 3).T
         position = data.light_xpos[light] - data.xpos[root]

@@ -20,7 +20,7 @@ _MOST_LINES = 200
 """MuJoCo's `mjMAXPLANEGRID`: grid lines of a plane."""
 
 
-def make_surfaces(scene: Scene, device: str) -> kernel.Surfaces:
+def make_surfaces(scene: Scene) -> kernel.Surfaces:
     """Return what the geoms of a scene look like."""
     model = scene.model
     count = model.ngeom
@@ -49,7 +49,7 @@ def make_surfaces(scene: Scene, device: str) -> kernel.Surfaces:
         "counts": ([cell[4:] for cell in cells], wp.vec2i),
     }
     for name, (value, dtype) in values.items():
-        setattr(made, name, wp.array(np.asarray(value), dtype=dtype, device=device))
+        setattr(made, name, wp.array(np.asarray(value), dtype=dtype, device="cpu"))
     quality = model.vis.quality
     made.divisions, made.slices = int(quality.numquads), int(quality.numslices)
     made.stacks = int(quality.numstacks)

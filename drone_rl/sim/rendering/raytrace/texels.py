@@ -1,5 +1,6 @@
 """Textures of a scene, with their mip levels, for `texels_kernel`."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco as _mujoco
@@ -7,6 +8,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from drone_rl.sim.rendering import textures
 from drone_rl.sim.rendering.raytrace.texels_kernel import Textures
 from drone_rl.sim.rendering.scene import Scene
 
@@ -21,15 +23,16 @@ _LINEAR = np.round(
 """Linear brightness of the bytes of sRGB images."""
 
 
-def make_textures(scene: Scene, device: str) -> Textures:
-    """Return the textures of a scene with their mip levels."""
+def make_textures(scene: Scene, more: Sequence[str] = ()) -> Textures:
+    """Return the textures of a scene, then some by name or file, with their mip levels."""
     model = scene.model
     texels, starts, faces, total = [np.zeros((1, 3), np.uint8)], [], [], 1
-    widths, heights = model.tex_width.copy(), model.tex_height.copy()
-    for number in range(model.ntex):
-        images = _images(model, number)
+    widths, heights = [], []
+    every = [_images(model, number) for number in range(model.ntex)]
+    for images in every + [textures.load(name)[None] for name in more]:
         rows = [level.reshape(-1, 3) for level in _levels(images)]
-        heights[number], widths[number] = images.shape[1:3]
+        heights.append(images.shape[1])
+        widths.append(images.shape[2])
         starts.append(total)
         faces.append(len(images))
         texels += rows
@@ -43,7 +46,7 @@ def make_textures(scene: Scene, device: str) -> Textures:
         "texels": (np.concatenate(texels).astype(np.uint32) @ _SHIFTS, wp.uint32),
     }
     for name, (value, dtype) in values.items():
-        setattr(made, name, wp.array(np.array(value), dtype=dtype, device=device))
+        setattr(made, name, wp.array(np.array(value), dtype=dtype, device="cpu"))
     return made
 
 
