@@ -58,7 +58,7 @@ def test_rows_name_benchmarks():
         "revisions",
     }  # a chart, and for contributors
     assert named <= set(BENCHMARKS)
-    assert {row.bench for row in rows.HEADLINES} <= named and len(rows.HEADLINES) <= 8
+    assert {row.bench for row in rows.HEADLINES} <= named and len(rows.HEADLINES) <= 3
 
 
 @pytest.mark.parametrize(
@@ -67,7 +67,8 @@ def test_rows_name_benchmarks():
 def test_a_row_shows_kept_figures(row):
     ledger = Ledger(ROOT / "docs" / "results.json")
     table = make_table([row], ledger.figures)
-    assert UNKNOWN not in table or row.bench == "airsim"  # whose newest figures are not kept yet
+    is_new = row.bench not in ledger.origins  # it has not run on a quiet machine yet
+    assert UNKNOWN not in table or is_new or row.bench == "airsim"  # newest figures: not kept yet
 
 
 @pytest.mark.parametrize(

@@ -11,13 +11,6 @@ def _peer_seconds(figures: Figures) -> str:
     return "; ".join(f"{seconds:.1f}" for seconds in means)
 
 
-def _relative_time(figures: Figures) -> str:
-    """Format the ratio of training times, and both times."""
-    ratio = figures["solve_over_best_peer"]
-    ours = statistics.mean(figures["peers"]["reinforce"]["seconds"])
-    return f"{ratio:.2f} ({ours:.1f} s against {ours / ratio:.1f} s)"
-
-
 def _world_solved(figures: Figures) -> str:
     solved = figures["world_solve_s"].values()
     return "; ".join("not solved" if one is None else f"{one:.0f}" for one in solved)
@@ -26,24 +19,8 @@ def _world_solved(figures: Figures) -> str:
 HEADLINES = (
     Row(
         "solve",
-        "Seconds to train the default task, start-up included, median of 5 seeds",
+        "Seconds to train the chapter's task, start-up included, median of 5 seeds",
         "{time_to_solve_s.median:.1f}",
-    ),
-    Row(
-        "solve",
-        "Success rate in 1,000 held-out episodes, lower end of the 95% CI, worst of 5 seeds",
-        "{success_lower95.min:%}",
-    ),
-    Row(
-        "peers",
-        "Time until solved, relative to the fastest other: Stable-Baselines3's PPO or A2C, or "
-        "TorchRL's Collector (means of 3 seeds)",
-        _relative_time,
-    ),
-    Row(
-        "render",
-        "Rendering speed at 25x64 pixels relative to MuJoCo Warp, same CPU",
-        lambda figures: f"{figures['render_over_warp']['25x64']:.1f} times",
     ),
     Row(
         "gamed",
@@ -55,13 +32,8 @@ HEADLINES = (
         "Heat maps that ignore the policy (such as noise) but pass the tests",
         "{placebo_maps_trusted} of {placebo_maps_total}",
     ),
-    Row(
-        "prove",
-        "Simulated episodes that end differently than proved",
-        "{proof_contradicted} of {proof_flights:,}",
-    ),
 )
-"""The headline figures of README.md, most important first: at most eight that need no legend."""
+"""The headline figures of README.md: three that need no legend."""
 MAIN = (
     Row(
         "solve",
