@@ -41,8 +41,8 @@ BOTTOM_CENTER = CameraSpec("bottom_center", (0, 0, -0.1), (0, -1, 0, 1, 0, 0))
 BACK_CENTER = CameraSpec("back_center", (-0.4, 0, 0), (0, 1, 0, 0, 0, 1))
 DRONE_CAMERAS = (FRONT_CENTER, FRONT_RIGHT, FRONT_LEFT, BOTTOM_CENTER, BACK_CENTER)
 """In the order of AirSim's camera numbers 0 to 4."""
-CARRIER = 2 * FRONT_CENTER.pos[0]
-"""Size in metres of a drone on whose surface the front camera is."""
+CARRIER = 4 * FRONT_CENTER.pos[0]
+"""Size in metres of a drone within whose ball all cameras are, the front one half way."""
 CHASE = CameraSpec("chase", (-7.0, 0, 3.5), (0, -1, 0, 0.34, 0, 0.94))
 
 

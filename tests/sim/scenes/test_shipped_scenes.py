@@ -56,10 +56,10 @@ def test_outdoor_trees_stand_on_the_ground():
         assert geom[0] == ground and 20.0 - deep == pytest.approx(0.2, abs=0.15)
 
 
-def test_the_camera_is_on_the_surface_of_a_small_drone():
+def test_the_camera_is_inside_of_a_small_drone():
     """It would look through walls that the drone can't pass."""
     worlds = Worlds(1, BaseTaskSettings.read({"name": "reach", "drone_size": 0.3}, "task"))
     model = worlds.scene.model
     assert model.cam_pos[model.camera("drone/front_center").id].tolist() == pytest.approx(
-        [0.15, 0.0, 0.0]
+        [0.075, 0.0, 0.0]
     )

@@ -138,3 +138,10 @@ def test_a_scene_without_solids_is_refused(tmp_path):
     path.write_text('<mujoco><worldbody><site name="goal"/></worldbody></mujoco>')
     with pytest.raises(InputError, match="nothing is solid"):
         as_task(reach(path))
+
+
+def test_cameras_are_inside_the_drone_next_to_walls(tmp_path):
+    made = begun(reach(write_house(tmp_path)), 1)
+    model = made.scene.model
+    for name in ("front_center", "front_left", "back_center", "bottom_center"):
+        assert np.linalg.norm(model.camera(f"drone/{name}").pos) < 0.5 * made.task.drone_size
