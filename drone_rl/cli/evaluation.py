@@ -53,6 +53,7 @@ class EvaluateCommand(AppearanceCommandSettings, EvaluateSettings):
         result = drone_rl.evaluate(policy, self, progress=log)
         _log.info("policy: %s", policy.path)
         finish(result, folder / "evaluation.json")
+        _draw_maps(policy, folder, self, result)
         if self.videos:
             from drone_rl.trust.video import film
 
@@ -66,6 +67,15 @@ class EvaluateCommand(AppearanceCommandSettings, EvaluateSettings):
                 renderer=self.renderer,
             )
         return 0, result.success
+
+
+def _draw_maps(policy: Any, folder: Path, settings: HeldOutSettings, result: Seeded) -> None:
+    """Draw the map of each scene file of a policy's task, if there is one."""
+    if getattr(policy.task, "scene", None):
+        from drone_rl.trust.scene_map import save_maps
+
+        for path in save_maps(policy, folder, settings, result.seed or 0):
+            _log.info("written: %s", path)
 
 
 class PlayCommand(AppearanceCommandSettings, DeviceSettings):
@@ -143,6 +153,8 @@ class VerdictCommand(AppearanceCommandSettings, JudgeSettings):
         options["progress"] = None if self.require == "proved" else silent  # a bar of the proof
         result = drone_rl.judge(self.policy, self, **options, **self.shared())
         finish(result, folder / "verdict.json")
+        if result.weights is not None or result.scenes:
+            _draw_maps(self.load_policy(), folder, self, result)
         if self.require == "proved" and result.proof is None:
             _log.info(
                 "the policy has no certificate; make one with drone-rl prove, or give certificate="

@@ -318,6 +318,10 @@ class TermTask(ObjectTask):
         """See `ObjectTask.scene_of`."""
         return state.sampled[:, 4 + 3 * len(self.each)].long()
 
+    def starts_of(self, state: ObjectState) -> Tensor:
+        """Return the number of each episode's start, of `Routes.start_names`. Shape: (N,)."""
+        return state.sampled[:, 5 + 3 * len(self.each)].long()
+
     def routes_of(self, state: ObjectState) -> Tensor:
         """Return the number of the route to each object, -1 for none. Shape: (N, P), int64."""
         first = 6 + 3 * len(self.each)
