@@ -153,7 +153,7 @@ class VerdictCommand(AppearanceCommandSettings, JudgeSettings):
         options["progress"] = None if self.require == "proved" else silent  # a bar of the proof
         result = drone_rl.judge(self.policy, self, **options, **self.shared())
         finish(result, folder / "verdict.json")
-        if result.weights is not None or result.scenes:
+        if result.camera is not None:  # it is no baseline
             _draw_maps(self.load_policy(), folder, self, result)
         if self.require == "proved" and result.proof is None:
             _log.info(

@@ -246,6 +246,7 @@ def judge_one(
         **dict(verdict),
         policy=name,
         weights=identify(loaded),
+        known_scene=_known_scene(loaded),
         certificate=None if claim is None else claim.path,
         shifts=None if measured is None else measured.path,
         findings=find(verdict, measured),
@@ -260,6 +261,15 @@ def identify(policy: BasePolicy | None) -> str | None:
     if policy.description != policy.state.description:
         return None
     return fingerprint(policy.state.weights)
+
+
+def _known_scene(policy: BasePolicy | None) -> str | None:
+    """Return the only scene file of a policy's training if the verdict has the same one."""
+    if not isinstance(policy, Policy):
+        return None
+    own = getattr(policy.state.description.task.parameters, "scene", None)
+    now = getattr(policy.task, "scene", None)
+    return own[0] if own and len(own) == 1 and own == now else None
 
 
 def _loaded(policy: Any, outputs: str | Path, changed: Mapping[str, Any]) -> BasePolicy | None:

@@ -68,7 +68,7 @@ def fly_paths(env: Any, actor: Any, episodes: int = EPISODES) -> list[Path3D]:
     task: Any = base.worlds.task
     agent: Agent = Exploring(as_agent(actor), greedy=True)
     while len(found) < episodes:
-        state = base.start()
+        state: Any = base.start()
         goals = state.places[:, task.roles == GOAL].cpu().numpy()
         scenes = task.scene_of(state).tolist()
         starts = _starts(task, state)
@@ -119,7 +119,7 @@ def draw_map(scene: SceneFile, paths: list[Path3D]) -> Figure:
     plan.set_title(
         f"{scene.name}: {counts['success']} of {len(paths)} episodes reach the goal", fontsize=12
     )
-    _add_legend(plan, counts, height)
+    _add_legend(figure, counts, height)
     _draw_rates(bars, rates)
     return figure
 
@@ -150,7 +150,7 @@ def _draw_path(axis: Axes, path: Path3D) -> None:
         axis.plot(x[-1], y[-1], "X", color=color, mec="white", mew=0.5, ms=9, zorder=4)
 
 
-def _add_legend(axis: Axes, counts: dict[str, int], height: float) -> None:
+def _add_legend(figure: Figure, counts: dict[str, int], height: float) -> None:
     lines = {
         "success": ("reaches the goal", "-", "o"),
         "contact": ("touches something (X)", "-", "X"),
@@ -166,7 +166,7 @@ def _add_legend(axis: Axes, counts: dict[str, int], height: float) -> None:
         Patch(color=css(INK), label=f"solid at {height:.1f} m, the height of flight"),
         Patch(color=css(EMPTY), label=f"solid at {_LOWER * height:.1f} m, flown over"),
     ]
-    axis.get_figure().legend(handles=handles, loc="outside lower left", ncols=2, frameon=False)
+    figure.legend(handles=handles, loc="outside lower left", ncols=2, frameon=False)
 
 
 def _draw_rates(axis: Axes, rates: dict[str, Share]) -> None:
@@ -184,9 +184,7 @@ def _draw_rates(axis: Axes, rates: dict[str, Share]) -> None:
     axis.spines[["top", "right"]].set_visible(False)
 
 
-def save_maps(
-    policy: BasePolicy, folder: Path, settings: HeldOutSettings, seed: int
-) -> list[Path]:
+def save_maps(policy: BasePolicy, folder: Path, settings: HeldOutSettings, seed: int) -> list[Path]:
     """Draw a map of each scene of a policy's task; return the files, none without scenes.
 
     Args:

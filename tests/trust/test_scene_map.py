@@ -1,5 +1,7 @@
 """The map of a scene: paths of episodes, how they end, and success by start."""
 
+from typing import Any
+
 import numpy as np
 import torch
 
@@ -34,7 +36,7 @@ def test_paths_lead_from_starts_to_ends(tmp_path):
 
 
 def test_the_map_counts_contacts_and_shows_walls(tmp_path):
-    env = environment(tmp_path)
+    env: Any = environment(tmp_path)
     paths = fly_paths(env, ConstantAgent(torch.tensor(0)), 20)  # straight on
     hit = [path for path in paths if path.outcome == "contact"]
     assert len(hit) > 10
