@@ -2,9 +2,9 @@
 
 import dataclasses
 import functools
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import mujoco as _mujoco
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from drone_rl.sim.scenes.assets import Folder, version_of
 from drone_rl.sim.scenes.compiling import compile_scene, freeze
-from drone_rl.sim.scenes.elements import write
+from drone_rl.sim.scenes.elements import parse, write
 from drone_rl.sim.scenes.reader import Reader, Reading
 from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.files import as_path
@@ -71,6 +71,19 @@ class SceneFile:
     def name(self) -> str:
         """The file's name without its ending."""
         return self.path.stem
+
+    def without(self, geoms: Collection[str]) -> Self:
+        """Return the scene without some geoms, by name."""
+        root = parse(self.mjcf.encode(), self.path)
+        kept = [self.model.geom(i).name not in geoms for i in range(self.model.ngeom)]
+        for element in (root, *root.every()):
+            element.children = [
+                of for of in element.children if of.tag != "geom" or of.get("name") not in geoms
+            ]
+        solid = tuple(
+            is_solid for is_solid, is_kept in zip(self.solid, kept, strict=True) if is_kept
+        )
+        return dataclasses.replace(self, mjcf=write(root)[0], solid=solid)
 
     @functools.cached_property
     def model(self) -> Any:
