@@ -45,6 +45,7 @@ from benchmarks.verdicts import bench_verdicts
 from benchmarks.worlds.commands import bench_world_commands
 from benchmarks.worlds.contacts import bench_contacts
 from benchmarks.worlds.drawing import bench_drawing
+from benchmarks.worlds.hostile import bench_hostile
 from benchmarks.worlds.judging import bench_world_judging
 from benchmarks.worlds.strangers import bench_strangers
 from benchmarks.worlds.training import bench_world_training
@@ -160,6 +161,7 @@ BENCHMARKS: dict[str, Benchmark] = {
         bench_drawing, "worlds", *_COLLECTING, "acceleration", *_parts("worlds/house")
     ),
     "world_contacts": _benchmark(bench_contacts, "worlds", "sim"),
+    "world_hostile": _benchmark(bench_hostile, "worlds", "sim/scenes", "utils/limits"),
     "world_training": _benchmark(bench_world_training, "worlds", *_SOLVING, "acceleration"),
     "world_judging": _benchmark(
         bench_world_judging, "worlds", *_EXPLAINING, *_parts("maps", "worlds/training")
