@@ -309,14 +309,22 @@ class PlacedSolids:
         fraction = self.solids.sweep_at(before, now, self.radius, self.places).fraction[:, None]
         return torch.where(fraction <= 1.0, before + fraction.clamp(max=1.0) * (now - before), now)
 
-    def touched(self, before: Tensor, now: Tensor) -> tuple[Tensor, Tensor]:
-        """Return which balls touch a solid on their way, and how far it is from their centres then.
+    def touched(self, before: Tensor | None, now: Tensor) -> tuple[Tensor, Tensor]:
+        """Return which balls touch a solid, and how far it is from their centres.
 
-        Shapes: (N,), bool, and (N,), float64, metres.
+        Args:
+            before: Where they come from, (N, 3); None if solids have stopped them on their way.
+            now: Where they are. Shape: (N, 3).
+
+        Returns:
+            Shapes: (N,), bool, and (N,), float64, metres.
         """
         distance = self.solids.nearest_at(now, self.places).distance
-        is_stopped = self.solids.sweep_at(before, now, self.radius, self.places).fraction <= 1.0
-        return is_stopped | (distance <= self.radius + float(kernel.TOUCHING)), distance
+        is_touching = distance <= self.radius + float(kernel.TOUCHING)
+        if before is not None:
+            way = self.solids.sweep_at(before, now, self.radius, self.places)
+            is_touching |= way.fraction <= 1.0
+        return is_touching, distance
 
 
 @functools.lru_cache(8)
@@ -381,8 +389,7 @@ def closed_parts(triangles: Triangles) -> NDArray[np.bool_]:
     ones = np.ones(len(edges))
     _, part = connected_components(coo_array((ones, edges.T), shape=(count, count)), directed=False)
     signs = np.sign(edges[:, 1] - edges[:, 0])
-    _, edge = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
-    edge = edge.reshape(-1)
+    _, edge = np.unique(edges.min(1) * count + edges.max(1), return_inverse=True)
     is_open = np.bincount(edge, weights=signs)[edge] != 0
     open_parts = np.bincount(part[edges[:, 0]], weights=is_open, minlength=part.max() + 1) > 0
     return ~open_parts[part[corners[:, 0]]]

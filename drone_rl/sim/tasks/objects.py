@@ -166,11 +166,20 @@ class ObjectTask(Task[ObjectState]):
             speeds = dynamics.actions.speeds_of(action)
         around = None
         if self.scenes:
-            struck, gaps = self.solids(state).touched(state.drone, body.position)
-            if isinstance(body, FlightState) and isinstance(state.body, FlightState):
-                struck |= body.contact.time > state.body.contact.time
-            around = struck, gaps
+            around = self._around(state, body, dynamics)
         return new, self.rules.step(new, state.drone, speeds, dynamics, around)
+
+    def _around(
+        self, state: ObjectState, body: BodyState, dynamics: Dynamics | None
+    ) -> tuple[Tensor, Tensor]:
+        """Return which drones have touched solids, and how far these are; see `World.struck`."""
+        is_stopped = getattr(dynamics, "stops_at_solids", False)
+        is_flown = isinstance(body, FlightState)  # not straight
+        before = None if is_stopped and not is_flown else state.drone
+        struck, gaps = self.solids(state).touched(before, body.position)
+        if isinstance(body, FlightState) and isinstance(state.body, FlightState):
+            struck |= body.contact.time > state.body.contact.time
+        return struck, gaps
 
     def touch(
         self, state: ObjectState, position: Tensor, before: Tensor | None = None
