@@ -33,12 +33,22 @@ NO_TEXTURE = "none"
 class ByName(Annotation):
     """The kind of a mapping from names to settings."""
 
-    of: type[Settings]
+    inside: type[Settings]
+
+    @property
+    def words(self) -> str:
+        """See `Annotation`."""
+        return "settings by name"
+
+    @property
+    def reason(self) -> str:
+        """See `Annotation`; errors inside have reasons of their own."""
+        return ""
 
     @property
     def hint(self) -> Any:
         """See `Annotation`."""
-        return Annotated[dict[Annotated[str, Text(80)], self.of], MaxLen(64)]
+        return Annotated[dict[Annotated[str, Text(80)], self.inside], MaxLen(64)]
 
 
 _Tint = Span(Several(Real(0.0, 1.0), 3, 3))
@@ -137,13 +147,13 @@ class AppearanceSettings(Settings):
     """Degrees added to `camera.horizontal_fov`; negative values narrow the field of view."""
     exposure: Annotated[NumberOrRange, Span(Real(0.01, 100.0))] = 1.0
     """Factor by which the camera multiplies all colors."""
-    objects: Annotated[Mapping[str, ObjectAppearance], ByName(ObjectAppearance)] = {}
+    objects: Annotated[Mapping[str, ObjectAppearance], ByName(ObjectAppearance)] | None = None
     """Color and texture of objects of a scene file by name, as in
     {wall*: {color: [[0, 0, 0], [1, 1, 1]], texture: [bricks, none]}}: names of geoms, bodies or
-    materials, where * stands for any text."""
-    lights: Annotated[Mapping[str, LightAppearance], ByName(LightAppearance)] = {}
+    materials, where * stands for any text; null for none."""
+    lights: Annotated[Mapping[str, LightAppearance], ByName(LightAppearance)] | None = None
     """Strength and color of lights of a scene file by name, as in {lamp*: {strength: [0.5, 1.5]}};
-    the light at the camera is headlight."""
+    the light at the camera is headlight; null for none."""
 
     @pydantic.model_validator(mode="before")
     @classmethod
@@ -159,12 +169,13 @@ class AppearanceSettings(Settings):
     def varies(self) -> bool:
         """Whether it differs between episodes: a value is sampled, or distractors are placed."""
         values = {n: v for n, v in self if not n.startswith("distractor")}
-        named = [*self.objects.values(), *self.lights.values()]
+        objects, lights = self.objects or {}, self.lights or {}
+        named = [*objects.values(), *lights.values()]
         every = [*values.values(), *(value for one in named for _, value in one)]
         textures = (
             self.ground_texture,
             self.object_texture,
-            *(o.texture for o in self.objects.values()),
+            *(one.texture for one in objects.values()),
         )
         return (
             any(_is_range(value) for value in every)
@@ -237,7 +248,7 @@ def check_appearance(
 
 
 def _check_names(settings: AppearanceSettings, task: str, has_scene: bool) -> None:
-    for name in () if has_scene else {**settings.objects, **settings.lights}:
+    for name in () if has_scene else {**(settings.objects or {}), **(settings.lights or {})}:
         raise InputError(
             f"appearance: {name!r} is named in a scene file, and task={task} has none; give "
             "task.scene=FILE, or leave appearance.objects and appearance.lights out"

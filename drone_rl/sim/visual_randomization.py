@@ -143,7 +143,7 @@ class AppearanceSampler:
         self.settings, self._device = settings, device
         self.distractors = most_distractors(settings)
         """Largest number of distractors."""
-        named = [one.texture for one in settings.objects.values()]
+        named = [one.texture for one in (settings.objects or {}).values()]
         for name in {
             n for of in (settings.ground_texture, settings.object_texture, *named) for n in of or ()
         }:
@@ -226,8 +226,8 @@ class AppearanceSampler:
             exposure=None if settings.exposure == 1.0 else exposure,
             textures={of: cover for of, cover in covers.items() if cover is not None},
             camera=mounting,
-            objects={n: _object(one, color, number) for n, one in settings.objects.items()},
-            lamps={n: Lamp(color=number()[..., None] * color()) for n in settings.lights},
+            objects={n: _object(one, color, number) for n, one in (settings.objects or {}).items()},
+            lamps={n: Lamp(color=number()[..., None] * color()) for n in settings.lights or {}},
             distractors=self._distractors(list(columns)),
         )
         return _of_scene(whole, settings) if self._has_scene else whole
@@ -285,9 +285,9 @@ def _sample_numbers(
     numbers += [float(_uniform(pair, source, ())) for pair in camera]
     objects = [
         [*color(one.color or _BLACK), texture(one.texture), number(one.tile)]
-        for one in s.objects.values()
+        for one in (s.objects or {}).values()
     ]
-    lamps = [[number(lamp.strength), *color(lamp.color)] for lamp in s.lights.values()]
+    lamps = [[number(lamp.strength), *color(lamp.color)] for lamp in (s.lights or {}).values()]
     return [*numbers, *itertools.chain(*objects, *lamps)]
 
 

@@ -130,7 +130,7 @@ def _rows(defaults: Settings, prefix: str) -> Iterator[str]:
             yield f"| `{prefix}{name}` | {range_of} | {meaning} |"
             (kind, *_) = inner_types(hint)
             if isinstance(kind, ByName):
-                yield from _rows(kind.of(), f"{prefix}{name}.NAME.")
+                yield from _rows(kind.inside(), f"{prefix}{name}.NAME.")
 
 
 def first_comment(path: Path) -> str:
@@ -155,8 +155,6 @@ def _may_be(hint: Any) -> str:
     (kind, *_) = inner_types(hint)
     if type(None) in typing.get_args(hint):
         return f"{_may_be(kind)}; or null"
-    if isinstance(kind, ByName):
-        return "settings by name"
     of = getattr(kind, "of", kind)
     if isinstance(kind, Changes):
         return f"changes to the policy's {_link(kind.of or BaseTaskSettings)}"
