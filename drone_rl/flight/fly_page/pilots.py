@@ -219,7 +219,10 @@ class _Drone(Pilot):
 
 
 class PosePilot(FlyPilot):
-    """Computer-vision mode: controls change the pose by steps of 0.25 m and 5 degrees."""
+    """Computer-vision mode: controls change the pose by steps of 0.25 m and 5 degrees.
+
+    What is solid in a scene file ends a step.
+    """
 
     def __init__(self, world: World) -> None:
         """Take over the drone's place and attitude."""
@@ -239,9 +242,16 @@ class PosePilot(FlyPilot):
             count = int(self._left[name])
             self._left[name] -= count
             keys += [name] * count
+        around = self.world.task.obstacles(self.world.worlds.state)
+        scene = None if around is None else around.scene
         for name in keys:
-            if name != "down" or float(self._drone.body.position[0, 2]) - STEP >= _LOWEST:
-                self._drone.press(name)
+            before = self._drone.body.position
+            if name == "down" and scene is None and float(before[0, 2]) - STEP < _LOWEST:
+                continue
+            self._drone.press(name)
+            if scene is not None:
+                body = self._drone.body
+                self._drone.body = body.moved(scene.reached(before, body.position), body.attitude)
         if keys:
             self.world.move(self._drone.body)
 

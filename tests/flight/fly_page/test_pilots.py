@@ -144,6 +144,19 @@ def test_computer_vision_keys_step_the_pose(make_world):
     assert world.worlds.state.steps.tolist() == [0]  # no time passes
 
 
+def test_walls_of_a_scene_file_stop_keys_and_velocities(make_world):
+    """For ten seconds at 4 m/s, in a house of 10 m."""
+    for mode in ("computer_vision", "simple_flight"):
+        world, controls = make_world(untrained(SmallCnn(), task={"name": "reach"})), Controls()
+        pilot = make_pilot(mode, world, Steps().note)
+        controls.hold(["forward"])
+        fly(pilot, controls, 10.0)
+        solids = world.task.solids(world.worlds.state).solids
+        away = float(solids.distances(world.body.position))
+        radius = world.task.drone_size / 2 if mode == "computer_vision" else 0.3
+        assert away == pytest.approx(radius, abs=0.2) and away >= radius - 1e-4
+
+
 def test_velocities_accelerate_the_drone_and_letting_go_stops_it(make_world):
     world, controls = make_world(), Controls()
     pilot = make_pilot("simple_flight", world, Steps().note)
