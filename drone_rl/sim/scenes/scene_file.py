@@ -23,6 +23,8 @@ _SMALLEST, _LARGEST = 0.1, 1000.0
 """Longest edges of worlds, metres; outside of this range the units are wrong."""
 _HUGE = 1e6
 """Metres."""
+_MOST_LIGHTS = 8
+"""Of OpenGL, and so of the ray tracer, with the headlight."""
 _NOT_DRAWN = {
     "flex": "flexes are",
     "flexcomp": "flexes are",
@@ -182,7 +184,7 @@ def _load(file: Path, folder: Folder) -> SceneFile:
         {name: content for name, content in reading.files.items() if name in used},
         _sites(model, data),
         solid,
-        tuple(_warnings(reading.notes)),
+        (*_warnings(reading.notes), *_dark_lights(model)),
     )
     del model, data  # of large meshes hundreds of megabytes
     _check_size(scene)
@@ -236,6 +238,14 @@ def _warnings(notes: Mapping[str, list[str]]) -> list[str]:
         where = f"key frame {notes['key'][0]} has them" if notes["key"] else "they begin"
         lines.append(f"joints do not move; they stay where {where}: {_some(joints)}")
     return lines
+
+
+def _dark_lights(model: Any) -> list[str]:
+    """Return a line about lights that are not drawn, because OpenGL has eight."""
+    most = _MOST_LIGHTS - bool(model.vis.headlight.active)
+    dark = np.flatnonzero(model.light_active).tolist()[most:]
+    names = [model.light(number).name or str(number) for number in dark]
+    return [f"lights after the first {most} are not drawn: {_some(names)}"] if dark else []
 
 
 def _some(names: list[str]) -> str:

@@ -102,6 +102,13 @@ def test_names_what_is_not_drawn(write):
     assert all(word in text for word in ("mirror", "bolt", "cloth", "mujoco.sdf.bolt"))
 
 
+def test_names_lights_that_are_not_drawn(write):
+    """The headlight and seven others are the eight of OpenGL."""
+    lamps = "".join(f'<light name="lamp{i}" pos="0 0 3"/>' for i in range(9))
+    (line,) = load_scene(write('<geom size="1"/>' + lamps)).warnings
+    assert "first 7 are not drawn: lamp7, lamp8" in line
+
+
 @pytest.mark.parametrize(
     ("world", "words"),
     [
