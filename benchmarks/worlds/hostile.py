@@ -240,9 +240,12 @@ HOSTILE: dict[str, Made] = {
     "glb_nodes": {
         "scene.glb": _glb(
             {
-                **_gltf_scene(accessors=[{**_HUGE_ACCESSOR, "count": 3}]),
+                **_gltf_scene(accessors=[{**_HUGE_ACCESSOR, "count": 3, "bufferView": 0}]),
                 "nodes": [{"children": [i + 1] * 10} for i in range(12)] + [{"mesh": 0}],
-            }
+                "buffers": [{"byteLength": 36}],
+                "bufferViews": [{"buffer": 0, "byteLength": 36}],
+            },
+            struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0),
         ),
     },
     "glb_files": {

@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import logging
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, Self
@@ -13,12 +14,14 @@ from numpy.typing import NDArray
 from drone_rl.sim.scenes.assets import Folder, version_of
 from drone_rl.sim.scenes.compiling import compile_scene, freeze
 from drone_rl.sim.scenes.elements import parse, write
+from drone_rl.sim.scenes.meshes import ENDINGS, read_mesh
 from drone_rl.sim.scenes.reader import Reader, Reading
 from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.files import as_path
 
 mujoco: Any = _mujoco
 """MuJoCo's bindings, which are untyped."""
+_log = logging.getLogger(__name__)
 _SMALLEST, _LARGEST = 0.1, 1000.0
 """Longest edges of worlds, metres; outside of this range the units are wrong."""
 _HUGE = 1e6
@@ -156,7 +159,7 @@ def load_scene(path: str | Path, up: str = "z", scale: float = 1.0) -> SceneFile
         versions, scene = _loaded.get((file, up, scale), ({}, None))
         if scene is None or any(version_of(of) != version for of, version in versions.items()):
             folder = Folder(file.parent)
-            scene = _load(file, folder)
+            scene = _load(file, folder, up, scale)
             _loaded[file, up, scale] = folder.versions, scene
         return scene
     except (InputError, OSError, RuntimeError) as error:  # the last are loops of links
@@ -164,10 +167,13 @@ def load_scene(path: str | Path, up: str = "z", scale: float = 1.0) -> SceneFile
         raise InputError(f"scene={path}: {text}") from error
 
 
-def _load(file: Path, folder: Folder) -> SceneFile:
+def _load(file: Path, folder: Folder, up: str, scale: float) -> SceneFile:
     reading = Reading(folder)
-    root = Reader(file, reading).root
+    is_mesh = file.suffix.lower() in ENDINGS
+    root = read_mesh(file, reading, up, scale) if is_mesh else Reader(file, reading).root
     model, text, solid = compile_scene(root, reading)
+    if not model.ngeom:
+        raise InputError(f"it has no geoms{''.join(f'; {of}' for of in _warnings(reading.notes))}")
     data = mujoco.MjData(model)
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)
@@ -187,7 +193,9 @@ def _load(file: Path, folder: Folder) -> SceneFile:
         (*_warnings(reading.notes), *_dark_lights(model)),
     )
     del model, data  # of large meshes hundreds of megabytes
-    _check_size(scene)
+    size = _check_size(scene)
+    if is_mesh:
+        _log.info("scene=%s: its longest edge is %.3g m", file.name, size)
     return scene
 
 
@@ -209,8 +217,8 @@ def _check_numbers(model: Any, data: Any) -> None:
             )
 
 
-def _check_size(scene: SceneFile) -> None:
-    """Raise an `InputError` if the world is too small or too large, or infinite."""
+def _check_size(scene: SceneFile) -> float:
+    """Return the longest edge; raise an `InputError` if the world is too small or too large."""
     low, high = scene.bounds
     model = scene.model
     planes = model.geom_size[model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE, :2]
@@ -223,6 +231,7 @@ def _check_size(scene: SceneFile) -> None:
     if max(abs(low).max(), abs(high).max()) > _LARGEST:
         far = f"[{', '.join(f'{value:.3g}' for value in (low + high) / 2)}]"
         raise InputError(f"the world's middle is {far} m; move it within {_LARGEST:g} m of 0")
+    return size
 
 
 def _warnings(notes: Mapping[str, list[str]]) -> list[str]:
