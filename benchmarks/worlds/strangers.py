@@ -208,5 +208,5 @@ def inner(segmentation: NDArray[np.int32]) -> NDArray[np.bool_]:
 
 
 if __name__ == "__main__":
-    logging.basicConfig(level=logging.INFO, stream=sys.stderr)
+    logging.basicConfig(level=logging.INFO, stream=sys.stderr, force=True)
     sys.stdout.write(json.dumps(measure(int(sys.argv[1]))) + "\n")

@@ -10,6 +10,7 @@ from drone_rl.config.task import TASKS, BaseTaskSettings
 from drone_rl.sim.tasks.task import MAKERS
 from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.sim.worlds import Worlds
+from drone_rl.trust.perturbations import scene_appearance, sun_at
 from drone_rl.utils.errors import InputError
 
 ROOM = """<mujoco><visual><headlight active="0"/></visual>
@@ -94,6 +95,18 @@ def test_fog_and_sky_apply(task):
     _, white, sky = render(task, fog_visibility=4.9, sky_horizon=[0.0, 0.0, 1.0])
     np.testing.assert_allclose(white[0], 0.05 * FULL + 0.95 * np.array([0, 0, 255]), atol=2)
     np.testing.assert_allclose(sky, [[0, 0, 255]] * 2, atol=1)
+
+
+def test_perturbations_begin_with_the_scene_as_it_is(task):
+    worlds = Worlds(1, task, CameraSettings(width=32, height=32))
+    base = scene_appearance(worlds.scene)
+    own, same = worlds.render(worlds.state), worlds.render(worlds.state, appearance=base)
+    assert (own == same).all()
+    low = sun_at(5.0).change(base, torch.zeros(1, 0))  # shines at the walls
+    steep = sun_at(85.0).change(base, torch.zeros(1, 0))
+    bright, dim = (worlds.render(worlds.state, appearance=look)[0, 16, 18] for look in (low, steep))
+    assert int(bright[0]) > int(dim[0]) + 20
+    worlds.close()
 
 
 def test_unknown_names_are_refused(task):
