@@ -79,6 +79,40 @@ def clear(canvas: Canvas) -> None:
     ...
 
 
+_COPY = """
+for (int row = 0; row < canvas.height; ++row)
+    for (int column = 0; column < canvas.across; ++column) {
+        const int tile = row / 8 * canvas.across + column, first = 8 * column;
+        const int count = canvas.width - first < 8 ? canvas.width - first : 8;
+        const int from = 64 * tile + row % 8 * 8, to = row * canvas.width + first;
+        for (int c = 0; c < count; ++c) PIXEL
+    }
+"""
+_DEPTH = """{
+    const float x = (first + c - canvas.x0) / canvas.x_scale;
+    const float y = (row - canvas.y0) / canvas.y_scale;
+    const float along = is_along_ray ? sqrtf(1.0f + x * x + y * y) : 1.0f;
+    const float depth = canvas.depth.data[from + c];
+    values.data[to + c] = depth < 1e9f ? depth * along : 0.0f;
+}"""
+_OWNER = """{
+    const int owner = canvas.owner.data[from + c];
+    values.data[to + c] = owner < 0 ? -1 : numbers.data[owner];
+}"""
+
+
+@wp.func_native(_COPY.replace("PIXEL", _DEPTH))
+def copy_depths(canvas: Canvas, values: wp.array[float], is_along_ray: bool) -> None:
+    """Write depths, or distances along each pixel's ray, row by row; 0 where nothing is shown."""
+    ...
+
+
+@wp.func_native(_COPY.replace("PIXEL", _OWNER))
+def copy_owners(canvas: Canvas, numbers: wp.array[int], values: wp.array[int]) -> None:
+    """Write the numbers of geoms, row by row; -1 where nothing is shown."""
+    ...
+
+
 _AXES = """
 const auto &m = geom.into.data;
 const float x_scale = canvas.x_scale, y_scale = canvas.y_scale;

@@ -15,6 +15,7 @@ from drone_rl.sim.rendering.raytrace.projection_kernel import frame_attitude, pr
 from drone_rl.sim.rendering.raytrace.structs_kernel import NO_GEOM, Geoms, PoseArrays, struct
 from drone_rl.sim.rendering.raytrace.triangles_kernel import (
     Triangles,
+    smooth_normal,
     trace_mesh,
     triangle_normal,
     triangle_weights,
@@ -63,9 +64,6 @@ class Hit:
     """Rotates directions from the geom's frame to the world's."""
     size: wp.vec3
     """Of the geom, as MuJoCo's; zero for meshes and height fields."""
-    is_mapped: bool
-    """Whether the mesh has texture coordinates."""
-    texcoord: wp.vec2
 
 
 @struct
@@ -162,9 +160,8 @@ def make_hit(
     hit.geom = world.geoms.number[geom]
     hit.distance = along
     hit.point = origin + along * direction
-    mesh = world.mesh[geom]
     return complete_hit(
-        hit, world, local.kind, local.size, local.axes, mesh, part, local.origin, local.ray
+        hit, world, local.kind, local.size, local.axes, part, local.origin, local.ray
     )
 
 
@@ -175,7 +172,6 @@ def complete_hit(
     kind: int,
     size: wp.vec3,
     axes: wp.mat33,
-    mesh: int,
     part: int,
     origin: wp.vec3,
     ray: wp.vec3,
@@ -193,14 +189,7 @@ def complete_hit(
         hit.local_normal = triangle_normal(triangles, part)
         hit.face_normal = axes @ hit.local_normal
         weights = triangle_weights(triangles, part, origin, ray)
-        smooth = wp.vec3()
-        for corner in range(3):
-            smooth += weights[corner] * triangles.normals[3 * part + corner]
-        hit.normal = axes @ wp.normalize(smooth)
-        hit.is_mapped = triangles.is_mapped[mesh] != 0
-        if hit.is_mapped:
-            for corner in range(3):
-                hit.texcoord += weights[corner] * triangles.texcoords[3 * part + corner]
+        hit.normal = axes @ smooth_normal(triangles, part, weights)
     else:
         hit.size = size
         hit.local_normal = surface_normal(kind, size, part, origin, ray, hit.distance)

@@ -1,8 +1,12 @@
-"""Triangles into which MuJoCo's OpenGL divides geoms: it lights their corners."""
+"""Triangles into which MuJoCo's OpenGL divides geoms: it lights their corners.
+
+Flat faces have a grid of rectangles, round solids slices and stacks; a corner is a pair of whole
+numbers on that grid, so that the next pixels can use its color again.
+"""
 
 import warp as wp
 
-from drone_rl.sim.rendering.raytrace.cast_kernel import MESH, Hit, World
+from drone_rl.sim.rendering.raytrace.cast_kernel import MESH
 from drone_rl.sim.rendering.raytrace.intersection_kernel import BOX, CAPSULE, PLANE
 from drone_rl.sim.rendering.raytrace.structs_kernel import struct
 from drone_rl.sim.rendering.raytrace.surfaces_kernel import (
@@ -10,14 +14,11 @@ from drone_rl.sim.rendering.raytrace.surfaces_kernel import (
     DOME,
     TUBE,
     TURN,
-    Surfaces,
     face_axes,
-    mesh_weights,
     radii,
     round_part,
     unroll,
 )
-from drone_rl.sim.rendering.raytrace.triangles_kernel import triangle_corner
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -26,79 +27,231 @@ _SMALL = wp.constant(2.0)
 
 
 @struct
-class Corners:
-    """The triangle that a point is on, geom's frame, or the point alone."""
+class Face:
+    """A face of a geom, or its whole surface if it is round, in the geom's frame."""
 
-    count: int
-    """3, or 1 for the point."""
-    places: wp.mat33
-    """A corner in each row."""
-    normals: wp.mat33
-    weights: wp.vec3
+    kind: int
+    part: int
+    """Face or triangle; see `Hit`."""
+    size: wp.vec3
+    normal: wp.vec3
+    """Of a flat face or triangle."""
+    axes: wp.vec2i
+    """Of the grid on a flat face."""
+    first: wp.vec2
+    """Grid line 0."""
+    width: wp.vec2
+    """Distance of grid lines."""
+    counts: wp.vec2i
+    """Cells between the first and the last line; -1 for an infinite face."""
+    level: float
+    """The coordinate that all points of a flat face share."""
+    is_main: bool
+    """Whether the main diagonal divides rectangles, from the first to the last corner."""
+    slices: int
+    stacks: int
 
 
 @struct
-class Half:
-    """One half of a square of side 1, on either side of a diagonal, and a point in it."""
+class Cell:
+    """The triangle that a point is on."""
 
-    corners: wp.mat33
-    """A corner in each row, x and y."""
+    count: int
+    """3, or 1 if the triangle is so small that the point itself is lit."""
+    x: wp.vec3i
+    """Each corner's place on the grid; of a mesh, its number."""
+    y: wp.vec3i
     weights: wp.vec3
+    side: int
+    """Part of a round solid, twice, plus 1 below its middle."""
 
 
 @wp.func
-def find_corners(surfaces: Surfaces, world: World, hit: Hit, eye: wp.vec3, pixel: float) -> Corners:
-    """Return the triangle around a point, of which a pixel shows `pixel` metres.
+def find_cell(face: Face, local: wp.vec3, pixel: float) -> Cell:
+    """Return the triangle around a point of a face that shows `pixel` metres in a pixel."""
+    if face.kind == PLANE or face.kind == BOX:
+        return _find_rectangle(face, local, pixel)
+    return _find_round(face, local, pixel)
 
-    `eye` is the camera's position, world frame.
+
+@wp.func
+def _line(face: Face, axis: int, number: int) -> float:
+    """Return the coordinate of a grid line; those beyond the face's edge are on the edge."""
+    place = face.first[axis] + float(number) * face.width[axis]
+    if face.counts[axis] < 0:
+        return place
+    half = face.size[face.axes[axis]]
+    return wp.clamp(place, -half, half)
+
+
+@wp.func
+def _number(face: Face, axis: int, place: float) -> int:
+    number = int(wp.floor((place - face.first[axis]) / face.width[axis]))
+    if face.counts[axis] < 0:
+        return number
+    return wp.clamp(number, -1, face.counts[axis])
+
+
+@wp.func
+def _point_alone() -> Cell:
+    cell = Cell()
+    cell.count = 1
+    return cell
+
+
+@wp.func
+def _find_rectangle(face: Face, local: wp.vec3, pixel: float) -> Cell:
+    x, y = local[face.axes[0]], local[face.axes[1]]
+    column, row = _number(face, 0, x), _number(face, 1, y)
+    left, low = _line(face, 0, column), _line(face, 1, row)
+    wide = wp.max(_line(face, 0, column + 1) - left, 1e-9)
+    high = wp.max(_line(face, 1, row + 1) - low, 1e-9)
+    if wp.max(wide, high) < _SMALL * pixel:
+        return _point_alone()
+    right, up = wp.clamp((x - left) / wide, 0.0, 1.0), wp.clamp((y - low) / high, 0.0, 1.0)
+    return _halve(column, row, right, up, face.is_main)
+
+
+@wp.func
+def _halve(column: int, row: int, x: float, y: float, is_main: bool) -> Cell:
+    """Return half of a rectangle, in which a point has coordinates from 0 to 1."""
+    cell = Cell()
+    cell.count = 3
+    next, above = column + 1, row + 1
+    if is_main:
+        if y > x:
+            cell.x = wp.vec3i(column, column, next)
+            cell.y = wp.vec3i(row, above, above)
+            cell.weights = wp.vec3(1.0 - y, y - x, x)
+        else:
+            cell.x = wp.vec3i(column, next, next)
+            cell.y = wp.vec3i(row, row, above)
+            cell.weights = wp.vec3(1.0 - x, x - y, y)
+    elif x + y > 1.0:
+        cell.x = wp.vec3i(next, next, column)
+        cell.y = wp.vec3i(above, row, above)
+        cell.weights = wp.vec3(x + y - 1.0, 1.0 - y, 1.0 - x)
+    else:
+        cell.x = wp.vec3i(column, next, column)
+        cell.y = wp.vec3i(row, row, above)
+        cell.weights = wp.vec3(1.0 - x - y, x, y)
+    return cell
+
+
+@wp.func
+def _find_round(face: Face, local: wp.vec3, pixel: float) -> Cell:
+    """Find a triangle of a ball, ellipsoid, capsule or cylinder, in slices and stacks.
+
+    Triangles around a pole have it as one corner.
     """
-    if hit.kind == MESH:
-        return _mesh_corners(world, hit, pixel)
-    if hit.kind == PLANE:
-        cells, counts = surfaces.cells[hit.geom], surfaces.counts[hit.geom]
-        above = hit.local - wp.transpose(hit.axes) @ (hit.point - eye)
-        x_first, y_first = (
-            _first(cells[0], counts[0], above[0]),
-            _first(cells[2], counts[1], above[1]),
+    size = radii(face.kind, face.size)
+    if TURN * wp.max(size[0], size[2]) < _SMALL * pixel * float(face.slices):
+        return _point_alone()
+    part = round_part(face.kind, face.part, face.size, local)
+    stacks = _stacks(face, part)
+    at = unroll(face.kind, face.size, part, local)
+    around, along = at[0] * float(face.slices), at[1] * float(stacks)
+    slice = int(wp.floor(around))
+    stack = wp.clamp(int(wp.floor(along)), 0, stacks - 1)
+    x, y = around - float(slice), wp.clamp(along - float(stack), 0.0, 1.0)
+    is_low = local[2] < 0.0
+    cell = _halve(slice, stack, x, y, (part == DOME and is_low) or (part == DISK and not is_low))
+    if part == DOME and stack == stacks - 1:
+        cell.x = wp.vec3i(slice, slice + 1, slice)
+        cell.y = wp.vec3i(stack, stack, stack + 1)
+        cell.weights = wp.vec3((1.0 - x) * (1.0 - y), x * (1.0 - y), y)
+    if part == DISK and stack == 0:
+        cell.x = wp.vec3i(slice, slice + 1, slice)
+        cell.y = wp.vec3i(1, 1, 0)
+        cell.weights = wp.vec3((1.0 - x) * y, x * y, 1.0 - y)
+    cell.side = 2 * part
+    if is_low:
+        cell.side += 1
+    return cell
+
+
+@wp.func
+def _stacks(face: Face, part: int) -> int:
+    if part == TUBE:
+        return face.stacks
+    return face.stacks // 2
+
+
+@wp.func
+def find_corner(face: Face, side: int, x: int, y: int) -> tuple[wp.vec3, wp.vec3]:
+    """Return place and unit normal of a corner on a face's grid; see `Cell`."""
+    if face.kind == PLANE or face.kind == BOX:
+        place = wp.vec3(face.level, face.level, face.level)
+        place[face.axes[0]] = _line(face, 0, x)
+        place[face.axes[1]] = _line(face, 1, y)
+        return place, face.normal
+    part, upwards = side // 2, float(1.0)
+    if side % 2 == 1:
+        upwards = -1.0
+    along = float(y) / float(_stacks(face, part))
+    turn = TURN * float(x) / float(face.slices)
+    out = wp.vec3(wp.cos(turn), wp.sin(turn), 0.0)
+    size = radii(face.kind, face.size)
+    if part == DISK:
+        far = along * size[0]
+        return wp.vec3(far * out[0], far * out[1], face.level), face.normal
+    if part == DOME:
+        flat, up = wp.cos(0.25 * TURN * along), wp.sin(0.25 * TURN * along)
+        out = wp.vec3(flat * out[0], flat * out[1], upwards * up)
+    place = wp.cw_mul(out, size)
+    if part == TUBE:
+        place[2] = face.size[1] * (2.0 * along - 1.0)
+    elif face.kind == CAPSULE:
+        place[2] = place[2] + upwards * face.size[1]
+    return place, wp.normalize(wp.cw_div(out, size))
+
+
+@wp.func
+def is_tiny(first: wp.vec3, second: wp.vec3, pixel: float) -> bool:
+    """Return whether a triangle of a mesh with these corners is lit at the point itself."""
+    return wp.length_sq(second - first) < (_SMALL * pixel) * (_SMALL * pixel)
+
+
+@wp.func
+def grid_face(
+    kind: int,
+    part: int,
+    size: wp.vec3,
+    normal: wp.vec3,
+    cells: wp.vec4,
+    counts: wp.vec2i,
+    eye: wp.vec3,
+    divisions: int,
+    slices: int,
+    stacks: int,
+) -> Face:
+    """Return a face, given what `Surfaces` says of its geom; `eye` is the camera, geom's frame."""
+    face = Face()
+    face.kind = kind
+    face.part = part
+    face.size = size
+    face.normal = normal
+    face.slices = slices
+    face.stacks = stacks
+    if kind == PLANE:
+        face.axes = wp.vec2i(0, 1)
+        face.first = wp.vec2(
+            _first(cells[0], counts[0], eye[0]), _first(cells[2], counts[1], eye[1])
         )
-        x = _cell(hit.local[0], x_first, cells[1], counts[0], hit.size[0])
-        y = _cell(hit.local[1], y_first, cells[3], counts[1], hit.size[1])
-        return _flat_corners(hit, wp.vec2i(0, 1), x, y, False, wp.vec3(0.0, 0.0, 1.0), pixel)
-    if hit.kind == BOX:
-        axes, parts = face_axes(hit.part // 2), surfaces.divisions
-        one, two = hit.size[axes[0]], hit.size[axes[1]]
-        x = _cell(hit.local[axes[0]], -one, 2.0 * one / float(parts), parts, one)
-        y = _cell(hit.local[axes[1]], -two, 2.0 * two / float(parts), parts, two)
-        is_main = hit.part == 0 or hit.part == 3 or hit.part == 4
-        return _flat_corners(hit, axes, x, y, is_main, hit.local_normal, pixel)
-    return _round_corners(surfaces, hit, pixel)
-
-
-@wp.func
-def _point_alone(hit: Hit, normal: wp.vec3) -> Corners:
-    corners = Corners()
-    corners.count = 1
-    corners.places[0] = hit.local
-    corners.normals[0] = normal
-    corners.weights[0] = 1.0
-    return corners
-
-
-@wp.func
-def _mesh_corners(world: World, hit: Hit, pixel: float) -> Corners:
-    first = triangle_corner(world.triangles, hit.part, 0)
-    second = triangle_corner(world.triangles, hit.part, 1)
-    if wp.length_sq(second - first) < (_SMALL * pixel) * (_SMALL * pixel):
-        return _point_alone(hit, wp.transpose(hit.axes) @ hit.normal)
-    corners = Corners()
-    corners.count = 3
-    corners.weights = mesh_weights(world, hit.part, hit.local)
-    corner = int(0)
-    while corner < 3:
-        corners.places[corner] = triangle_corner(world.triangles, hit.part, corner)
-        corners.normals[corner] = world.triangles.normals[3 * hit.part + corner]
-        corner += 1
-    return corners
+        face.width = wp.vec2(cells[1], cells[3])
+        face.counts = counts
+        face.normal = wp.vec3(0.0, 0.0, 1.0)
+    elif kind == BOX:
+        face.axes = face_axes(part // 2)
+        one, two = size[face.axes[0]], size[face.axes[1]]
+        face.first = wp.vec2(-one, -two)
+        face.width = wp.vec2(2.0 * one / float(divisions), 2.0 * two / float(divisions))
+        face.counts = wp.vec2i(divisions, divisions)
+        face.level = size[part // 2] * normal[part // 2]
+        face.is_main = part == 0 or part == 3 or part == 4
+    elif kind != MESH:
+        face.level = size[1] * normal[2]
+    return face
 
 
 @wp.func
@@ -107,129 +260,3 @@ def _first(stored: float, count: int, eye: float) -> float:
     if count < 0:
         return stored * wp.round(eye / stored)
     return stored
-
-
-@wp.func
-def _cell(place: float, first: float, width: float, count: int, half: float) -> wp.vec2:
-    """Return the grid lines around a coordinate; the outermost cells end at `half`, if any."""
-    number = wp.floor((place - first) / width)
-    if count < 0:
-        return wp.vec2(first + number * width, first + (number + 1.0) * width)
-    number = wp.clamp(number, -1.0, float(count))
-    low, high = first + number * width, first + (number + 1.0) * width
-    return wp.vec2(wp.max(low, -half), wp.min(high, half))
-
-
-@wp.func
-def _flat_corners(
-    hit: Hit,
-    axes: wp.vec2i,
-    x: wp.vec2,
-    y: wp.vec2,
-    is_main: bool,
-    normal: wp.vec3,
-    pixel: float,
-) -> Corners:
-    """Return half of a rectangle with ends `x` and `y` along `axes`; see `_halve`."""
-    wide, high = wp.max(x[1] - x[0], 1e-9), wp.max(y[1] - y[0], 1e-9)
-    if wp.max(wide, high) < _SMALL * pixel:
-        return _point_alone(hit, normal)
-    right = wp.clamp((hit.local[axes[0]] - x[0]) / wide, 0.0, 1.0)
-    up = wp.clamp((hit.local[axes[1]] - y[0]) / high, 0.0, 1.0)
-    half = _halve(right, up, is_main)
-    corners = Corners()
-    corners.count = 3
-    corners.weights = half.weights
-    corner = int(0)
-    while corner < 3:
-        place = hit.local
-        place[axes[0]] = x[0] + half.corners[corner, 0] * wide
-        place[axes[1]] = y[0] + half.corners[corner, 1] * high
-        corners.places[corner] = place
-        corners.normals[corner] = normal
-        corner += 1
-    return corners
-
-
-@wp.func
-def _halve(x: float, y: float, is_main: bool) -> Half:
-    """Return half of a square with side 1; the main diagonal leads from (0, 0) to (1, 1)."""
-    half = Half()
-    if is_main:
-        if y > x:
-            half.corners = wp.mat33(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0)
-            half.weights = wp.vec3(1.0 - y, y - x, x)
-        else:
-            half.corners = wp.mat33(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0)
-            half.weights = wp.vec3(1.0 - x, x - y, y)
-    elif x + y > 1.0:
-        half.corners = wp.mat33(1.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
-        half.weights = wp.vec3(x + y - 1.0, 1.0 - y, 1.0 - x)
-    else:
-        half.corners = wp.mat33(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
-        half.weights = wp.vec3(1.0 - x - y, x, y)
-    return half
-
-
-@wp.func
-def _round_corners(surfaces: Surfaces, hit: Hit, pixel: float) -> Corners:
-    """Return corners on a ball, ellipsoid, capsule or cylinder, divided in slices and stacks.
-
-    Triangles around a pole have it as one corner.
-    """
-    size, part = radii(hit), round_part(hit)
-    if TURN * wp.max(size[0], size[2]) < _SMALL * pixel * float(surfaces.slices):
-        return _point_alone(hit, hit.local_normal)
-    stacks = float(surfaces.stacks)
-    if part != TUBE:
-        stacks = float(surfaces.stacks // 2)
-    at = unroll(hit, part, hit.local)
-    around, along = at[0] * float(surfaces.slices), at[1] * stacks
-    slice, stack = wp.floor(around), wp.clamp(wp.floor(along), 0.0, stacks - 1.0)
-    x, y = around - slice, wp.clamp(along - stack, 0.0, 1.0)
-    is_low = hit.local[2] < 0.0
-    half = _halve(x, y, (part == DOME and is_low) or (part == DISK and not is_low))
-    if part == DOME and stack == stacks - 1.0:
-        half.corners = wp.mat33(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
-        half.weights = wp.vec3((1.0 - x) * (1.0 - y), x * (1.0 - y), y)
-    if part == DISK and stack == 0.0:
-        half.corners = wp.mat33(0.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0)
-        half.weights = wp.vec3((1.0 - x) * y, x * y, 1.0 - y)
-    corners = Corners()
-    corners.count = 3
-    corners.weights = half.weights
-    corner = int(0)
-    while corner < 3:
-        turn = (slice + half.corners[corner, 0]) / float(surfaces.slices)
-        up = (stack + half.corners[corner, 1]) / stacks
-        normal = _roll(hit, part, turn, up)
-        corners.places[corner] = _round_place(hit, part, normal, up)
-        corners.normals[corner] = wp.normalize(wp.cw_div(normal, size))
-        if part == DISK:
-            corners.normals[corner] = hit.local_normal
-        corner += 1
-    return corners
-
-
-@wp.func
-def _roll(hit: Hit, part: int, around: float, along: float) -> wp.vec3:
-    """Return the direction from the axis, or a dome's centre, for coordinates of `unroll`."""
-    x, y = wp.cos(TURN * around), wp.sin(TURN * around)
-    if part != DOME:
-        return wp.vec3(x, y, 0.0)
-    flat = wp.cos(0.25 * TURN * along)
-    return wp.vec3(flat * x, flat * y, wp.sign(hit.local[2]) * wp.sin(0.25 * TURN * along))
-
-
-@wp.func
-def _round_place(hit: Hit, part: int, direction: wp.vec3, along: float) -> wp.vec3:
-    size = radii(hit)
-    if part == DISK:
-        out = along * size[0]
-        return wp.vec3(out * direction[0], out * direction[1], hit.local[2])
-    place = wp.cw_mul(direction, size)
-    if part == TUBE:
-        place[2] = hit.size[1] * (2.0 * along - 1.0)
-    elif hit.kind == CAPSULE:
-        place[2] = place[2] + wp.sign(hit.local[2]) * hit.size[1]
-    return place

@@ -43,6 +43,9 @@ _HAZE = (0.62, 0.74, 0.92)
 _COVER = ("texture", "mapping", "scale")
 """Fields of `Surfaces` that an appearance changes, next to colors."""
 
+_CORNERS = 1024
+"""Corners whose colors are kept while an image is made: a power of 2."""
+
 
 class LookEncoder:
     """Encodes a scene's own materials and lights, and appearances that differ from them.
@@ -63,6 +66,11 @@ class LookEncoder:
         }
         kind: Any = kernel.PlacedLight
         self._placed: Any = wp.empty((workers, len(self._lights)), dtype=kind, device="cpu")
+        kinds: dict[str, Any] = {"keys": wp.vec4i, "known": wp.vec3}
+        self._corners = {
+            name: wp.empty((workers, _CORNERS), dtype=kind, device="cpu")
+            for name, kind in kinds.items()
+        }
         self._textures = functools.cache(functools.partial(_load_textures, scene))
         plain = self._encode(Appearance(), 1)
         self._last: tuple[Appearance | None, int, kernel.Look] = (None, 0, plain)
@@ -84,6 +92,7 @@ class LookEncoder:
         look.lighting = self._lighting(appearance, num_envs)
         look.surfaces = self._paint(appearance, num_envs, names)
         look.textures, look.placed = self._textures(names), self._placed
+        look.keys, look.known = self._corners["keys"], self._corners["known"]
         return look
 
     def _paint(

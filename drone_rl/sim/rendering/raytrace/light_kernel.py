@@ -8,13 +8,17 @@ its ambient part.
 import mujoco
 import warp as wp
 
-from drone_rl.sim.rendering.raytrace.cast_kernel import Hit, World, cast, is_blocked
-from drone_rl.sim.rendering.raytrace.corners_kernel import Corners, find_corners
-from drone_rl.sim.rendering.raytrace.intersection_kernel import PLANE
+from drone_rl.sim.rendering.raytrace.cast_kernel import World
 from drone_rl.sim.rendering.raytrace.projection_kernel import frame_attitude, rotation
-from drone_rl.sim.rendering.raytrace.structs_kernel import NO_GEOM, Camera, ViewArrays, struct
-from drone_rl.sim.rendering.raytrace.surfaces_kernel import Surfaces, sample_surface
-from drone_rl.sim.rendering.raytrace.texels_kernel import Textures, sample_cube
+from drone_rl.sim.rendering.raytrace.spans_kernel import fill
+from drone_rl.sim.rendering.raytrace.structs_kernel import Camera, ViewArrays, struct
+from drone_rl.sim.rendering.raytrace.surfaces_kernel import Surfaces
+from drone_rl.sim.rendering.raytrace.texels_kernel import (
+    Image,
+    Textures,
+    get_image,
+    sample_cube,
+)
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -26,14 +30,6 @@ CAMERA_FRAME = wp.constant(-1)
 
 _HIDDEN = wp.constant(-50.0)
 """Metres: a frame below is out of sight, and so are its lights and its sky."""
-_OPAQUE = wp.constant(0.995)
-"""Opacity from which OpenGL lets nothing through."""
-_LAYERS = wp.constant(4)
-"""Transparent surfaces that a ray passes."""
-_OFF = wp.constant(1e-4)
-"""How far off a surface rays to lights start, relative to the distance from the shot."""
-_FROM_BEHIND = wp.constant(0.3)
-"""Factor of the opacity of planes that are seen from behind."""
 _MOST_LIGHTS = wp.constant(8)
 """Lights that OpenGL has: later ones are off."""
 _GLOBAL = wp.constant(0.3)
@@ -113,6 +109,10 @@ class Look:
     textures: Textures
     placed: wp.array2d[PlacedLight]
     """Working memory: a row for each worker."""
+    keys: wp.array2d[wp.vec4i]
+    """Corners whose colors are known, in working memory: see `shade_kernel`."""
+    known: wp.array2d[wp.vec3]
+    """Their colors."""
 
 
 @struct
@@ -128,12 +128,24 @@ class Shot:
     right: wp.vec3
     """Step between pixels at distance 1 along the axis."""
     down: wp.vec3
+    pixel: float
+    """Length of `right`."""
     lights: wp.array[PlacedLight]
     count: int
     """Lights that are on; the array is longer."""
+    num_casting: int
+    """How many of them cast shadows."""
     ambient: float
-    skybox: int
-    """Texture of the sky; -1 for none."""
+    exposure: float
+    horizon: wp.vec3
+    """See `Lighting`."""
+    zenith: wp.vec3
+    haze: wp.vec3
+    extinction: float
+    skybox: Image
+    """Texture of the sky, of width 0 for none."""
+    keys: wp.array[wp.vec4i]
+    known: wp.array[wp.vec3]
 
 
 @wp.func
@@ -160,6 +172,7 @@ def start_image(
     shot.forward = -wp.vec3(to_world[0, 2], to_world[1, 2], to_world[2, 2])
     shot.right = pixel_width * wp.vec3(to_world[0, 0], to_world[1, 0], to_world[2, 0])
     shot.down = -pixel_height * wp.vec3(to_world[0, 1], to_world[1, 1], to_world[2, 1])
+    shot.pixel = pixel_width
     shot.lights = look.placed[worker]
     shot.ambient = _GLOBAL
     light = int(0)
@@ -179,16 +192,34 @@ def start_image(
         if is_on and shot.count < _MOST_LIGHTS:
             shot.lights[shot.count] = placed
             shot.count += 1
+            if placed.casts != 0:
+                shot.num_casting += 1
             if placed.kind != POINT:
                 shot.ambient = 0.0
         light += 1
-    shot.skybox = -1
+    shot.skybox = _find_sky(look, world, env)
+    lighting = look.lighting
+    shot.horizon = lighting.horizon[env % lighting.horizon.shape[0]]
+    shot.zenith = lighting.zenith[env % lighting.zenith.shape[0]]
+    shot.haze = lighting.haze[env % lighting.haze.shape[0]]
+    shot.extinction = lighting.extinction[env % lighting.extinction.shape[0]]
+    shot.exposure = lighting.exposure[env % lighting.exposure.shape[0]]
+    shot.keys = look.keys[worker]
+    shot.known = look.known[worker]
+    fill(shot.keys, 0, shot.keys.shape[0], wp.vec4i(-1, 0, 0, 0))
+    return shot
+
+
+@wp.func
+def _find_sky(look: Look, world: World, env: int) -> Image:
+    """Return the texture of the first skybox of an environment."""
+    found = Image()
     sky = int(0)
     while sky < look.lighting.skies.shape[0]:
-        if shot.skybox < 0 and not _is_hidden(world, env, look.lighting.skies[sky][1]):
-            shot.skybox = look.lighting.skies[sky][0]
+        if found.width == 0 and not _is_hidden(world, env, look.lighting.skies[sky][1]):
+            found = get_image(look.textures, look.lighting.skies[sky][0])
         sky += 1
-    return shot
+    return found
 
 
 @wp.func
@@ -217,20 +248,24 @@ def _place_light(lighting: Lighting, number: int, env: int) -> PlacedLight:
 
 
 @wp.func
-def sky(look: Look, direction: wp.vec3, shot: Shot) -> wp.vec3:
+def sky(texels: wp.array[wp.uint32], direction: wp.vec3, shot: Shot) -> wp.vec3:
     """Return the color, 0 to 1, of a ray that hits nothing. `direction`: world frame."""
-    lighting = look.lighting
-    color = lighting.horizon[shot.env % lighting.horizon.shape[0]]
-    if color[0] >= 0.0:
-        zenith = lighting.zenith[shot.env % lighting.zenith.shape[0]]
-        color += wp.max(direction[2], 0.0) * (zenith - color)
-    elif shot.skybox >= 0:
-        ray = direction / wp.dot(direction, shot.forward)
+    color = wp.vec3()
+    if shot.horizon[0] >= 0.0:
+        color = shot.horizon + wp.max(direction[2], 0.0) * (shot.zenith - shot.horizon)
+    elif shot.skybox.width > 0:
+        ray = _turn_sky(direction / wp.dot(direction, shot.forward))
         right, down = _turn_sky(shot.right), _turn_sky(shot.down)
-        color = sample_cube(look.textures, shot.skybox, _turn_sky(ray), right, down)
-    else:
-        color = wp.vec3()
-    return _clip(lighting.exposure[shot.env % lighting.exposure.shape[0]] * color)
+        color = sample_cube(texels, shot.skybox, ray, right, down)
+    return clip(shot.exposure * color)
+
+
+@wp.func
+def clip(color: wp.vec3) -> wp.vec3:
+    """Return a color with its parts between 0 and 1."""
+    return wp.vec3(
+        wp.clamp(color[0], 0.0, 1.0), wp.clamp(color[1], 0.0, 1.0), wp.clamp(color[2], 0.0, 1.0)
+    )
 
 
 @wp.func
@@ -240,158 +275,65 @@ def _turn_sky(ray: wp.vec3) -> wp.vec3:
 
 
 @wp.func
-def shade(look: Look, world: World, hit: Hit, direction: wp.vec3, shot: Shot) -> wp.vec3:
-    """Return the color, 0 to 1, of what a ray hits, and of what is behind transparent surfaces.
+def finish(color: wp.vec3, distance: float, shot: Shot) -> wp.vec3:
+    """Return the color of a surface at a distance, metres, with exposure and fog."""
+    total = clip(shot.exposure * color)
+    if shot.extinction > 0.0:
+        clear = wp.exp(-shot.extinction * distance)
+        total = shot.haze + clear * (total - shot.haze)
+    return total
 
-    `direction` is that of the ray, world frame.
+
+@wp.func_native(f"""
+using vec = wp::vec_t<3, float>;
+vec total = group < 0 ? color * (shine[0] + ambient) : vec(0.0f);
+const vec to_eye = shine[1] > 0.0f ? wp::normalize(eye - place) : vec(0.0f);
+for (int k = group < 0 ? 0 : group; k < (group < 0 ? count : group + 1); ++k) {{
+    const auto &light = lights.data[k];
+    if (group < 0 && has_shadows && light.casts) continue;
+    vec to_light = -light.direction;
+    float strength = 1.0f;
+    if (light.kind != {int(DIRECTIONAL)}) {{
+        to_light = light.position - place;
+        const float distance = wp::length(to_light);
+        to_light = to_light / wp::max(distance, 1e-9f);
+        const vec fade = light.attenuation;
+        strength = 1.0f / wp::max(fade[0] + distance * (fade[1] + distance * fade[2]), 1e-6f);
+        if (distance > light.range) continue;
+        if (light.least_cosine > -1.5f) {{
+            const float cosine = -wp::dot(to_light, light.direction);
+            if (cosine < light.least_cosine) continue;
+            strength *= wp::pow(cosine, light.exponent);
+        }}
+    }}
+    const float facing = wp::dot(normal, to_light);
+    vec reflected = light.ambient;
+    if (facing > 0.0f) reflected = reflected + light.diffuse * facing;
+    vec lit = wp::cw_mul(color, reflected);
+    if (facing > 0.0f && shine[1] > 0.0f) {{
+        const float cosine = wp::max(wp::dot(normal, wp::normalize(to_light + to_eye)), 0.0f);
+        lit = lit + light.specular * (shine[1] * wp::pow(cosine, shine[2]));
+    }}
+    total = total + lit * strength;
+}}
+for (int c = 0; c < 3; ++c) total[c] = wp::min(wp::max(total[c], 0.0f), 1.0f);
+return total;
+""")
+def light_point(
+    lights: wp.array[PlacedLight],
+    count: int,
+    group: int,
+    has_shadows: bool,
+    ambient: float,
+    eye: wp.vec3,
+    place: wp.vec3,
+    normal: wp.vec3,
+    color: wp.vec3,
+    shine: wp.vec3,
+) -> wp.vec3:
+    """Return what a point reflects of one light, or of all and what it emits: OpenGL's formula.
+
+    `group` is the light, or -1 for all, of which those that cast shadows are left out if
+    `has_shadows`. Camera `eye`, `place` and `normal` are in the world frame.
     """
-    far = shot.far / wp.dot(direction, shot.forward)
-    total = wp.vec3()
-    left = float(1.0)
-    layer = int(0)
-    behind = hit
-    passed = float(0.0)
-    while layer < _LAYERS and behind.geom != NO_GEOM:
-        opacity = _rgba(look, shot.env, behind.geom)[3]
-        if behind.kind == PLANE and behind.local_normal[2] < 0.0:
-            opacity *= _FROM_BEHIND
-        if opacity < _OPAQUE and layer + 1 < _LAYERS:
-            # OpenGL blends each transparent geom twice, from front to back and then back to front
-            share = opacity * (2.0 - opacity)
-            total += left * share * _shade_surface(look, world, behind, direction, shot, False)
-            left *= 1.0 - share
-            passed += behind.distance + _OFF * (1.0 + passed)
-            beyond = shot.position + passed * direction
-            behind = cast(world, shot.env, beyond, direction, far - passed)
-            layer += 1
-        else:
-            total += left * _shade_surface(look, world, behind, direction, shot, True)
-            left = 0.0
-            layer = _LAYERS
-    if left > 0.0:
-        total += left * sky(look, direction, shot)
-    return total
-
-
-@wp.func
-def _rgba(look: Look, env: int, geom: int) -> wp.vec4:
-    return look.surfaces.color[env % look.surfaces.color.shape[0], geom]
-
-
-@wp.func
-def _shade_surface(
-    look: Look, world: World, hit: Hit, direction: wp.vec3, shot: Shot, has_shadows: bool
-) -> wp.vec3:
-    depth = wp.dot(hit.point - shot.position, shot.forward)
-    corners = find_corners(look.surfaces, world, hit, shot.position, depth * wp.length(shot.right))
-    total = _light_by_group(look, hit, corners, shot, -1, has_shadows)
-    light = int(0)
-    while light < shot.count and has_shadows:
-        if shot.lights[light].casts != 0:
-            lit = _light_by_group(look, hit, corners, shot, light, True)
-            if wp.length_sq(lit) > 0.0 and not _is_in_shadow(world, hit, shot, light):
-                total += lit
-        light += 1
-    row = shot.env % look.surfaces.texture.shape[0]
-    if look.surfaces.texture[row, hit.geom] >= 0:
-        flat = direction / wp.dot(direction, shot.forward)
-        against = wp.dot(hit.face_normal, flat)
-        right = shot.right - wp.dot(hit.face_normal, shot.right) / against * flat
-        below = shot.down - wp.dot(hit.face_normal, shot.down) / against * flat
-        back = depth * wp.transpose(hit.axes)
-        texel = sample_surface(
-            look.surfaces, look.textures, world, hit, back @ right, back @ below, row
-        )
-        total = wp.cw_mul(total, texel)
-    lighting = look.lighting
-    total = _clip(lighting.exposure[shot.env % lighting.exposure.shape[0]] * total)
-    extinction = lighting.extinction[shot.env % lighting.extinction.shape[0]]
-    if extinction > 0.0:
-        haze = lighting.haze[shot.env % lighting.haze.shape[0]]
-        clear = wp.exp(-extinction * wp.length(hit.point - shot.position))
-        total = haze + clear * (total - haze)
-    return total
-
-
-@wp.func
-def _light_by_group(
-    look: Look, hit: Hit, corners: Corners, shot: Shot, only: int, has_shadows: bool
-) -> wp.vec3:
-    """Return what a surface emits and reflects of the lights without shadows, or of one with."""
-    rgba = _rgba(look, shot.env, hit.geom)
-    color, shine = wp.vec3(rgba[0], rgba[1], rgba[2]), look.surfaces.shine[hit.geom]
-    centre = hit.point - hit.axes @ hit.local
-    total = wp.vec3()
-    corner = int(0)
-    while corner < corners.count:
-        place = centre + hit.axes @ corners.places[corner]
-        normal = hit.axes @ corners.normals[corner]
-        lit = wp.vec3()
-        if only >= 0:
-            lit = _light_corner(shot, only, place, normal, color, shine)
-        else:
-            lit = (shine[0] + shot.ambient) * color
-            light = int(0)
-            while light < shot.count:
-                if shot.lights[light].casts == 0 or not has_shadows:
-                    lit += _light_corner(shot, light, place, normal, color, shine)
-                light += 1
-        total += corners.weights[corner] * _clip(lit)
-        corner += 1
-    return total
-
-
-@wp.func
-def _is_in_shadow(world: World, hit: Hit, shot: Shot, light: int) -> bool:
-    towards = -shot.lights[light].direction
-    distance = float(1e6)
-    if shot.lights[light].kind != DIRECTIONAL:
-        towards = shot.lights[light].position - hit.point
-        distance = wp.length(towards)
-        towards = towards / distance
-    if wp.dot(hit.face_normal, towards) <= 0.0:
-        return True
-    start = hit.point + _OFF * (1.0 + hit.distance) * hit.face_normal
-    return is_blocked(world, shot.env, start, towards, distance)
-
-
-@wp.func
-def _light_corner(
-    shot: Shot, number: int, place: wp.vec3, normal: wp.vec3, color: wp.vec3, shine: wp.vec3
-) -> wp.vec3:
-    """Return the light that a corner reflects, world frame: OpenGL's formula."""
-    light = shot.lights[number]
-    to_light = -light.direction
-    strength = float(1.0)
-    if light.kind != DIRECTIONAL:
-        to_light = light.position - place
-        distance = wp.length(to_light)
-        to_light = to_light / wp.max(distance, 1e-9)
-        fade = light.attenuation
-        strength = 1.0 / wp.max(fade[0] + distance * (fade[1] + distance * fade[2]), 1e-6)
-        if distance > light.range:
-            strength = 0.0
-        if light.least_cosine > -1.5:
-            cosine = -wp.dot(to_light, light.direction)
-            if cosine < light.least_cosine:
-                strength = 0.0
-            else:
-                strength *= wp.pow(cosine, light.exponent)
-    if strength == 0.0:
-        return wp.vec3()
-    facing = wp.dot(normal, to_light)
-    reflected = wp.vec3(light.ambient)
-    if facing > 0.0:
-        reflected += light.diffuse * facing
-    lit = wp.cw_mul(color, reflected)
-    if facing > 0.0 and shine[1] > 0.0:
-        half = wp.normalize(to_light + wp.normalize(shot.position - place))
-        lit += light.specular * (shine[1] * wp.pow(wp.max(wp.dot(normal, half), 0.0), shine[2]))
-    return strength * lit
-
-
-@wp.func
-def _clip(color: wp.vec3) -> wp.vec3:
-    return wp.vec3(
-        wp.clamp(color[0], 0.0, 1.0), wp.clamp(color[1], 0.0, 1.0), wp.clamp(color[2], 0.0, 1.0)
-    )
+    ...

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from drone_rl.sim.rendering.raytrace.cast_kernel import MESH, Hit, World
+from drone_rl.sim.rendering.raytrace.cast_kernel import MESH
 from drone_rl.sim.rendering.raytrace.intersection_kernel import (
     BOX,
     CAPSULE,
@@ -12,8 +12,6 @@ from drone_rl.sim.rendering.raytrace.intersection_kernel import (
     ROUND,
 )
 from drone_rl.sim.rendering.raytrace.structs_kernel import struct
-from drone_rl.sim.rendering.raytrace.texels_kernel import Textures, sample_cube, sample_flat
-from drone_rl.sim.rendering.raytrace.triangles_kernel import triangle_corner
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -66,65 +64,53 @@ class Surfaces:
     """The same along the axis; half of it from the middle of a disk to its edge."""
 
 
+@struct
+class Mapping:
+    """How a texture lies on a geom."""
+
+    texture: int
+    """-1 for none."""
+    kind: int
+    scale: wp.vec3
+    shift: wp.vec2
+
+
 @wp.func
-def sample_surface(
-    surfaces: Surfaces,
-    textures: Textures,
-    world: World,
-    hit: Hit,
-    across: wp.vec3,
-    down: wp.vec3,
-    row: int,
+def is_around(mapping: Mapping, kind: int, part: int) -> bool:
+    """Return whether a texture goes around a round solid, with a seam."""
+    return mapping.kind == WRAPPED and kind != MESH and part == ROUND
+
+
+@wp.func
+def texture_place(
+    mapping: Mapping, kind: int, part: int, size: wp.vec3, normal: wp.vec3, place: wp.vec3
 ) -> wp.vec3:
-    """Return the color of a geom's texture, 0 to 1, where a pixel shows it.
+    """Return texture coordinates of a place on a geom, but those of a mesh, geom's frame.
 
-    `across` and `down` are the steps on the surface to what the next pixels show, geom's frame, and
-    `row` that of the environment.
+    Those of a cube map are a direction. `normal` is the surface's.
     """
-    texture, mapping = surfaces.texture[row, hit.geom], surfaces.mapping[row, hit.geom]
-    here = _coordinates(surfaces, world, hit, hit.local, row)
-    right = _coordinates(surfaces, world, hit, hit.local + across, row) - here
-    below = _coordinates(surfaces, world, hit, hit.local + down, row) - here
-    if mapping == CUBE:
-        return sample_cube(textures, texture, here, right, below)
-    if mapping == WRAPPED and hit.kind != MESH and hit.part == ROUND:  # across the seam
-        turn = surfaces.scale[row, hit.geom][0]
-        right[0] = right[0] - wp.round(right[0] / turn) * turn
-        below[0] = below[0] - wp.round(below[0] / turn) * turn
-    return sample_flat(textures, texture, here, right, below)
-
-
-@wp.func
-def _coordinates(surfaces: Surfaces, world: World, hit: Hit, place: wp.vec3, row: int) -> wp.vec3:
-    """Return texture coordinates of a place near the point that is hit, geom's frame.
-
-    Those of a cube map are a direction.
-    """
-    mapping, scale = surfaces.mapping[row, hit.geom], surfaces.scale[row, hit.geom]
-    if mapping == CUBE:
-        return wp.cw_mul(_stretch_ends(hit, place), scale)
-    if mapping == PROJECTED:
+    scale = mapping.scale
+    if mapping.kind == CUBE:
+        return wp.cw_mul(_stretch_ends(kind, size, place), scale)
+    if mapping.kind == PROJECTED:
         return wp.vec3(place[0] * scale[0] - 0.5, -place[1] * scale[1] - 0.5, 0.0)
-    if mapping == TILED:
-        normal = hit.local_normal
+    if mapping.kind == TILED:
         axes = face_axes(
             int(wp.argmax(wp.vec3(wp.abs(normal[0]), wp.abs(normal[1]), wp.abs(normal[2]))))
         )
         return wp.vec3(place[axes[0]] * scale[0], -place[axes[1]] * scale[0], 0.0)
     at = wp.vec2()
-    if hit.kind == MESH:
-        at = _mesh_coordinates(world, hit, place)
-    elif hit.kind == PLANE:
-        at = wp.vec2(_along_plane(place[0], hit.size[0]), 1.0 - _along_plane(place[1], hit.size[1]))
-        if hit.size[1] <= 0.0:
+    if kind == PLANE:
+        at = wp.vec2(_along_plane(place[0], size[0]), 1.0 - _along_plane(place[1], size[1]))
+        if size[1] <= 0.0:
             at[1] = at[1] - 1.0
-    elif hit.kind == BOX:
-        axes = face_axes(hit.part // 2)
+    elif kind == BOX:
+        axes = face_axes(part // 2)
         one, two = axes[0], axes[1]
-        at = wp.vec2(0.5 + 0.5 * place[one] / hit.size[one], 0.5 - 0.5 * place[two] / hit.size[two])
+        at = wp.vec2(0.5 + 0.5 * place[one] / size[one], 0.5 - 0.5 * place[two] / size[two])
     else:
-        at = _round_coordinates(hit, place)
-    shift = surfaces.shift[hit.geom]
+        at = _round_coordinates(kind, part, size, place)
+    shift = mapping.shift
     return wp.vec3(at[0] * scale[0] + shift[0], at[1] * scale[1] + shift[1], 0.0)
 
 
@@ -139,13 +125,13 @@ def face_axes(axis: int) -> wp.vec2i:
 
 
 @wp.func
-def _stretch_ends(hit: Hit, place: wp.vec3) -> wp.vec3:
+def _stretch_ends(kind: int, size: wp.vec3, place: wp.vec3) -> wp.vec3:
     """Stretch the ends of a capsule as OpenGL does for cube maps."""
-    half = hit.size[1]
+    half = size[1]
     beyond = wp.abs(place[2]) - half
-    if hit.kind != CAPSULE or beyond <= 0.0:
+    if kind != CAPSULE or beyond <= 0.0:
         return place
-    return wp.vec3(place[0], place[1], wp.sign(place[2]) * half * (1.0 + beyond / hit.size[0]))
+    return wp.vec3(place[0], place[1], wp.sign(place[2]) * half * (1.0 + beyond / size[0]))
 
 
 @wp.func
@@ -156,38 +142,14 @@ def _along_plane(place: float, half: float) -> float:
 
 
 @wp.func
-def _mesh_coordinates(world: World, hit: Hit, place: wp.vec3) -> wp.vec2:
-    weights, first = mesh_weights(world, hit.part, place), 3 * hit.part
-    return (
-        weights[0] * world.triangles.texcoords[first]
-        + weights[1] * world.triangles.texcoords[first + 1]
-        + weights[2] * world.triangles.texcoords[first + 2]
-    )
-
-
-@wp.func
-def mesh_weights(world: World, triangle: int, place: wp.vec3) -> wp.vec3:
-    """Return the weights of a triangle's corners at a place on its plane."""
-    a = triangle_corner(world.triangles, triangle, 0)
-    one = triangle_corner(world.triangles, triangle, 1) - a
-    two = triangle_corner(world.triangles, triangle, 2) - a
-    at = place - a
-    xx, xy, yy = wp.dot(one, one), wp.dot(one, two), wp.dot(two, two)
-    x, y = wp.dot(at, one), wp.dot(at, two)
-    area = wp.max(xx * yy - xy * xy, 1e-30)
-    second, third = (yy * x - xy * y) / area, (xx * y - xy * x) / area
-    return wp.vec3(1.0 - second - third, second, third)
-
-
-@wp.func
-def _round_coordinates(hit: Hit, place: wp.vec3) -> wp.vec2:
-    part = round_part(hit)
+def _round_coordinates(kind: int, face: int, size: wp.vec3, place: wp.vec3) -> wp.vec2:
+    part = round_part(kind, face, size, place)
     if part == DISK:
-        return wp.vec2(0.5 + 0.5 * place[0] / hit.size[0], 0.5 + 0.5 * place[1] / hit.size[0])
-    at = unroll(hit, part, place)
+        return wp.vec2(0.5 + 0.5 * place[0] / size[0], 0.5 + 0.5 * place[1] / size[0])
+    at = unroll(kind, size, part, place)
     if part == TUBE:
         return wp.vec2(at[0], 1.0 - at[1])
-    if hit.kind != CAPSULE:
+    if kind != CAPSULE:
         return wp.vec2(at[0], 0.5 - 0.5 * wp.sign(place[2]) * at[1])
     if place[2] > 0.0:
         return wp.vec2(at[0], 1.0 - at[1])
@@ -195,42 +157,42 @@ def _round_coordinates(hit: Hit, place: wp.vec3) -> wp.vec2:
 
 
 @wp.func
-def round_part(hit: Hit) -> int:
-    """Return the part of a ball, ellipsoid, capsule or cylinder that is hit."""
-    if hit.kind == CYLINDER:
-        if hit.part == ROUND:
+def round_part(kind: int, face: int, size: wp.vec3, place: wp.vec3) -> int:
+    """Return the part of a ball, ellipsoid, capsule or cylinder that a place is on."""
+    if kind == CYLINDER:
+        if face == ROUND:
             return TUBE
         return DISK
-    if hit.kind == CAPSULE and wp.abs(hit.local[2]) < hit.size[1]:
+    if kind == CAPSULE and wp.abs(place[2]) < size[1]:
         return TUBE
     return DOME
 
 
 @wp.func
-def radii(hit: Hit) -> wp.vec3:
+def radii(kind: int, size: wp.vec3) -> wp.vec3:
     """Return the factors that make a round solid of one with radius 1."""
-    if hit.kind == ELLIPSOID:
-        return hit.size
-    return wp.vec3(hit.size[0], hit.size[0], hit.size[0])
+    if kind == ELLIPSOID:
+        return size
+    return wp.vec3(size[0], size[0], size[0])
 
 
 @wp.func
-def unroll(hit: Hit, part: int, place: wp.vec3) -> wp.vec2:
+def unroll(kind: int, size: wp.vec3, part: int, place: wp.vec3) -> wp.vec2:
     """Return coordinates on a part of a round solid, each from 0 to 1.
 
     The first goes around the axis. The second goes along a tube, from the equator of a dome to its
     pole, or from the middle of a disk to its edge.
     """
-    unit = wp.cw_div(place, radii(hit))
+    unit = wp.cw_div(place, radii(kind, size))
     around = wp.atan2(unit[1], unit[0]) / TURN
     if around < 0.0:
         around += 1.0
     flat = wp.sqrt(unit[0] * unit[0] + unit[1] * unit[1])
     if part == TUBE:
-        return wp.vec2(around, 0.5 + 0.5 * place[2] / hit.size[1])
+        return wp.vec2(around, 0.5 + 0.5 * place[2] / size[1])
     if part == DISK:
         return wp.vec2(around, flat)
     up = wp.abs(unit[2])
-    if hit.kind == CAPSULE:
-        up -= hit.size[1] / hit.size[0]
+    if kind == CAPSULE:
+        up -= size[1] / size[0]
     return wp.vec2(around, wp.atan2(up, flat) / (0.25 * TURN))

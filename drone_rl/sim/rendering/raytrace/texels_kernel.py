@@ -21,24 +21,46 @@ class Textures:
     """Red in the lowest 8 bits, then green, then blue."""
 
 
+@struct
+class Image:
+    """One texture; see `Textures`."""
+
+    width: int
+    height: int
+    faces: int
+    start: int
+
+
+@wp.func
+def get_image(textures: Textures, texture: int) -> Image:
+    """Return a texture."""
+    image = Image()
+    image.width = textures.width[texture]
+    image.height = textures.height[texture]
+    image.faces = textures.faces[texture]
+    image.start = textures.start[texture]
+    return image
+
+
 @wp.func
 def sample_flat(
-    textures: Textures, texture: int, here: wp.vec3, right: wp.vec3, below: wp.vec3
+    texels: wp.array[wp.uint32], image: Image, here: wp.vec3, right: wp.vec3, below: wp.vec3
 ) -> wp.vec3:
     """Return the color, 0 to 1, at coordinates in a texture that repeats.
 
     `right` and `below` are the steps to the coordinates of the next pixels.
     """
-    width, height = float(textures.width[texture]), float(textures.height[texture])
+    width, height = float(image.width), float(image.height)
     one = wp.vec2(right[0] * width, right[1] * height)
     two = wp.vec2(below[0] * width, below[1] * height)
-    most = wp.max(wp.length_sq(one), wp.length_sq(two))
-    return _sample_levels(textures, texture, 0, here[0], here[1], wp.sqrt(most))
+    most = wp.sqrt(wp.max(wp.length_sq(one), wp.length_sq(two)))
+    across, down = here[0] - wp.floor(here[0]), here[1] - wp.floor(here[1])
+    return sample_levels(texels, image, 0, across, down, most)
 
 
 @wp.func
 def sample_cube(
-    textures: Textures, texture: int, ray: wp.vec3, right: wp.vec3, below: wp.vec3
+    texels: wp.array[wp.uint32], image: Image, ray: wp.vec3, right: wp.vec3, below: wp.vec3
 ) -> wp.vec3:
     """Return the color, 0 to 1, of a cube map in a direction.
 
@@ -51,8 +73,7 @@ def sample_cube(
     here = _on_face(face, axis, ray)
     one, two = _on_face(face, axis, ray + right) - here, _on_face(face, axis, ray + below) - here
     most = wp.sqrt(wp.max(wp.length_sq(one), wp.length_sq(two)))
-    most *= float(textures.width[texture])
-    return _sample_levels(textures, texture, face, here[0], here[1], most)
+    return sample_levels(texels, image, face, here[0], here[1], most * float(image.width))
 
 
 @wp.func
@@ -73,67 +94,54 @@ def _on_face(face: int, axis: int, ray: wp.vec3) -> wp.vec2:
     return wp.vec2(0.5 + 0.5 * across / most, 0.5 + 0.5 * down / most)
 
 
-@wp.func
-def _sample_levels(
-    textures: Textures, texture: int, face: int, across: float, down: float, texels: float
+@wp.func_native("""
+int width = image.width, height = image.height, start = image.start;
+const bool is_cube = image.faces > 1;
+while (covered >= 2.0f && (width > 1 || height > 1)) {
+    start += width * height * image.faces;
+    width = width > 1 ? width / 2 : 1;
+    height = height > 1 ? height / 2 : 1;
+    covered *= 0.5f;
+}
+float total[3] = {0.0f, 0.0f, 0.0f}, share = 1.0f;
+const bool has_next = covered > 1.0f && (width > 1 || height > 1);
+for (int level = 0; level < 1 + has_next; ++level) {
+    const float x = across * width - 0.5f, y = down * height - 0.5f;
+    const int i = (int)floorf(x), j = (int)floorf(y);
+    const float right = x - i, below = y - j;
+    int left = i, next = i + 1, upper = j, lower = j + 1;
+    if (is_cube) {
+        left = left < 0 ? 0 : left;
+        upper = upper < 0 ? 0 : upper;
+        next = next < width ? next : width - 1;
+        lower = lower < height ? lower : height - 1;
+    } else {
+        left = left < 0 ? width - 1 : left;
+        upper = upper < 0 ? height - 1 : upper;
+        next = next < width ? next : 0;
+        lower = lower < height ? lower : 0;
+    }
+    const unsigned *const data = texels.data + start + face * width * height;
+    const unsigned a = data[upper * width + left], b = data[upper * width + next];
+    const unsigned c = data[lower * width + left], d = data[lower * width + next];
+    if (has_next) share = level ? covered - 1.0f : 2.0f - covered;
+    const float of_c = share * (1.0f - right) * below, of_d = share * right * below;
+    const float of_a = share * (1.0f - right) - of_c, of_b = share * right - of_d;
+    for (int k = 0; k < 3; ++k)
+        total[k] += of_a * (int)(a >> 8 * k & 255u) + of_b * (int)(b >> 8 * k & 255u)
+            + of_c * (int)(c >> 8 * k & 255u) + of_d * (int)(d >> 8 * k & 255u);
+    start += width * height * image.faces;
+    width = width > 1 ? width / 2 : 1;
+    height = height > 1 ? height / 2 : 1;
+}
+const float unit = 1.0f / 255.0f;
+return wp::vec_t<3, float>(unit * total[0], unit * total[1], unit * total[2]);
+""")
+def sample_levels(
+    texels: wp.array[wp.uint32], image: Image, face: int, across: float, down: float, covered: float
 ) -> wp.vec3:
-    """Interpolate between texels and between mip levels; a pixel is `texels` wide."""
-    width, height = int(textures.width[texture]), int(textures.height[texture])
-    faces, start = int(textures.faces[texture]), int(textures.start[texture])
-    covered = float(texels)
-    while covered >= 2.0 and (width > 1 or height > 1):
-        start += width * height * faces
-        width = wp.max(width // 2, 1)
-        height = wp.max(height // 2, 1)
-        covered *= 0.5
-    first = start + face * width * height
-    color = _sample_level(textures.texels, first, width, height, faces > 1, across, down)
-    if covered > 1.0 and (width > 1 or height > 1):
-        start += width * height * faces
-        width = wp.max(width // 2, 1)
-        height = wp.max(height // 2, 1)
-        first = start + face * width * height
-        coarse = _sample_level(textures.texels, first, width, height, faces > 1, across, down)
-        color += (covered - 1.0) * (coarse - color)
-    return color / 255.0
+    """Interpolate between texels and between mip levels, at coordinates from 0 to 1.
 
-
-@wp.func
-def _sample_level(
-    texels: wp.array[wp.uint32],
-    start: int,
-    width: int,
-    height: int,
-    is_cube: bool,
-    across: float,
-    down: float,
-) -> wp.vec3:
-    x, y = across * float(width) - 0.5, down * float(height) - 0.5
-    left, upper = wp.floor(x), wp.floor(y)
-    share_x, share_y = x - left, y - upper
-    above = start + _wrap(int(upper), height, is_cube) * width
-    below = start + _wrap(int(upper) + 1, height, is_cube) * width
-    one, two = _wrap(int(left), width, is_cube), _wrap(int(left) + 1, width, is_cube)
-    first = _color(texels[above + one]) * (1.0 - share_x) + _color(texels[above + two]) * share_x
-    second = _color(texels[below + one]) * (1.0 - share_x) + _color(texels[below + two]) * share_x
-    return first * (1.0 - share_y) + second * share_y
-
-
-@wp.func
-def _wrap(number: int, count: int, is_cube: bool) -> int:
-    """Repeat a texture; clamp at the edges of a cube map's faces."""
-    if is_cube:
-        return wp.clamp(number, 0, count - 1)
-    rest = number % count
-    if rest < 0:
-        rest += count
-    return rest
-
-
-@wp.func
-def _color(texel: wp.uint32) -> wp.vec3:
-    return wp.vec3(
-        float(texel & wp.uint32(255)),
-        float((texel >> wp.uint32(8)) & wp.uint32(255)),
-        float((texel >> wp.uint32(16)) & wp.uint32(255)),
-    )
+    A pixel is `covered` texels wide. Flat textures repeat; faces of cube maps end at their edges.
+    """
+    ...

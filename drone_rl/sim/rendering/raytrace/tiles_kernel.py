@@ -5,11 +5,27 @@ import warp as wp
 from drone_rl.sim.rendering.raytrace import canvas_kernel as canvases
 from drone_rl.sim.rendering.raytrace import structs_kernel as structs
 from drone_rl.sim.rendering.raytrace.cast_kernel import MESH, Hit, World, complete_hit
-from drone_rl.sim.rendering.raytrace.intersection_kernel import PLANE
-from drone_rl.sim.rendering.raytrace.light_kernel import Look, Shot, shade, sky, start_image
+from drone_rl.sim.rendering.raytrace.intersection_kernel import PLANE, ROUND, surface_normal
+from drone_rl.sim.rendering.raytrace.light_kernel import Look, Shot, finish, sky, start_image
 from drone_rl.sim.rendering.raytrace.projection_kernel import frame_attitude, product, rotation
+from drone_rl.sim.rendering.raytrace.shade_kernel import (
+    OPAQUE,
+    Point,
+    Surface,
+    light_surface,
+    light_with_shadows,
+    make_surface,
+    sample_surface,
+    shade,
+)
 from drone_rl.sim.rendering.raytrace.shading_kernel import gray_of, to_bytes
 from drone_rl.sim.rendering.raytrace.structs_kernel import struct
+from drone_rl.sim.rendering.raytrace.triangles_kernel import (
+    Triangles,
+    smooth_normal,
+    triangle_normal,
+    triangle_weights,
+)
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -31,6 +47,8 @@ class TileScratch:
     """Least depth of each geom, metres."""
     parts: wp.array2d[wp.vec4i]
     """Pixels in which each geom is drawn."""
+    faces: wp.array2d[Surface]
+    """Two surfaces, while they are shaded."""
 
 
 @wp.kernel
@@ -58,7 +76,8 @@ def render_tiles(
         canvas = make_canvas(view, camera, scratch, buffer)
         draw(canvas, world, env, eye, to_world, scratch, buffer)
         shot = start_image(look, world, view, camera, env, buffer, eye, to_world)
-        write(canvas, view, world, look, shot, to_world, scratch.geoms[buffer], images, row)
+        geoms, faces = scratch.geoms[buffer], scratch.faces[buffer]
+        write(canvas, view, world, look, shot, to_world, geoms, faces, images, row)
         row += 1
 
 
@@ -162,94 +181,194 @@ def write(
     shot: Shot,
     to_world: wp.mat33,
     geoms: wp.array[structs.GeomView],
+    faces: wp.array[Surface],
     images: structs.Images,
     row: int,
 ) -> None:
-    """Write the image `row` from a canvas."""
-    pixel = int(0)
-    y = int(0)
-    while y < canvas.height:
-        x = int(0)
-        while x < canvas.width:
-            at = 64 * ((y >> 3) * canvas.across + (x >> 3)) + 8 * (y & 7) + (x & 7)
-            ray = wp.vec3(
-                (float(x) - canvas.x0) / canvas.x_scale,
-                (canvas.y0 - float(y)) / canvas.y_scale,
-                -1.0,
-            )
-            cosine = 1.0 / wp.length(ray)
-            ray *= cosine
-            hit = Hit()
-            hit.env = shot.env
-            hit.geom = structs.NO_GEOM
-            owner = canvas.owner[at]
-            direction = to_world @ ray
-            if owner != structs.NO_GEOM:
-                seen = geoms[owner]
-                hit.geom = seen.number
-                hit.distance = canvas.depth[at] / cosine
-                hit.point = shot.position + hit.distance * direction
-                hit = complete_hit(
-                    hit,
-                    world,
-                    seen.kind,
-                    seen.size,
-                    seen.axes,
-                    world.mesh[owner],
-                    canvas.part[at],
-                    seen.eye,
-                    seen.into @ ray,
-                )
-            write_pixel(view, images, row, pixel, cosine, direction, world, look, hit, shot)
-            pixel += 1
-            x += 1
-        y += 1
-
-
-@wp.func
-def write_pixel(
-    view: structs.ViewArrays,
-    images: structs.Images,
-    row: int,
-    pixel: int,
-    cosine: float,
-    direction: wp.vec3,
-    world: World,
-    look: Look,
-    hit: Hit,
-    shot: Shot,
-) -> None:
-    """Write all modalities of a pixel. `cosine` is that of its ray to the camera's axis."""
+    """Write all modalities of the image `row` from a canvas."""
     what = view.what
     if (what & (structs.RGB | structs.GRAY)) != 0:
-        color = _color(look, world, hit, direction, shot)
-        if (what & structs.RGB) != 0:
-            images.rgb[row, pixel] = color
-        if (what & structs.GRAY) != 0:
-            images.gray[row, pixel] = gray_of(color)
-    write_geometry(images, what, row, pixel, cosine, hit)
-
-
-@wp.func
-def _color(look: Look, world: World, hit: Hit, direction: wp.vec3, shot: Shot) -> wp.vec3ub:
-    shown = wp.vec3()
-    if hit.geom == structs.NO_GEOM:
-        shown = sky(look, direction, shot)
-    else:
-        shown = shade(look, world, hit, direction, shot)
-    return to_bytes(255.0 * wp.min(wp.max(shown, wp.vec3()), wp.vec3(1.0, 1.0, 1.0)))
-
-
-@wp.func
-def write_geometry(
-    images: structs.Images, what: int, row: int, pixel: int, cosine: float, hit: Hit
-) -> None:
-    """Write all modalities of a pixel but its color; see `write_pixel`."""
+        write_colors(canvas, what, world, look, shot, to_world, geoms, faces, images, row)
     if (what & structs.DEPTH) != 0:
-        images.depth[row, pixel] = hit.distance * cosine
+        canvases.copy_depths(canvas, images.depth[row], False)
     if (what & structs.DISTANCE) != 0:
-        images.distance[row, pixel] = hit.distance
+        canvases.copy_depths(canvas, images.distance[row], True)
     if (what & structs.SEGMENTATION) != 0:
-        images.segmentation[row, pixel] = hit.geom
+        canvases.copy_owners(canvas, world.geoms.number, images.segmentation[row])
     if (what & structs.NORMALS) != 0:
-        images.normals[row, pixel] = hit.face_normal
+        write_normals(canvas, world.triangles, geoms, images.normals[row])
+
+
+@wp.func
+def pixel_ray(canvas: canvases.Canvas, x: int, y: int) -> wp.vec3:
+    """Return the direction through a pixel, with length 1 along the camera's axis."""
+    return wp.vec3(
+        (float(x) - canvas.x0) / canvas.x_scale, (canvas.y0 - float(y)) / canvas.y_scale, -1.0
+    )
+
+
+@wp.func
+def write_normals(
+    canvas: canvases.Canvas,
+    triangles: Triangles,
+    geoms: wp.array[structs.GeomView],
+    normals: wp.array[wp.vec3],
+) -> None:
+    """Write the unit normal of what each pixel shows, world frame."""
+    tile = int(0)
+    while tile < canvas.across * canvas.down:
+        left, top = 8 * (tile % canvas.across), 8 * (tile // canvas.across)
+        k = int(0)
+        while k < 64:
+            x, y = left + (k & 7), top + (k >> 3)
+            if x < canvas.width and y < canvas.height:
+                at = 64 * tile + k
+                owner = canvas.owner[at]
+                normal = wp.vec3()
+                if owner != structs.NO_GEOM:
+                    ray, depth = pixel_ray(canvas, x, y), canvas.depth[at]
+                    part = canvas.part[at]
+                    normal = geoms[owner].axes @ _normal(triangles, geoms[owner], part, ray, depth)
+                normals[y * canvas.width + x] = normal
+            k += 1
+        tile += 1
+
+
+@wp.func
+def _normal(
+    triangles: Triangles, seen: structs.GeomView, part: int, ray: wp.vec3, depth: float
+) -> wp.vec3:
+    """Return the unit normal of what a ray meets, on the side that is seen, geom's frame."""
+    if seen.kind == MESH:
+        return triangle_normal(triangles, part)
+    if seen.kind == PLANE:
+        return wp.vec3(0.0, 0.0, wp.sign(seen.eye[2]))
+    return surface_normal(seen.kind, seen.size, part, seen.eye, seen.into @ ray, depth)
+
+
+@wp.func
+def write_colors(
+    canvas: canvases.Canvas,
+    what: int,
+    world: World,
+    look: Look,
+    shot: Shot,
+    to_world: wp.mat33,
+    geoms: wp.array[structs.GeomView],
+    faces: wp.array[Surface],
+    images: structs.Images,
+    row: int,
+) -> None:
+    """Write colors. What consecutive pixels of a face share is computed once, in `faces[0]`."""
+    last_owner = int(structs.NO_GEOM)
+    last_part = int(0)
+    tile = int(0)
+    while tile < canvas.across * canvas.down:
+        left, top = 8 * (tile % canvas.across), 8 * (tile // canvas.across)
+        k = int(0)
+        while k < 64:
+            x, y = left + (k & 7), top + (k >> 3)
+            if x < canvas.width and y < canvas.height:
+                owner, part = int(canvas.owner[64 * tile + k]), int(canvas.part[64 * tile + k])
+                ray = pixel_ray(canvas, x, y)
+                shown = wp.vec3()
+                if owner == structs.NO_GEOM:
+                    shown = sky(look.textures.texels, wp.normalize(to_world @ ray), shot)
+                else:
+                    depth = canvas.depth[64 * tile + k]
+                    is_new = owner != last_owner or part != last_part
+                    if is_new and (owner != last_owner or geoms[owner].kind != MESH):
+                        faces[0] = face_of(look, shot, geoms[owner], part)
+                    point = point_of(world.triangles, geoms, owner, part, ray, depth, faces)
+                    if faces[0].opacity < OPAQUE:
+                        hit = hit_of(world, shot, geoms[owner], part, point, to_world @ ray)
+                        direction = wp.normalize(to_world @ ray)
+                        shown = shade(look, world, hit, direction, shot, faces)
+                    else:
+                        shown = light_surface(world.triangles, faces, 0, point, shot, -1, True)
+                        if shot.num_casting > 0:
+                            shown += light_with_shadows(world, faces, 0, point, shot)
+                        texels = look.textures.texels
+                        texel = sample_surface(texels, world.triangles, faces, 0, point, shot)
+                        shown = wp.cw_mul(shown, texel)
+                        shown = finish(shown, depth * wp.length(ray), shot)
+                    last_owner = owner
+                    last_part = part
+                write_color(images, what, row, y * canvas.width + x, shown)
+            k += 1
+        tile += 1
+
+
+@wp.func
+def write_color(images: structs.Images, what: int, row: int, pixel: int, shown: wp.vec3) -> None:
+    """Write one color, 0 to 1, as bytes and as gray."""
+    color = to_bytes(255.0 * shown)
+    if (what & structs.RGB) != 0:
+        images.rgb[row, pixel] = color
+    if (what & structs.GRAY) != 0:
+        images.gray[row, pixel] = gray_of(color)
+
+
+@wp.func
+def face_of(look: Look, shot: Shot, seen: structs.GeomView, part: int) -> Surface:
+    """Return a face of a geom, flat ones with their normal."""
+    normal = wp.vec3()
+    if seen.kind != MESH and part != ROUND:
+        normal[part // 2] = 2.0 * float(part % 2) - 1.0
+    return make_surface(
+        look.surfaces,
+        look.textures,
+        shot,
+        seen.number,
+        seen.kind,
+        part,
+        seen.size,
+        seen.axes,
+        seen.eye,
+        normal,
+    )
+
+
+@wp.func
+def point_of(
+    triangles: Triangles,
+    geoms: wp.array[structs.GeomView],
+    owner: int,
+    part: int,
+    ray: wp.vec3,
+    depth: float,
+    faces: wp.array[Surface],
+) -> Point:
+    """Return what a pixel shows of `faces[0]`, of which it sets the triangle of a mesh."""
+    point = Point()
+    point.depth = depth
+    point.ray = geoms[owner].into @ ray
+    point.local = geoms[owner].eye + depth * point.ray
+    if geoms[owner].kind == MESH:
+        faces[0].face.part = part
+        point.normal = triangle_normal(triangles, part)
+        point.weights = triangle_weights(triangles, part, geoms[owner].eye, point.ray)
+        point.smooth = smooth_normal(triangles, part, point.weights)
+    elif part == ROUND:
+        point.normal = _normal(triangles, geoms[owner], part, ray, depth)
+        point.smooth = point.normal
+    else:
+        point.normal = faces[0].face.normal
+        point.smooth = point.normal
+    return point
+
+
+@wp.func
+def hit_of(
+    world: World, shot: Shot, seen: structs.GeomView, part: int, point: Point, ray: wp.vec3
+) -> Hit:
+    """Return what a pixel shows as the hit of a ray, world frame."""
+    hit = Hit()
+    hit.env = shot.env
+    hit.geom = seen.number
+    hit.distance = point.depth * wp.length(ray)
+    direction = wp.normalize(ray)
+    hit.point = shot.position + hit.distance * direction
+    return complete_hit(
+        hit, world, seen.kind, seen.size, seen.axes, part, seen.eye, wp.normalize(point.ray)
+    )

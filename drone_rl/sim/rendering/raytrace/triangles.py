@@ -89,7 +89,6 @@ def make_triangles(meshes: list[Mesh]) -> Triangles:
         "depth": (depths, int),
         "node": (np.cumsum([0, *(2 * leaves - 1)])[:-1], int),
         "leaf": (np.cumsum([0, *leaves])[:-1], int),
-        "is_mapped": ([mesh.texcoords is not None for mesh in meshes], int),
     }
     kinds: dict[str, Any] = {
         "boxes": float,

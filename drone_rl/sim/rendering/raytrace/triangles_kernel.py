@@ -31,8 +31,6 @@ class Triangles:
     """Of each leaf: x of all first corners, y, z, then the second and third corners."""
     normals: wp.array[wp.vec3]
     """Shading normals: three a triangle."""
-    is_mapped: wp.array[int]
-    """Whether each mesh has texture coordinates."""
     texcoords: wp.array[wp.vec2]
     """Three a triangle; zero without."""
 
@@ -160,6 +158,14 @@ def triangle_normal(triangles: Triangles, triangle: int) -> wp.vec3:
     b = triangle_corner(triangles, triangle, 1)
     c = triangle_corner(triangles, triangle, 2)
     return wp.normalize(wp.cross(b - a, c - a))
+
+
+@wp.func
+def smooth_normal(triangles: Triangles, triangle: int, weights: wp.vec3) -> wp.vec3:
+    """Return the unit normal for shading, interpolated between a triangle's corners."""
+    at = 3 * triangle
+    normal = weights[0] * triangles.normals[at] + weights[1] * triangles.normals[at + 1]
+    return wp.normalize(normal + weights[2] * triangles.normals[at + 2])
 
 
 @wp.func

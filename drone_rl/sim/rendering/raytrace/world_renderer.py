@@ -120,6 +120,7 @@ def _make_scratch(view: View, workers: int, geoms: int) -> Any:
     across, down = -(-view.width // TILE), -(-view.height // TILE)
     tiles = across * down
     kind: Any = structs.GeomView
+    surface: Any = tiles_kernel.Surface
     arrays = {
         "depth": (tiles * TILE**2, float),
         "owner": (tiles * TILE**2, int),
@@ -130,6 +131,7 @@ def _make_scratch(view: View, workers: int, geoms: int) -> Any:
         "order": (geoms, int),
         "least": (geoms, float),
         "parts": (geoms, wp.vec4i),
+        "faces": (2, surface),
     }
     scratch: Any = tiles_kernel.TileScratch()
     for name, (length, dtype) in arrays.items():

@@ -39,17 +39,6 @@ def test_mesh_has_smooth_normals_and_hides_its_inside():
     assert inside["geom"].tolist() == [-1]
 
 
-def test_texture_coordinates_are_interpolated():
-    pyramid = """<mesh name="m" vertex="0 -1 -1  0 1 -1  0 1 1  0 -1 1  1 0 0"
-    face="0 2 1  0 3 2  0 1 4  1 2 4  2 3 4  3 0 4" texcoord="0 0  1 0  1 1  0 1  0 0"/>"""
-    scene = make_scene('<geom type="mesh" mesh="m" pos="2 0 0"/>', pyramid)
-    ray = np.array([[2.0, 0.5, -0.5]]) / np.sqrt(4.5)
-    hit = cast(scene, np.zeros(3), ray)
-    assert hit["is_mapped"].tolist() == [1]
-    np.testing.assert_allclose(hit["texcoord"], [[0.75, 0.25]], atol=1e-5)
-    np.testing.assert_allclose(hit["face_normal"], [[-1.0, 0.0, 0.0]], atol=1e-6)
-
-
 def test_planes_are_seen_from_both_sides():
     scene = make_scene('<geom type="plane" size="1 1 1" pos="0 0 2"/>')
     up = np.array([[0.0, 0.0, 1.0]])
