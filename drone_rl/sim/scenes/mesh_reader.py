@@ -25,6 +25,11 @@ _LEAST_VERTICES = 4
 _GRAY = (0.7, 0.7, 0.7, 1.0)
 
 
+_LIGHT = '<visual><headlight ambient=".35 .35 .35" diffuse=".2 .2 .2" specular="0 0 0"/></visual>'
+_SKY = '<texture type="skybox" builtin="gradient" rgb1=".55 .7 .92" rgb2=".85 .9 .97" width="64"/>'
+_SUN = '<light type="directional" dir=".35 -.45 -.82" diffuse=".6 .6 .6" castshadow="false"/>'
+
+
 class _Inside:
     """What trimesh gets files by that a mesh names: those in its folder."""
 
@@ -63,7 +68,10 @@ class _Writer:
     def mjcf(self) -> str:
         """The model."""
         assets, geoms = "\n".join(self._assets), "\n".join(self._geoms)
-        return f"<mujoco><asset>{assets}</asset><worldbody>{geoms}</worldbody></mujoco>"
+        return (
+            f"<mujoco>{_LIGHT}<asset>{_SKY}{assets}</asset>"
+            f"<worldbody>{_SUN}{geoms}</worldbody></mujoco>"
+        )
 
     def add(self, name: str, mesh: Any, transform: NDArray[np.float64]) -> None:
         """Add a mesh where it is."""
@@ -100,7 +108,7 @@ class _Writer:
             texture = "" if material is None else self._texture(material, name)
             color = (1.0,) * 4 if texture else _color(visual, material)
             rgba = " ".join(f"{value:.4g}" for value in color)
-            self._assets.append(f'<material name="{name}" rgba="{rgba}"{texture}/>')
+            self._assets.append(f'<material name="{name}" rgba="{rgba}" specular="0"{texture}/>')
         return self._materials[key]
 
     def _texture(self, material: Any, name: str) -> str:
