@@ -1,6 +1,7 @@
 """Compile a scene's MJCF, and write it again as what does not move."""
 
 import re
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -32,14 +33,21 @@ def compile_scene(root: Element, reading: Reading) -> tuple[Any, str, tuple[bool
         can_touch = [bool(geom.contype or geom.conaffinity) for geom in spec.geoms]
         for geom in spec.geoms:  # MuJoCo would make convex hulls of meshes, for its own contacts
             geom.contype = geom.conaffinity = 0
-        model = spec.compile()
+        with warnings.catch_warnings(record=True, action="always") as caught:
+            model = spec.compile()
+        lines = [str(one.message).splitlines()[0][:200] for one in caught]
+        reading.notes["remarks"] += [_with_names(line, reading) for line in lines]
         solid = {geom.id: is_solid for geom, is_solid in zip(spec.geoms, can_touch, strict=True)}
         return model, spec.to_xml(), tuple(solid[i] for i in range(model.ngeom))
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
-        message = str(error)
-        for (_, path), (name, _) in reading.names.items():
-            message = message.replace(f"'{name}'", f"'{path.name}'")
-        raise InputError(_reason(message, of_line)) from error
+        raise InputError(_reason(_with_names(str(error), reading), of_line)) from error
+
+
+def _with_names(message: str, reading: Reading) -> str:
+    """Return MuJoCo's message with the names of the user's files instead of ours."""
+    for (_, path), (name, _) in reading.names.items():
+        message = message.replace(f"'{name}'", f"'{path.name}'")
+    return message
 
 
 def _reason(message: str, of_line: list[Element]) -> str:

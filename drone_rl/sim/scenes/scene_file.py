@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 import logging
+import warnings
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, Self
@@ -93,7 +94,8 @@ class SceneFile:
     @functools.cached_property
     def model(self) -> Any:
         """The compiled scene alone, a `mujoco.MjModel`; geoms are numbered as in `mjcf`."""
-        return mujoco.MjModel.from_xml_string(self.mjcf, dict(self.assets))
+        with warnings.catch_warnings(action="ignore"):  # which `warnings` has
+            return mujoco.MjModel.from_xml_string(self.mjcf, dict(self.assets))
 
     @functools.cached_property
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -242,6 +244,7 @@ def _warnings(notes: Mapping[str, list[str]]) -> list[str]:
     ]
     if notes["plugin"]:
         lines.append(f"plugins do not run: {_some(notes['plugin'])}")
+    lines += dict.fromkeys(notes["remarks"])
     joints = notes["joint"] + notes["freejoint"]
     if joints:
         where = f"key frame {notes['key'][0]} has them" if notes["key"] else "they begin"
