@@ -4,9 +4,11 @@ Stepping in Python takes most of the time: a small network is evaluated on a fra
 microseconds, and a frame is rendered in as many.
 """
 
+import sys
 from collections.abc import Iterable, Mapping
 from typing import Any, Self
 
+import numpy as np
 import torch
 import warp as wp
 from torch import Tensor
@@ -287,6 +289,8 @@ class RolloutBuffer:
 
     def __init__(self, part: Mapping[str, Tensor]) -> None:
         self._arrays = dict(part)
+        self._copies: dict[str, list[np.ndarray]] = {}
+        """Memory of copies, also of earlier batches."""
         self._num_rows = len(next(iter(self._arrays.values())))
 
     def open(self, part: int, kept: Iterable[str]) -> dict[str, Tensor]:
@@ -306,4 +310,20 @@ class RolloutBuffer:
 
     def read(self, rows: Tensor, names: Iterable[str]) -> dict[str, Tensor]:
         """Return copies of rows (k,), counted from the first part's, of the named entries."""
-        return {name: self._arrays[name].index_select(0, rows) for name in names}
+        copies = {}
+        for name in names:
+            array = self._arrays[name]
+            out = self._unused(name, len(rows)) if array.is_floating_point() else None
+            copies[name] = torch.index_select(array, 0, rows, out=out)
+        return copies
+
+    def _unused(self, name: str, count: int) -> Tensor:
+        """Return memory, (count, *), that no batch uses: new pages take longer than copies do."""
+        memory = self._copies.setdefault(name, [])
+        for array in memory:
+            # one reference of the list, of the loop and of the call; tensors have one, too
+            if len(array) >= count and sys.getrefcount(array) == 3:
+                return torch.from_numpy(array)[:count]
+        shape = self._arrays[name].shape[1:]
+        memory[:] = [np.empty((count + count // 4, *shape), np.float32), *memory[:2]]
+        return torch.from_numpy(memory[0])[:count]
