@@ -549,6 +549,18 @@ def test_buffer_grows_with_the_number_of_parts(num_parts):
     assert where[0] == where[1]
 
 
+def test_memory_of_batches_is_reused_once_nothing_refers_to_it():
+    buffer, rows = make_buffer(), torch.arange(4)
+    write(buffer.open(0, ("pixels",)), 1, 2, 3, 4)
+    view = buffer.read(rows, ["pixels"])["pixels"][1:]
+    write(buffer.open(0, ("pixels",)), 5, 6, 7, 8)
+    second = buffer.read(rows, ["pixels"])["pixels"]
+    assert view[:, 0].tolist() == [2, 3, 4] and second[:, 0].tolist() == [5, 6, 7, 8]
+    place = second.data_ptr()
+    del second
+    assert buffer.read(rows[:3], ["pixels"])["pixels"].data_ptr() == place
+
+
 class TestRecordedActivations:
     @pytest.fixture
     def episodes(self):
