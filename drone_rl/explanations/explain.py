@@ -19,6 +19,7 @@ from drone_rl.explanations import (
     embedding,
     importance,
     response,
+    scene_map,
     truth,
 )
 from drone_rl.explanations.context import Context, LeftOutError, find_lacking
@@ -59,6 +60,7 @@ SECTIONS: dict[str, Section] = {
     "asymmetry": response.asymmetry_section,
     "shifts": behavior.shifts_section,
     "truth": truth.section,
+    "scene_map": scene_map.section,
 }
 """Sections by the names of their results in `Explanation`; `drone_rl.explain` adds "places".
 `report.page.PARTS` displays them."""

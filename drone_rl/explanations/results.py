@@ -430,6 +430,15 @@ class Asymmetry(Model):
     worst: tuple[Mirrored, ...]
 
 
+class SceneMap(Model):
+    """Paths of episodes in scene files."""
+
+    by_start: dict[str, Share]
+    """Success rate of the most probable actions by the name of the start."""
+    picture: Array
+    """The floor plans with paths, RGB, uint8. Shape: (height, width, 3)."""
+
+
 class Explanation(Seeded):
     """Everything that is known of one policy; a section that is not computed is None.
 
@@ -465,6 +474,7 @@ class Explanation(Seeded):
     response: Response | None = None
     places: ExactMap | None = None
     asymmetry: Asymmetry | None = None
+    scene_map: SceneMap | None = None
     data: dict[str, Array] = Field({}, exclude=True)
     """Arrays of `dataset.npz`, with the analysed frames."""
     source: str = Field("explanation.json", exclude=True)

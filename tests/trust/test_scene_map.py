@@ -1,5 +1,6 @@
 """The map of a scene: paths of episodes, how they end, and success by start."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,8 @@ import torch
 from drone_rl.config import ActionSettings
 from drone_rl.config.task import BaseTaskSettings
 from drone_rl.envs import DroneEnv
+from drone_rl.explanations import scene_map
+from drone_rl.explanations.report import scene_map as scene_map_part
 from drone_rl.policies.baselines import ConstantAgent, OracleAgent
 from drone_rl.trust.scene_map import by_start, draw_map, fly_paths
 from tests.house import SITES, write_house
@@ -49,3 +52,14 @@ def test_the_map_counts_contacts_and_shows_walls(tmp_path):
         "start_east",
         "start_west",
     ]
+
+
+def test_an_explanation_shows_the_map(tmp_path):
+    env: Any = environment(tmp_path)
+    context: Any = SimpleNamespace(
+        scenes=SimpleNamespace(task=env.worlds.task), env=env, restart=OracleAgent
+    )
+    found: Any = scene_map.section(context)
+    assert found.by_start["start_east"].share == 1.0
+    assert found.picture.shape[2] == 3 and found.picture.dtype == np.uint8
+    assert scene_map_part.draw(dict(found), None)["scene_map"].height == len(found.picture)  # pyright: ignore[reportArgumentType]

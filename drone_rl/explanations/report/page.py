@@ -16,6 +16,7 @@ from drone_rl.explanations.report import (
     importance,
     places,
     response,
+    scene_map,
     truth,
 )
 from drone_rl.explanations.report.part import METHOD_NAMES, Figures, Part
@@ -29,6 +30,7 @@ from drone_rl.utils.text import FILTERS
 
 PARTS: dict[str, Part] = {
     "verdict": behavior.VERDICT_PART,
+    "scene_map": scene_map.PART,
     "shifts": behavior.SHIFTS_PART,
     "dataset": behavior.DATASET_PART,
     "tsne": embedding.PART,
