@@ -136,6 +136,7 @@ class Reader:
         """Note what will not be drawn, or does not move."""
         notes, root = self.reading.notes, self.root
         for element in root.every():
+            _check_numbers(element)
             if element.tag == "default":
                 continue
             tag, name = element.tag, element.get("name") or element.get("prefix") or element.tag
@@ -283,6 +284,13 @@ class Reader:
             if self.costs[name] > most:
                 count = f"with it the scene has {self.costs[name]} {name}"
                 fail(element, f"{count}; give at most {most}")
+
+
+def _check_numbers(element: Element) -> None:
+    """Refuse what is no number, about which MuJoCo would write a log file."""
+    for name, value in element.attributes.items():
+        if name != "name" and "nan" in value.lower().split():
+            fail(element, f"{name} has a nan, which is no number; correct it")
 
 
 def _whole(element: Element, name: str) -> int:
