@@ -243,10 +243,9 @@ def judge_one(
         )
     progress("judged", 1, 1)
     return Judgement(
-        **dict(verdict),
+        **dict(verdict) | {"known_scene": _known_scene(loaded)},
         policy=name,
         weights=identify(loaded),
-        known_scene=_known_scene(loaded),
         certificate=None if claim is None else claim.path,
         shifts=None if measured is None else measured.path,
         findings=find(verdict, measured),

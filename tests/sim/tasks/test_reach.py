@@ -135,7 +135,7 @@ def test_what_can_not_work_is_one_line(tmp_path, sites, changes, message):
 
 def test_a_scene_without_solids_is_refused(tmp_path):
     path = tmp_path / "empty.xml"
-    path.write_text('<mujoco><worldbody><site name="goal"/></worldbody></mujoco>')
+    path.write_text('<mujoco><worldbody><geom size="1" contype="0" conaffinity="0"/><site name="goal"/></worldbody></mujoco>')
     with pytest.raises(InputError, match="nothing is solid"):
         as_task(reach(path))
 
