@@ -34,6 +34,8 @@ class InTheLoopDynamics:
     episode begins, `begin` flies there, then each `step` continues.
     """
 
+    stops_at_solids = False
+
     def __init__(
         self,
         drone: DroneInTheLoop,

@@ -135,7 +135,8 @@ def test_what_can_not_work_is_one_line(tmp_path, sites, changes, message):
 
 def test_a_scene_without_solids_is_refused(tmp_path):
     path = tmp_path / "empty.xml"
-    path.write_text('<mujoco><worldbody><geom size="1" contype="0" conaffinity="0"/><site name="goal"/></worldbody></mujoco>')
+    geom = '<geom size="1" contype="0" conaffinity="0"/>'
+    path.write_text(f'<mujoco><worldbody>{geom}<site name="goal"/></worldbody></mujoco>')
     with pytest.raises(InputError, match="nothing is solid"):
         as_task(reach(path))
 
