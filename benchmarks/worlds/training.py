@@ -16,15 +16,13 @@ SCENE = "indoor"
 SUCCESS = 0.9
 """Success rate of a verdict that counts as solved."""
 STATUSES = (NOT_CERTAIN, *(kind.exit_code for kind in VerdictKind))
-_PPO = (
-    *("objective=ppo", "objective.num_steps=64", "objective.epochs=3"),
-    *("objective.minibatch_size=1024", "objective.entropy_coeff=0.01", "returns.gamma=0.98"),
-    *("optimizer.lr=1e-3", "collector.num_envs=256", "trainer.confirm_share=0.93"),
+WALKING = (
+    *("experiment=reach", "inputs=[gray,goal,last_action]", "inputs.goal.scale=5"),
+    *("inputs.gray.size=[12,24]", "inputs.gray.horizontal_fov=110"),
 )
-WALKING = (*_PPO, "actions=moves_turning", "inputs=[gray,goal,last_action]")
 FLYING = (
-    *(*_PPO, "dynamics=quadrotor", "actions=velocity", "actions.yaw_rate=90"),
-    "inputs=[depth,goal,velocity]",
+    *("experiment=reach_flight", "inputs=[depth,goal,velocity]", "inputs.goal.scale=5"),
+    *("inputs.depth.size=[12,24]", "inputs.depth.horizontal_fov=110", "inputs.depth.maximum=6"),
 )
 _MOST = {"moves": 3_000_000, "flight": 6_000_000}
 """Frames after which a training ends at the latest."""
@@ -76,7 +74,9 @@ def _compare(setup: Setup, way: str) -> dict[str, Any]:
 
 
 def _without_image(settings: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(one.replace("[gray,", "[").replace("[depth,", "[") for one in settings)
+    """Return settings without those of the image, the first input."""
+    kept = (one for one in settings if not one.startswith(("inputs.gray.", "inputs.depth.")))
+    return tuple(one.replace("[gray,", "[").replace("[depth,", "[") for one in kept)
 
 
 def train(run: Path, seed: int, most: int, *settings: str) -> None:
