@@ -31,7 +31,7 @@ _AFTER: dict[type, tuple[type, ...]] = {
     CropRows: (),
     StandardizePixels: (),
     CatFrames: (),
-    Shift: (CropRows,),
+    Shift: (CropRows, ChromaticityPixels, StandardizePixels),
     ChromaticityPixels: (StandardizePixels, CatFrames),
 }
 """Transforms that the kernel has, each with those that it can't follow."""

@@ -33,7 +33,7 @@ from drone_rl.config.inputs import (
     Velocity,
     describe_inputs,
 )
-from drone_rl.config.transforms import Crop
+from drone_rl.config.transforms import Chromaticity, Crop
 from drone_rl.config.transforms import Shift as ShiftSettings
 from drone_rl.envs import (
     ChromaticityPixels,
@@ -481,6 +481,10 @@ def test_several_inputs_are_fused(inputs, how):
     [
         ({"gray": GrayImage(noise=0.1)}, "transform Noise is not fused"),
         ({"gray": GrayImage(), "goal": Goal(loss=0.1)}, "errors of input goal are not fused"),
+        (
+            {"rgb": RgbImage(transforms=(Chromaticity(), SHIFTED[0]))},
+            "transform Shift is not fused",
+        ),
         ({"segmentation": SegmentationImage()}, "input segmentation is not fused"),
         ({"goal": Goal()}, "a policy without images is not fused"),
     ],
