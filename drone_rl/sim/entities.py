@@ -1,5 +1,6 @@
 """Entities of a dm_control scene: the field, the drone, and what tasks add to them."""
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from drone_rl.config import CameraSettings
@@ -70,16 +71,21 @@ class Field(composer.Arena):
 
     semantic_class = SemanticClass.GROUND
 
-    def _build(self, scene: SceneFile | None = None, name: str = "field") -> None:
-        """Make the arena; that of a scene file has its headlight and draw distance alone."""
+    def _build(self, scenes: Sequence[SceneFile] = (), name: str = "field") -> None:
+        """Make the arena; that of scene files has a headlight and a draw distance alone.
+
+        The headlight is the first one's, which OpenGL shows in all; see `Scene.headlights`.
+        """
         super()._build(name=name)
         root: Any = self._mjcf_root
         root.statistic.extent = 1.0
-        if scene is not None:
-            vis, extent = scene.model.vis, float(scene.model.stat.extent)
-            root.visual.map.set_attributes(
-                znear=min(0.05, vis.map.znear * extent), zfar=vis.map.zfar * extent
+        if scenes:
+            vis = scenes[0].model.vis
+            near, far = (
+                [float(getattr(of.model.vis.map, name) * of.model.stat.extent) for of in scenes]
+                for name in ("znear", "zfar")
             )
+            root.visual.map.set_attributes(znear=min(0.05, *near), zfar=max(far))
             root.visual.headlight.set_attributes(
                 active=vis.headlight.active,
                 ambient=vis.headlight.ambient,
@@ -109,7 +115,7 @@ class SceneEntity(composer.Entity):
         root: Any = mjcf.from_xml_string(
             scene.mjcf, escape_separators=True, assets=dict(scene.assets)
         )
-        root.model = name
+        root.model, self.file = name, scene.model
         for section in ("option", "statistic", "visual", "size"):  # those of the field apply
             getattr(root, section).remove()
         self._mjcf_root = root

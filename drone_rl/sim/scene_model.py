@@ -4,7 +4,7 @@ from typing import Any
 
 from drone_rl.config import CameraSettings
 from drone_rl.sim import entities
-from drone_rl.sim.rendering.scene import Scene, SemanticClass, compiled
+from drone_rl.sim.rendering.scene import Headlight, Scene, SemanticClass, compiled
 from drone_rl.sim.tasks import Task
 from drone_rl.utils.plugins import errors_of, place_of
 
@@ -18,7 +18,7 @@ class SceneModel:
         scenes = getattr(task, "scenes", ())
         self._is_file = bool(scenes)
         self._sky = (0.0, 0.0, 0.0) if scenes else entities.SKY_COLOR
-        self.field = entities.Field(next(iter(scenes), None))
+        self.field = entities.Field(scenes)
         model: Any = self.field.mjcf_model
         model.option.gravity = (0, 0, 0)
         # a small drone's camera must not look through a wall that the drone can't pass
@@ -42,4 +42,9 @@ class SceneModel:
         for number, entity in [(-1, self.drone), *enumerate(self.props)]:
             for geom in physics.bind(entity.mjcf_model.find_all("geom")).element_id:
                 classes[geom], props[geom] = entity.semantic_class, number
-        return Scene(model, tuple(classes), tuple(props), self._sky, self._is_file)
+        heads = tuple(
+            Headlight.of(prop.file, number)
+            for number, prop in enumerate(self.props)
+            if isinstance(prop, entities.SceneEntity)
+        )
+        return Scene(model, tuple(classes), tuple(props), self._sky, self._is_file, heads)

@@ -2,7 +2,7 @@
 
 import dataclasses
 import enum
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import mujoco as _mujoco
 import numpy as np
@@ -41,6 +41,24 @@ class SemanticClass(enum.IntEnum):
     DECORATION = 6
 
 
+class Headlight(NamedTuple):
+    """The light at the camera of a scene file. Colors in [0, 1]."""
+
+    prop: int
+    """The file's, see `Scene.props`; -1 for a light in all environments."""
+    is_on: bool
+    ambient: tuple[float, float, float]
+    diffuse: tuple[float, float, float]
+    specular: tuple[float, float, float]
+
+    @classmethod
+    def of(cls, model: Any, prop: int = -1) -> Self:
+        """Return that of a `mujoco.MjModel`."""
+        head = model.vis.headlight
+        colors = (tuple(of.tolist()) for of in (head.ambient, head.diffuse, head.specular))
+        return cls(prop, bool(head.active), *colors)
+
+
 class PropBox(NamedTuple):
     """The axis-aligned bounding box of a prop, in metres from the prop's position."""
 
@@ -65,6 +83,14 @@ class Scene:
     """Background color: red, green, blue in [0, 1]."""
     is_file: bool = False
     """Whether the scene is from a file, so that its sky and lights are the file's own."""
+    file_headlights: tuple[Headlight, ...] = ()
+    """Those of the files, if there are any."""
+
+    @property
+    def headlights(self) -> tuple[Headlight, ...]:
+        """The headlights of the files, or the model's, that are on."""
+        every = self.file_headlights or (Headlight.of(self.model),)
+        return tuple(one for one in every if one.is_on)
 
     def geoms(self, semantic_class: SemanticClass) -> list[int]:
         """Return the indices of the geoms of a class."""

@@ -2,15 +2,19 @@
 
 import math
 
+import numpy as np
 import pytest
+import torch
 
 from drone_rl.flight.airsim.messages import Pose
+from drone_rl.flight.airsim.scenes import make_task
 from drone_rl.flight.airsim.settings_file import AirsimSettings
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.stage import Stage
 from drone_rl.flight.image_types import ImageType
 from drone_rl.flight.settings import ServeSettings
 from drone_rl.sim.coordinates import GeoPoint
+from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from tests.flight.airsim.flying import fly
 from tests.flight.airsim.looking import look
@@ -140,3 +144,20 @@ def test_a_files_angles_are_degrees_and_its_settings_do_not_matter(tmp_path, set
     house = Stage(str(path), 0)
     assert house.object_pose("wall").attitude == pytest.approx((0.92388, 0, 0, -0.38268), abs=1e-4)
     house.close()
+
+
+def test_the_lights_of_a_file_are_on_wherever_its_start_is(tmp_path):
+    """The file is placed so that its start is above the origin, here 10 or 200 m below it."""
+    means = []
+    for high in (10, 200):
+        path = tmp_path / f"hill_{high}.xml"
+        path.write_text(
+            '<mujoco><visual><headlight active="0"/></visual><worldbody>'
+            '<light directional="true" dir="1 0 -1" diffuse="0.8 0.8 0.8" castshadow="false"/>'
+            f'<geom type="box" size="9 9 5" pos="0 0 {high - 5}"/>'
+            f'<site name="start" pos="0 0 {high + 1}"/></worldbody></mujoco>'
+        )
+        worlds = Worlds(1, make_task(str(path)))
+        worlds.reset(torch.arange(1), [np.random.RandomState(0)])
+        means.append(float(worlds.render(worlds.state).float().mean()))
+    assert means[0] == means[1] > 10

@@ -106,6 +106,21 @@ def test_each_episode_is_in_one_of_the_scenes_with_its_own_goal(tmp_path):
     assert made.task.routes_of(made.state)[:, 0].tolist() == scene.tolist()
 
 
+@pytest.mark.parametrize("red_first", [False, True])
+def test_each_scene_has_its_own_headlight(tmp_path, red_first):
+    paths = [write_house(tmp_path), write_house(tmp_path, name="red")]
+    red = '<visual><headlight ambient="0.3 0 0" diffuse="0 0 0"/></visual><worldbody>'
+    paths[1].write_text(paths[1].read_text().replace("<worldbody>", red))
+    paths = paths[::-1] if red_first else paths
+    both = begun(reach(*paths), 12)
+    shown, scene = both.render(both.state), both.task.scene_of(both.state)
+    for number, path in enumerate(paths):
+        alone = begun(reach(path), 12)
+        alone.state.body, alone.state.places = both.state.body, both.state.places
+        is_here = scene == number
+        assert is_here.any() and torch.equal(alone.render(alone.state)[is_here], shown[is_here])
+
+
 def test_goals_in_a_region_are_all_over_it(tmp_path):
     sites = SITES.replace('pos="5 3.2 1" size="0.1"', 'type="box" pos="4.5 2 1" size="1 1.5 0.1"')
     made = begun(reach(write_house(tmp_path, sites)), 100)

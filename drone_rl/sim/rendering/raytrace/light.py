@@ -25,11 +25,12 @@ from drone_rl.sim.rendering.appearance import (
 from drone_rl.sim.rendering.raytrace import light_kernel as kernel
 from drone_rl.sim.rendering.raytrace.materials import EXTINCTION
 from drone_rl.sim.rendering.raytrace.scene import Frames
+from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME
 from drone_rl.sim.rendering.raytrace.surfaces import make_surfaces
 from drone_rl.sim.rendering.raytrace.surfaces_kernel import TILED
 from drone_rl.sim.rendering.raytrace.texels import make_textures
 from drone_rl.sim.rendering.raytrace.texels_kernel import Textures
-from drone_rl.sim.rendering.scene import Scene, SemanticClass
+from drone_rl.sim.rendering.scene import Headlight, Scene, SemanticClass
 from drone_rl.utils.errors import InputError
 
 mujoco: Any = _mujoco
@@ -56,7 +57,7 @@ class LookEncoder:
     def __init__(self, scene: Scene, frames: Frames, workers: int) -> None:
         """Read a scene for up to `workers` images at the same time."""
         self._scene = scene
-        self._lights, self._lamps = _make_lights(scene.model, frames)
+        self._lights, self._lamps = _make_lights(scene, frames)
         self._skies = _skies(scene.model, frames)
         self._own = kernel.Look()
         self._surfaces = make_surfaces(scene)
@@ -198,11 +199,11 @@ def find_objects(scene: Scene, pattern: str) -> list[int]:
 def find_lights(scene: Scene, pattern: str) -> list[int]:
     """Return the lights of a scene file, as encoded, whose names fit; see `find_objects`.
 
-    The headlight has the name headlight.
+    Headlights have the name headlight.
     """
     model = scene.model
     names: dict[str, list[int]] = {}
-    for number, light in enumerate(_light_numbers(model)):
+    for number, light in enumerate(_light_numbers(scene)):
         name = "headlight" if light < 0 else _short(model.light(light).name)
         names.setdefault(name, []).append(number)
     return _matching(pattern, names, "lights")
@@ -227,33 +228,36 @@ def _load_textures(scene: Scene, names: tuple[str, ...]) -> Textures:
     return make_textures(scene, names)
 
 
-def _light_numbers(model: Any) -> list[int]:
-    """Return the lights that are on, -1 for the headlight."""
+def _light_numbers(scene: Scene) -> list[int]:
+    """Return the lights that are on, and before them -1 - k for headlight k."""
+    model = scene.model
     on = (model.light_active != 0) & (model.light_type != mujoco.mjtLightType.mjLIGHT_IMAGE)
-    return [-1] * bool(model.vis.headlight.active) + np.flatnonzero(on).tolist()
+    return [~k for k in range(len(scene.headlights))] + np.flatnonzero(on).tolist()
 
 
-def _make_lights(model: Any, frames: Frames) -> tuple[Any, dict[str, Tensor]]:
+def _make_lights(scene: Scene, frames: Frames) -> tuple[Any, dict[str, Tensor]]:
     """Return the lights for the kernels, and their colors, (1, num_lights, 3), by name."""
-    numbers, suns, lights = _light_numbers(model), set[int](), []
+    numbers, suns, lights = _light_numbers(scene), set[int](), []
+    model, heads = scene.model, scene.headlights
     for number in numbers:
-        light = _headlight() if number < 0 else _make_light(model, number, frames)
+        light = _headlight(heads[~number]) if number < 0 else _make_light(model, number, frames)
         if number >= 0 and light.kind == kernel.DIRECTIONAL and light.frame not in suns:
             suns.add(light.frame)
             light.is_sun = 1
         lights.append(light)
     colors = {}
     for name in ("ambient", "diffuse", "specular"):
-        stored, head = getattr(model, f"light_{name}"), getattr(model.vis.headlight, name)
-        rows = [head if number < 0 else stored[number] for number in numbers]
+        stored, own = getattr(model, f"light_{name}"), [getattr(head, name) for head in heads]
+        rows = [own[~number] if number < 0 else stored[number] for number in numbers]
         colors[name] = torch.tensor(np.array(rows, float).reshape(1, -1, 3))
     kind: Any = kernel.Light
     return wp.array(lights, dtype=kind, device="cpu"), colors
 
 
-def _headlight() -> Any:
+def _headlight(head: Headlight) -> Any:
     light: Any = kernel.Light()
-    light.kind, light.frame = kernel.DIRECTIONAL, kernel.CAMERA_FRAME
+    light.kind, light.is_head = kernel.DIRECTIONAL, 1
+    light.frame = kernel.CAMERA_FRAME if head.prop < 0 else DRONE_FRAME + 1 + head.prop
     light.direction, light.range = wp.vec3(0.0, 0.0, -1.0), math.inf
     return light
 

@@ -26,9 +26,9 @@ SPOT = wp.constant(int(mujoco.mjtLightType.mjLIGHT_SPOT))
 DIRECTIONAL = wp.constant(int(mujoco.mjtLightType.mjLIGHT_DIRECTIONAL))
 POINT = wp.constant(int(mujoco.mjtLightType.mjLIGHT_POINT))
 CAMERA_FRAME = wp.constant(-1)
-"""Frame of the headlight."""
+"""Frame of a headlight that is on in all environments."""
 
-_HIDDEN = wp.constant(-50.0)
+_HIDDEN = wp.constant(-5000.0)
 """Metres: a frame below is out of sight, and so are its lights and its sky."""
 _MOST_LIGHTS = wp.constant(8)
 """Lights that OpenGL has: later ones are off."""
@@ -54,6 +54,8 @@ class Light:
     """Metres; the light ends there. Infinite for none."""
     casts: int
     """Whether it casts shadows."""
+    is_head: int
+    """Whether it shines along the camera's axis."""
     is_sun: int
     """Whether it is the first directional light of its frame."""
 
@@ -179,7 +181,7 @@ def start_image(
     while light < look.lighting.lights.shape[0]:
         placed = _place_light(look.lighting, light, env)
         frame = look.lighting.lights[light].frame
-        if frame == CAMERA_FRAME:
+        if look.lighting.lights[light].is_head != 0:
             placed.direction = shot.forward
         else:
             turn = rotation(frame_attitude(frame, world.poses.attitudes[env]))
