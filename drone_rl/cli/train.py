@@ -32,7 +32,7 @@ _TRAIN_LONGER = {
 
 
 class TrainCommand(CommandSettings, TrainSettings):
-    """Train a policy that collects cubes from camera images."""
+    """Train a policy that sees camera images, in a task: collect cubes, reach a goal or others."""
 
     logger: Annotated[tuple[Logger, ...], Parts(Logger, 16)] = (Tensorboard(),)
     """Loggers in addition to metrics.csv."""

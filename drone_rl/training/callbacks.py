@@ -265,7 +265,9 @@ class UnpaidTerms(Callback):
         self._unpaid &= unpaid
         if self._unpaid and training.progress.episodes - self._episodes >= self.EPISODES:
             _log.warning(
-                "no episode was paid the reward terms %s; check their functions and parameters",
+                "none of %d episodes was paid the reward terms %s; normal before a first success, "
+                "otherwise check their functions and parameters",
+                training.progress.episodes - self._episodes,
                 ", ".join(sorted(self._unpaid)),
             )
             self._unpaid = set()
