@@ -183,7 +183,8 @@ def find_objects(scene: Scene, pattern: str) -> list[int]:
     """
     model = scene.model
     names: dict[str, list[int]] = {}
-    for geom in range(model.ngeom):
+    drone = scene.geoms(SemanticClass.DRONE)
+    for geom in {*range(model.ngeom)}.difference(drone):
         body = model.geom_bodyid[geom]
         own = [model.geom(geom).name]
         if model.geom_matid[geom] >= 0:
@@ -217,7 +218,7 @@ def _short(name: str) -> str:
 def _matching(pattern: str, names: dict[str, list[int]], kind: str) -> list[int]:
     found = sorted({i for name in fnmatch.filter(names, pattern) if name for i in names[name]})
     if not found:
-        known = ", ".join(sorted(name for name in names if name)[:20]) or "none"
+        known = ", ".join(sorted(filter(None, names))) or "none"
         raise InputError(
             f"appearance.{kind}: {pattern!r} names nothing in the scene; names there: {known}"
         )
