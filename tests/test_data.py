@@ -17,6 +17,8 @@ MUTABLE = {
     "explanations.truth:Intervention",
     "explanations.rollouts:RolloutDataset",
     "policies.zoo.files:TrainingProgress",
+    "sim.scenes.elements:Element",
+    "sim.scenes.reader:Reading",
     "sweeps.figures:Layout",
     "training.actor_critic:ActorCriticLearner",
     "training.learners:GradientLearner",

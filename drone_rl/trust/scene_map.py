@@ -35,7 +35,7 @@ _LOWER = 0.5
 _COLORS = {"success": css(GOOD), "contact": css(BAD), "other": css(FAINT)}
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True)
 class Path3D:
     """The path of a drone in one episode."""
 

@@ -49,7 +49,8 @@ def test_import_registers_the_shipped_tasks():
         "before = [name for name in gymnasium.registry if name.startswith('drone_rl/')]\n"
         "import drone_rl.sim.tasks\n"
         "after = [name for name in gymnasium.registry if name.startswith('drone_rl/')]\n"
-        "assert before == after == ['drone_rl/CollectCubes-v0', 'drone_rl/Pillars-v0'], after\n"
+        "names = ['drone_rl/CollectCubes-v0', 'drone_rl/Pillars-v0', 'drone_rl/Reach-v0']\n"
+        "assert before == after == names, (before, after)\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 

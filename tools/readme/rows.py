@@ -557,6 +557,12 @@ WORLDS = (
         "3",
     ),
     Row(
+        "world_hostile",
+        "hostile scene files that run code, reveal a file, or take over 2 GiB or 20 s",
+        "{world_hostile:d} of {world_hostile_total:d}",
+        "0",
+    ),
+    Row(
         "world_contacts",
         "largest error of distances to what is solid, 1,000 points in each of six scenes",
         "{contact_error_mm:.4f} mm",

@@ -9,7 +9,7 @@ import yaml
 from hydra.errors import HydraException
 
 from drone_rl.cli.main import COMMANDS
-from drone_rl.config import BaseTaskSettings, DynamicsSettings, PillarsSettings, TaskSettings
+from drone_rl.config import TASKS, BaseTaskSettings, DynamicsSettings, PillarsSettings
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.zoo import describe
 from drone_rl.utils.errors import InputError
@@ -80,7 +80,7 @@ def test_the_first_and_last_values_of_every_sweep_describes_a_policy(name, setti
 
 @pytest.mark.parametrize("command", ["evaluate", "prove", "explain"])
 def test_any_setting_of_the_task_can_be_changed_for_a_trained_policy(command, config, settings):
-    names = {*TaskSettings.model_fields, *PillarsSettings.model_fields, "name"}
+    names = {field for task in TASKS.values() for field in task.model_fields} | {"name"}
     assert set(config(command).task) == names
     assert settings(command).task == {}
     assert settings(command, "task.num_cubes=5").task == {"num_cubes": 5}

@@ -39,7 +39,10 @@ def message(line):
         ("train task.num_cube=1", "did you mean task.num_cubes?"),
         ("verdict camera=large", "drone-rl verdict --help all lists the settings"),
         ("train objective.epochs=3", "objective=ppo has it"),
-        ("train task=cubes", "task is one of collect_cubes, collect_one, pillars, or your own"),
+        (
+            "train task=cubes",
+            "task is one of collect_cubes, collect_one, pillars, reach, or your own",
+        ),
         ("train optimizer=adm", "optimizer is one of adam, sgd; did you mean adam?"),
         ("train hydra.run.dir=", "it has no value"),
         ("train hydra/launcher=slurm", "no effect on a single run; add -m"),

@@ -37,7 +37,8 @@ def test_reads_parts_colors_and_images(scene, tmp_path):
     mujoco.mj_kinematics(model, data)
     first = model.mesh_vertadr[1]
     corners = model.mesh_vert[first:] @ data.geom_xmat[1].reshape(3, 3).T + data.geom_xpos[1]
-    pixels = model.tex_data.reshape(64, 64, 3)
+    texture = int(np.flatnonzero(model.tex_type == mujoco.mjtTexture.mjTEXTURE_2D)[0])
+    pixels = model.tex_data[model.tex_adr[texture] :][: 64 * 64 * 3].reshape(64, 64, 3)
     upper_left = model.mesh_texcoord[int((corners[:, 0] - corners[:, 1]).argmin())]
     row, column = (63 * upper_left[::-1]).astype(int)
     assert pixels[row, column].tolist() == [0, 0, 255]
