@@ -62,4 +62,4 @@ def test_an_explanation_shows_the_map(tmp_path):
     found: Any = scene_map.section(context)
     assert found.by_start["start_east"].share == 1.0
     assert found.picture.shape[2] == 3 and found.picture.dtype == np.uint8
-    assert scene_map_part.draw(dict(found), None)["scene_map"].height == len(found.picture)  # pyright: ignore[reportArgumentType]
+    assert scene_map_part.draw(found, context)["scene_map"].height == len(found.picture)

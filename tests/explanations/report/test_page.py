@@ -12,7 +12,7 @@ import pytest
 
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.report.page import PARTS, find_explanations, render_section
-from drone_rl.explanations.results import Explanation, SceneMap
+from drone_rl.explanations.results import Explanation
 from drone_rl.utils.errors import InputError
 from tests.explanations.example import CONTENT, PICTURED, changed_explanation
 from tests.explanations.quick import ALL_SECTIONS, quick_figures
@@ -119,13 +119,6 @@ def test_every_part_is_on_the_page_in_order_with_a_link(report):
     assert re.findall(r'<a href="#([^"]+)">', nav) == ids[1:]
     assert set(re.findall(r'<a href="#([^"]+)">', text)) <= set(re.findall(r'id="([^"]+)"', text))
     assert "a/explanation.json" in text and "b/explanation.json" in text
-
-
-def test_the_map_of_scenes_is_a_figure():
-    picture = np.full((2, 3, 3), 7, np.uint8)
-    scene_map = SceneMap(by_start={}, picture=picture)
-    (figure,) = PARTS["scene_map"].draw(scene_map, changed_explanation()).values()
-    assert np.asarray(figure).tolist() == picture.tolist()
 
 
 def test_figures_are_saved(report):
