@@ -13,12 +13,15 @@ from torch import Tensor
 from benchmarks.adversarial_maps import adversarial_maps
 from benchmarks.benchmark import Setup
 from benchmarks.known_map_policies import make_policies, path_weights
+from drone_rl.envs import worlds_of
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.patches import has_effect, make_grid, patch_effects, placebo_maps
+from drone_rl.explanations.rollouts import collect, select_frames
 from drone_rl.explanations.scenes import Scenes, alternatives
 from drone_rl.explanations.trust import Trial, check_maps
 from drone_rl.policies import ImageNetwork, SmallCNN
 from drone_rl.policies.environment import make_env
+from drone_rl.policies.policy import BasePolicy
 from drone_rl.policies.zoo import policy_names, policy_path, read_policy
 from drone_rl.sim.tasks import State
 from drone_rl.sim.tasks.collect_cubes import CollectCubes
@@ -44,6 +47,27 @@ def bench_maps(setup: Setup) -> dict[str, Any]:
     found = count_maps(scenes, state, episode, expert(scenes, state), setup.quick)
     env.close()
     return {**found, "maps_s": time.perf_counter() - begin}
+
+
+def count_maps_in_flights(policy: BasePolicy, prefix: str, quick: bool) -> dict[str, Any]:
+    """Count trusted maps in frames of a policy's own flights, see `count_maps`.
+
+    Returns:
+        "PREFIX_placebos_trusted" of "PREFIX_placebos_total" adversarial maps, and
+        "PREFIX_planted_found", the fraction of "PREFIX_planted_total" true maps that are trusted.
+    """
+    with policy.flying(64, seed=0) as (env, actor):
+        flights = collect(env, actor, num_episodes=14 if quick else 40)
+        rows = select_frames(flights.episode, 56 if quick else 240)
+        state = flights.state(worlds_of(env))[torch.from_numpy(rows)]
+        episode, actions = flights.episode[rows], flights.tensor("actions")[rows]
+        found = count_maps(Scenes(env), state, episode, actions, quick)
+    return {
+        f"{prefix}_placebos_trusted": found["placebo_maps_trusted"],
+        f"{prefix}_placebos_total": found["placebo_maps_total"],
+        f"{prefix}_planted_found": found["planted_maps_found"],
+        f"{prefix}_planted_total": found["planted_maps_total"],
+    }
 
 
 def count_maps(

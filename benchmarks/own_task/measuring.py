@@ -16,19 +16,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import torch
-
 from benchmarks.benchmark import Setup
 from benchmarks.commands import call
-from benchmarks.maps import count_maps
+from benchmarks.maps import count_maps_in_flights
 from benchmarks.pipeline import paired
 from benchmarks.startup import first_update_seconds
 from drone_rl.config.learning import Episodes
 from drone_rl.config.task import BaseTaskSettings
 from drone_rl.config.training import TrainSettings
-from drone_rl.envs import worlds_of
-from drone_rl.explanations.rollouts import collect, select_frames
-from drone_rl.explanations.scenes import Scenes
 from drone_rl.policies.policy import load_policy
 from drone_rl.training.train import make_collector
 from drone_rl.trust.results import Verdict
@@ -256,19 +251,7 @@ def _run_program(own: Path, name: str) -> str | None:
 def _maps(own: Path, run: Path, quick: bool) -> dict[str, Any]:
     """Count trusted adversarial maps and true maps that are found, in frames of the policy."""
     import_plugin(str(own / TASK))
-    policy = load_policy(run)
-    with policy.flying(64, seed=0) as (env, actor):
-        flights = collect(env, actor, num_episodes=14 if quick else 40)
-        rows = select_frames(flights.episode, 56 if quick else 240)
-        state = flights.state(worlds_of(env))[torch.from_numpy(rows)]
-        episode, actions = flights.episode[rows], flights.tensor("actions")[rows]
-        found = count_maps(Scenes(env), state, episode, actions, quick)
-    return {
-        "own_task_placebos_trusted": found["placebo_maps_trusted"],
-        "own_task_placebos_total": found["placebo_maps_total"],
-        "own_task_planted_found": found["planted_maps_found"],
-        "own_task_planted_total": found["planted_maps_total"],
-    }
+    return count_maps_in_flights(load_policy(run), "own_task", quick)
 
 
 def _searched(own: Path, folder: Path, setup: Setup) -> dict[str, Any]:

@@ -4,15 +4,10 @@ import time
 from pathlib import Path
 from typing import Any
 
-import torch
-
 from benchmarks.benchmark import Setup
 from benchmarks.commands import call
-from benchmarks.maps import count_maps
+from benchmarks.maps import count_maps_in_flights
 from benchmarks.worlds.training import STATUSES, WALKING, train
-from drone_rl.envs import worlds_of
-from drone_rl.explanations.rollouts import collect, select_frames
-from drone_rl.explanations.scenes import Scenes
 from drone_rl.policies.policy import load_policy
 
 _GRAY = "experiment=reach", "inputs=[gray]"
@@ -35,7 +30,7 @@ def bench_world_judging(setup: Setup) -> dict[str, Any]:
         "world_verdict_s": _seconds("verdict", run, folder),
         "world_explain_s": _seconds("explain", run, folder),
         "world_shifts_s": _seconds("shifts", run, folder, "axes=[light]"),
-        **_maps(plain, setup.quick),
+        **count_maps_in_flights(load_policy(plain), "world", setup.quick),
     }
 
 
@@ -43,19 +38,3 @@ def _seconds(name: str, run: Path, folder: Path, *args: str) -> float:
     begin = time.perf_counter()
     call(name, f"policy={run}", f"hydra.run.dir={folder / name}", *args, statuses=STATUSES)
     return time.perf_counter() - begin
-
-
-def _maps(run: Path, quick: bool) -> dict[str, Any]:
-    """Count trusted adversarial maps and true maps that are found, in frames of the policy."""
-    with load_policy(run).flying(64, seed=0) as (env, actor):
-        flights = collect(env, actor, num_episodes=14 if quick else 40)
-        rows = select_frames(flights.episode, 56 if quick else 240)
-        state = flights.state(worlds_of(env))[torch.from_numpy(rows)]
-        episode, actions = flights.episode[rows], flights.tensor("actions")[rows]
-        found = count_maps(Scenes(env), state, episode, actions, quick)
-    return {
-        "world_placebos_trusted": found["placebo_maps_trusted"],
-        "world_placebos_total": found["placebo_maps_total"],
-        "world_planted_found": found["planted_maps_found"],
-        "world_planted_total": found["planted_maps_total"],
-    }
