@@ -40,9 +40,9 @@ def test_confirmation_uses_the_most_probable_action():
 
 
 def test_each_update_confirms_in_new_environments(monkeypatch):
-    calls, fly = [], confirming.rollout
+    calls, make_collector = [], confirming.EpisodeCollector
 
-    def note(actor, env, episodes, **how):
+    def note(env, actor, **how):
         base = env.base_env
         base.reset()
         calls.append(
@@ -54,9 +54,9 @@ def test_each_update_confirms_in_new_environments(monkeypatch):
             )
         )
         base.set_seed(SETTINGS.seed)
-        return fly(actor, env, episodes, **how)
+        return make_collector(env, actor, **how)
 
-    monkeypatch.setattr(confirming, "rollout", note)
+    monkeypatch.setattr(confirming, "EpisodeCollector", note)
     confirmation = Confirmation(SETTINGS, always(1.0, 0.0, 0.0))
     shares = [(confirmation(update), confirmation.succeeded)[1] for update in (1, 1, 2)]
     assert shares[0] == shares[1]
