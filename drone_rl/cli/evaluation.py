@@ -79,27 +79,16 @@ def _draw_maps(policy: Any, folder: Path, settings: HeldOutSettings, result: See
 
 
 class PlayCommand(AppearanceCommandSettings, DeviceSettings):
-    """Film a policy as MP4 and GIF, or record it for Rerun's viewer.
-
-    A recording, format=rerun, needs pip install -e '.[rerun]'.
-    """
+    """Film a policy as MP4 and GIF, or watch it in dm_control's viewer."""
 
     episodes: NumEpisodes = 3
     """Episodes to record, each in files of its own."""
-    format: Literal["video", "rerun"] = "video"
-    """video: an MP4 and a GIF file; or rerun: a recording of cameras, poses, action probabilities
-    and heat maps on one timeline, for the viewer of Rerun."""
     greedy: bool = True
     """Whether to take the most probable action instead of sampling."""
     seed: Seed = 0
     """Root of the environments' random streams."""
     viewer: bool = False
     """Whether to open dm_control's viewer, which needs a display, instead of recording."""
-
-    def check(self) -> None:
-        """Reject a format of files for the viewer, which writes none."""
-        if self.viewer and self.format != "video":
-            self.refuse("format", "is for recordings, which viewer=true does not make; omit one")
 
     def ends_alone(self) -> bool:
         """See `CommandSettings`."""
@@ -113,10 +102,6 @@ class PlayCommand(AppearanceCommandSettings, DeviceSettings):
 
         if self.viewer:
             view(policy, **options)
-        elif self.format == "rerun":
-            from drone_rl.explanations.rerun_export import record
-
-            record(policy, folder, self.episodes, **options)
         else:
             film(policy, folder, self.episodes, **options)
         return 0, None

@@ -148,6 +148,7 @@ class StepImages(NamedTuple):
     """Instruments, if the drone has flight dynamics."""
 
 
+@torch.no_grad()
 def film_episode(
     env: EnvBase, actor: TensorDictModuleBase | Agent, *, greedy: bool = True
 ) -> Iterator[np.ndarray]:
@@ -158,31 +159,17 @@ def film_episode(
     Yields:
         RGB frames, uint8. Shape: (720, 1280, 3).
     """
-    base, earned = base_env(env), 0.0
-    for context, act, reward in run_episode(env, actor, greedy=greedy):
-        earned += reward
-        caption = _caption(base.worlds.task, context.state, earned)
-        yield _compose(render_step(base), caption, act, context.actions)
-
-
-@torch.no_grad()
-def run_episode(
-    env: EnvBase, actor: TensorDictModuleBase | Agent, *, greedy: bool = True
-) -> Iterator[tuple[StepContext, Act | None, float]]:
-    """Run one episode in a single environment; yield each step with the reward of the one before.
-
-    The environment is then in that state. The last one, in which no action is taken, comes with
-    None.
-    """
-    base, reward, step = base_env(env), 0.0, None
+    base, earned, step = base_env(env), 0.0, None
     agent = Exploring(as_agent(actor), greedy=greedy)
-    for step in steps(agent, base.observer, base.start(), looks_ahead=True):
+    for step in steps(agent, base.observer, base.start()):
         base.worlds.state = step.context.state
-        yield step.context, step.act, reward
-        reward = float(step.reward)
+        caption = _caption(base.worlds.task, base.worlds.state, earned)
+        yield _compose(render_step(base), caption, step.act, step.context.actions)
+        earned += float(step.reward)
     assert step is not None
     base.worlds.state = step.after
-    yield step.following, None, reward
+    caption = _caption(base.worlds.task, step.after, earned)
+    yield _compose(render_step(base), caption)
 
 
 def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:

@@ -59,16 +59,6 @@ class Headlight(NamedTuple):
         return cls(prop, bool(head.active), *colors)
 
 
-class PropBox(NamedTuple):
-    """The axis-aligned bounding box of a prop, in metres from the prop's position."""
-
-    name: str
-    """Name of the prop's model."""
-    semantic_class: SemanticClass
-    center: NDArray[np.float64]  # (3,)
-    half_size: NDArray[np.float64]  # (3,)
-
-
 @dataclasses.dataclass(frozen=True)
 class Scene:
     """The model that all simulators and renderers share, and what its geoms are."""
@@ -112,24 +102,6 @@ class Scene:
         uses_material = (model.geom_matid >= 0) & (colors == _UNSET).all(1)
         colors[uses_material] = model.mat_rgba[model.geom_matid[uses_material]]
         return colors
-
-    def prop_boxes(self) -> list[PropBox]:
-        """Return the boxes around the props, distractors included, in their order in `props`."""
-        model, data = self.model, mujoco.MjData(self.model)
-        mujoco.mj_kinematics(model, data)
-        boxes: list[PropBox] = []
-        for prop in range(max(self.props, default=-1) + 1):
-            geoms = [geom for geom, owner in enumerate(self.props) if owner == prop]
-            root = model.body(model.body_rootid[model.geom_bodyid[geoms[0]]])
-            turns = data.geom_xmat[geoms].reshape(-1, 3, 3)
-            offset, half = (model.geom_aabb[geoms][:, part, None] for part in np.s_[:3, 3:])
-            middle = data.geom_xpos[geoms] + (turns @ offset)[..., 0] - data.xpos[root.id]
-            reach = (np.abs(turns) @ half)[..., 0]
-            low, high = (middle - reach).min(0), (middle + reach).max(0)
-            kind = self.semantic_classes[geoms[0]]
-            name = root.name.rstrip("/")
-            boxes.append(PropBox(name, kind, (low + high) / 2, (high - low) / 2))
-        return boxes
 
     def camera(self, name: str) -> int:
         """Return the index of a camera; raise an `InputError` if there is none of that name."""

@@ -40,18 +40,3 @@ def test_colors_default_to_the_material():
     colors = [[0.5, 0.5, 0.5, 1], [0.1, 0.2, 0.3, 1], [1, 0, 0, 1], [1, 1, 1, 0]]
     np.testing.assert_allclose(scene.colors, colors, atol=1e-7)
     assert scene.shown(show_drone=True) == [0, 1, 2]  # the last geom is invisible
-
-
-def test_boxes_around_props_are_relative_to_their_positions():
-    xml = """<mujoco><worldbody><geom type="plane" size="1 1 1"/>
-    <body name="post/" pos="5 0 0"><geom type="box" size="1 2 3" euler="0 0 90"/></body>
-    <body name="pair/" mocap="true"><geom type="sphere" size="1"/>
-    <body pos="4 0 0"><geom type="cylinder" size="1 2"/></body></body>
-    </worldbody></mujoco>"""
-    kinds = (SemanticClass.GROUND, SemanticClass.OBSTACLE, *(SemanticClass.TARGET,) * 2)
-    scene = Scene(mujoco.MjModel.from_xml_string(xml), kinds, (-1, 0, 1, 1), (0.0, 0.0, 1.0))
-    post, pair = scene.prop_boxes()
-    assert (post.name, post.semantic_class) == ("post", SemanticClass.OBSTACLE)
-    np.testing.assert_allclose([post.center, post.half_size], [[0, 0, 0], [2, 1, 3]], atol=1e-9)
-    assert (pair.name, pair.semantic_class) == ("pair", SemanticClass.TARGET)
-    np.testing.assert_allclose([pair.center, pair.half_size], [[2, 0, 0], [3, 1, 2]], atol=1e-9)
