@@ -196,11 +196,6 @@ class ChanceSettings(DeviceSettings):
     seed: Seed | None = None
     """Seed of the held-out placements; null takes a fresh one from the operating system, which is
     printed and recorded."""
-    within: Annotated[float, Real(0.0, 10_000.0, unit="m")] = 0.0
-    """Half-width in metres of a box around the cube positions; the success probability is bounded
-    over the box; 0: exact at the positions."""
-    parts: Annotated[int, Whole(1, 1_000_000, "parts")] = 20
-    """Cells of such a box: more cells give tighter bounds and take longer."""
 
 
 class ProveSettings(RendererSettings):

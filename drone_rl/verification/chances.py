@@ -1,18 +1,16 @@
 """`drone-rl chain`: exact success probabilities of a policy that samples its actions."""
 
-import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numpy as np
 import torch
 from torch import Tensor
 
 from drone_rl.config import TaskSettings
-from drone_rl.config.commands import ChanceSettings, ProveSettings
+from drone_rl.config.commands import ChanceSettings
 from drone_rl.config.configuration import from_arguments
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, CubesEnd
@@ -24,14 +22,7 @@ from drone_rl.utils.provenance import Provenance, provenance
 from drone_rl.utils.seeding import RootSeed, Stream, with_seed, world_random_state
 from drone_rl.utils.text import exact_percent, plural
 from drone_rl.verification.prover.lattice import explore, shape_of
-from drone_rl.verification.prover.markov_chain import (
-    NodeEvaluator,
-    Outcomes,
-    SuccessBounds,
-    bound_success,
-    propagate,
-)
-from drone_rl.verification.prover.policy_spec import make_policy_spec
+from drone_rl.verification.prover.markov_chain import NodeEvaluator, Outcomes, propagate
 from drone_rl.verification.requirements import require_cubes
 
 NODES_AT_A_TIME = 2**20  # lattice nodes of placements that are explored together; bounds memory
@@ -45,18 +36,6 @@ class EndChance(Stored):
     collected: tuple[bool, ...]
     """Whether each cube is collected by then."""
     probability: float
-
-
-class Within(Stored):
-    """Bounds on the success probability over a box around a placement."""
-
-    metres: float
-    """Half the width of the box."""
-    least: float
-    most: float
-    mean_least: float
-    mean_most: float
-    """Bounds of the mean over the box."""
 
 
 class PlacementChances(Stored):
@@ -74,8 +53,6 @@ class PlacementChances(Stored):
     undecided: float
     """Probability of episodes that are not followed to their end."""
     ends: tuple[EndChance, ...]
-    within: Within | None = None
-    """None unless bounds were asked for."""
 
     def collected(self, cube: int) -> float:
         """Return the probability that a cube is collected."""
@@ -125,14 +102,6 @@ class Chances(TableResult, Seeded, Provenance):
             _row("mean length", [p.mean_length for p in every], "{:.2f}".format),
             _row("undecided", [p.undecided for p in every]),
         ]
-        if boxes := [p.within for p in every if p.within is not None]:
-            name = f"within {boxes[0].metres:g} m"
-            rows += [
-                _row(f"{name}, everywhere at least", [box.least for box in boxes]),
-                _row(f"{name}, everywhere at most", [box.most for box in boxes]),
-                _row(f"{name}, on average at least", [box.mean_least for box in boxes]),
-                _row(f"{name}, on average at most", [box.mean_most for box in boxes]),
-            ]
         return rows if len(every) > 1 else [["", "chance"], *(row[:2] for row in rows[1:])]
 
     def save(self, path: Path) -> None:
@@ -169,7 +138,7 @@ def chances(
         policy: The policy, or an argument of `load_policy`.
         cubes: Positions of the cubes, metres to the left, nearest first, in one placement or
             several; held-out placements by default. Shape: (C,) or (P, C).
-        settings: Device, renderer, box of the bounds, and placements if `cubes` is None.
+        settings: Device, renderer, and placements if `cubes` is None.
         task: Changes to the policy's task.
         outputs: Folder of runs.
         progress: Called with the progress; a bar by default.
@@ -188,7 +157,6 @@ def chances(
         if cubes is None
         else _given(task_settings, cubes)
     )
-    bounded = _bounded(policy, placed, settings, progress) if settings.within else ()
     at_a_time = max(1, NODES_AT_A_TIME // math.prod(shape_of(task_settings)))
     with closing(policy.make_env(1, device=settings.device, renderer=settings.renderer)) as env:
         evaluator, outcomes = NodeEvaluator(env, policy.make_network(settings.device)), []
@@ -198,25 +166,19 @@ def chances(
             outcomes.append(propagate(graph, evaluator.on(graph)))
     progress("placements", len(placed), len(placed))
     joined = Outcomes.joined(outcomes)
-    within = [Within(metres=settings.within, **dataclasses.asdict(b)) for b in bounded]
     return Chances(
         policy=policy.name,
         path=str(policy.path),
         task=policy.task.values(),
         success=float(joined.success.mean()),
         pictures=evaluator.num_images,
-        placements=tuple(
-            _placement(placed[i], joined, i, within[i] if within else None)
-            for i in range(len(placed))
-        ),
+        placements=tuple(_placement(placed[i], joined, i) for i in range(len(placed))),
         **seed.as_dict() if cubes is None else {},
         **provenance(),
     )
 
 
-def _placement(
-    cubes: Tensor, outcomes: Outcomes, i: int, within: Within | None
-) -> PlacementChances:
+def _placement(cubes: Tensor, outcomes: Outcomes, i: int) -> PlacementChances:
     ends = outcomes.ends[i]
     return PlacementChances(
         cubes=tuple(map(tuple, cubes.tolist())),
@@ -233,24 +195,7 @@ def _placement(
             )
             for reason, bits in ends.nonzero().tolist()
         ),
-        within=within,
     )
-
-
-def _bounded(
-    policy: Policy, placed: Tensor, settings: ChanceSettings, progress: Progress
-) -> tuple[SuccessBounds, ...]:
-    """Bound the success probability over a box around each placement, within the lateral bound."""
-    network, gap = policy.make_network(), ProveSettings().logit_gap
-    bounds: list[SuccessBounds] = []
-    spec = make_policy_spec(policy.description, network, gap, settings.renderer)
-    with closing(spec):
-        bound = spec.lattice.task.lateral_bound
-        for i, aside in enumerate(placed[..., 1].numpy()):
-            progress("bounds", i, len(placed))
-            box = np.stack([aside - settings.within, aside + settings.within], -1)
-            bounds.append(bound_success(spec, box.clip(-bound, bound), settings.parts))
-    return tuple(bounds)
 
 
 def _sampled(task: TaskSettings, count: int, seed: RootSeed) -> Tensor:

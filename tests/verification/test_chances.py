@@ -8,7 +8,6 @@ from drone_rl.config import AppearanceSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.verification.chances import Chances, _row
-from drone_rl.verification.prover.markov_chain import SuccessBounds
 
 ONE = {"num_cubes": 1, "side_margin": 2.0}
 
@@ -30,18 +29,6 @@ def test_given_placements(good, tmp_path):
         assert placement.ended("all_cubes") == pytest.approx(placement.success, abs=1e-12)
     assert done.pictures > 100
     assert done.seed is None and "seed" not in str(done)
-
-
-def test_bounds_stay_within_the_lateral_bound(good, monkeypatch):
-    boxes = []
-
-    def bound(_, box, parts):
-        boxes.append(box.tolist())
-        return SuccessBounds(0.0, 1.0, 0.0, 1.0)
-
-    monkeypatch.setattr("drone_rl.verification.chances.bound_success", bound)
-    drone_rl.chances(good, [[5.75], [-6.0], [1.0]], task=ONE, within=0.5, progress=silent)
-    assert boxes == [[[5.25, 6.0]], [[-6.0, -5.5]], [[0.5, 1.5]]]
 
 
 def test_held_out_placements_are_those_of_an_evaluation(good):
@@ -93,10 +80,8 @@ def test_unsupported_policies_are_refused(good):
             drone_rl.chances(policy, [6.0], task=ONE, progress=silent)
 
 
-def test_tables_and_bounds(good):
-    done = drone_rl.chances(good, [5.98], task=ONE, within=0.05, parts=2, progress=silent)
-    (bounds,) = (placement.within for placement in done.placements)
-    assert bounds.least <= done.success <= bounds.most <= 1.0
+def test_table(good):
+    done = drone_rl.chances(good, [5.98], task=ONE, progress=silent)
     names = [row[0] for row in done.rows()]
-    assert "within 0.05 m, everywhere at least" in names and len(names) == len({*names})
+    assert len(names) == len({*names})
     assert names[1] in str(done) and f"<td>{names[1]}</td>" in done._repr_html_()

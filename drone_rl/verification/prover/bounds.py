@@ -57,29 +57,16 @@ class NetworkBounds:
 
         Bit a is clear if another action certainly beats action a. Shape: (N,), uint8.
         """
-        least, gap = self._least(lower, upper)
-        return self._bits(least > self._scale * gap)
-
-    @torch.no_grad()
-    def probabilities(self, lower: Tensor, upper: Tensor) -> tuple[Tensor, Tensor]:
-        """Return bounds of the probability of each sampled action. Shapes: (N, actions)."""
-        least, gap = self._least(lower, upper)
-        least = least.double() / self._scale - gap
-        lead = torch.zeros(len(least), self.num_actions, self.num_actions, dtype=torch.float64)
-        lead[:, self._first, self._second] = least  # of an action over another one, at least
-        return 1 / (-lead).exp().sum(-1), 1 / lead.transpose(1, 2).exp().sum(-1)
-
-    def _least(self, lower: Tensor, upper: Tensor) -> tuple[Tensor, Tensor]:
-        """Return lower bounds of logit differences, times the scale, and the certain lead."""
         total, width = lower + upper, upper - lower
         largest: list[Tensor] = []
         for step, scale in self._steps:
             largest.append(_size(total, width) / scale)
             total, width = step(total, width)
         largest.append(_size(total, width) / self._scale)
+        # lower bounds of logit differences, times the scale
         least = functional.linear(total, self._weight, self._scale * self._bias)
         least = least - functional.linear(width, self._weight.abs())
-        return least, self._error(largest).clamp(min=self.gap)
+        return self._bits(least > self._scale * self._error(largest).clamp(min=self.gap))
 
     @torch.no_grad()
     def decide(self, images: Tensor) -> tuple[Tensor, Tensor]:

@@ -70,19 +70,6 @@ def test_bounds_hold_for_all_images_in_range(make, doubt):
         assert ((bits & ~possible) == 0).all()
 
 
-def test_probabilities_of_sampled_actions():
-    """Logits 0 and x with x from 1 to 2: the second is drawn with 1 / (1 + exp(-x))."""
-    bounds = NetworkBounds(last_layer([[0.0, 0.0], [1.0, 0.0]], [0.0, 0.0]), gap=0.0)
-    least, most = bounds.probabilities(images([1.0, 0.0]), images([2.0, 0.0]))
-    one, two = (1 / (1 + torch.tensor([-1.0, -2.0]).double().exp())).tolist()
-    assert least[0].tolist() == pytest.approx([1 - two, one], rel=1e-5)
-    assert most[0].tolist() == pytest.approx([1 - one, two], rel=1e-5)
-    wider, _ = NetworkBounds(
-        last_layer([[0.0, 0.0], [1.0, 0.0]], [0.0, 0.0]), gap=0.5
-    ).probabilities(images([1.0, 0.0]), images([2.0, 0.0]))
-    assert float(wider[0, 1]) == pytest.approx(1 / (1 + float(torch.tensor(-0.5).exp())))
-
-
 def test_actions_decided_by_summation_order_stay_possible():
     """The hidden unit is 2^24 + 1 - 2^24: 1 in exact arithmetic, 0 in some orders."""
     hidden = nn.Linear(2, 2)

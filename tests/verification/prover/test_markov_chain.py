@@ -1,14 +1,12 @@
-"""Probabilities by hand, by a second program and by sampled episodes; bounds on them."""
+"""Probabilities by hand, by a second program and by sampled episodes."""
 
 import math
 from collections import defaultdict
 
-import numpy as np
 import pytest
 import torch
 from torch import nn
 
-import drone_rl
 from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.config import TaskSettings
 from drone_rl.policies import make_actor
@@ -16,19 +14,9 @@ from drone_rl.policies.zoo import policy_path, read_policy
 from drone_rl.policies.zoo.description import TaskDescription
 from drone_rl.sim.tasks.collect_cubes import CubesEnd
 from drone_rl.trust.metrics import summarise
-from drone_rl.utils.progress import silent
 from drone_rl.verification.prover import markov_chain
-from drone_rl.verification.prover.lattice import AHEAD, LatticeState, explore
-from drone_rl.verification.prover.markov_chain import (
-    _WON,
-    NEGLIGIBLE,
-    NodeEvaluator,
-    _least_mean,
-    _reachable,
-    bound_success,
-    propagate,
-)
-from drone_rl.verification.prover.policy_spec import make_policy_spec
+from drone_rl.verification.prover.lattice import explore
+from drone_rl.verification.prover.markov_chain import NEGLIGIBLE, NodeEvaluator, propagate
 
 
 def constant(settings, cubes, *probs):
@@ -151,68 +139,3 @@ def test_greedy_episodes_agree():
     assert torch.equal(done.reasons.argmax(-1), flown.end_reason)
     assert torch.equal(done.collected, flown.goals.reached.double())
     assert torch.equal(done.steps, flown.length.double())
-
-
-def make_placements(box, points=3):
-    """Sample random placements in a box."""
-    low, high = np.array(box).T
-    return low + np.random.RandomState(0).rand(points, len(box)) * (high - low)
-
-
-def bounds_over(name, box, most=1):
-    """Bounds over a box."""
-    policy = drone_rl.load_policy(name).in_task(num_cubes=len(box))
-    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
-    found = bound_success(spec, np.array(box, float), most)
-    spec.close()
-    return found
-
-
-def chances_at(name, placements):
-    """Exact chances of success at placements. Shape: (P,)."""
-    policy = drone_rl.load_policy(name).in_task(num_cubes=placements.shape[1])
-    found = drone_rl.chances(policy, placements.tolist(), progress=silent)
-    return np.array([placement.success for placement in found.placements])
-
-
-def test_least_mean_by_hand():
-    """0.2 to 0.5 of 10, 0.1 to 0.9 of 1 and 0.2 to 0.6 of 4: as much as may be of 1, then of 4."""
-    values = np.array([[10.0, 1.0, 4.0]])
-    lowest, highest = np.array([[0.2, 0.1, 0.2]]), np.array([[0.5, 0.9, 0.6]])
-    assert _least_mean(values, lowest, highest)[0] == pytest.approx(0.2 * 10 + 0.6 * 1 + 0.2 * 4)
-    highest[0, 1] = 0.3
-    assert _least_mean(values, lowest, highest)[0] == pytest.approx(0.2 * 10 + 0.3 * 1 + 0.5 * 4)
-
-
-@pytest.mark.parametrize(
-    ("name", "box"),
-    [
-        ("right_and_forward", [[1.6, 1.7]]),
-        ("good", [[0.9, 0.92], [-3.0, -2.98]]),
-    ],
-)
-def test_bounds_hold_within_the_box(name, box):
-    found, exact = bounds_over(name, box), chances_at(name, make_placements(box))
-    assert (exact >= found.least).all() and (exact <= found.most).all()
-    assert found.mean_least <= found.mean_most
-
-
-def test_smaller_boxes_give_tighter_bounds():
-    one = bounds_over("right_and_forward", [[1.6, 1.7]])
-    many = bounds_over("right_and_forward", [[1.6, 1.7]], most=3)
-    # The midpoint rule: the mean of a monotone probability is off by at most 1 / (2 * 6).
-    middles = 1.6 + 0.1 * (np.arange(6)[:, None] + 0.5) / 6
-    exact = chances_at("right_and_forward", middles)
-    assert many.mean_most - many.mean_least < 0.8 * (one.mean_most - one.mean_least)
-    assert many.mean_least - 0.1 < float(exact.mean()) < many.mean_most + 0.1
-    assert many.least >= one.least and many.most <= one.most
-
-
-@pytest.mark.parametrize("lowest", [-1.7, -1.65])
-def test_a_box_includes_its_ends(lowest):
-    """A cube at -1.65 m is touched straight ahead, and no other one of the box from -1.7 m."""
-    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
-    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
-    states, targets = _reachable(spec, np.array([[lowest, -1.65]]))
-    spec.close()
-    assert _WON in targets[states.index(LatticeState(13, 0)), AHEAD]
