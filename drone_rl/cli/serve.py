@@ -14,9 +14,6 @@ class ServeCommand(CommandSettings, ServeSettings):
     settings: str | None = None
     """AirSim's settings.json; null for settings.json in the working directory, else in
     ~/Documents/AirSim, else for one multirotor; none for one multirotor."""
-    watch: bool = False
-    """Whether to serve a page that shows the first vehicle while programs fly it; needs the extra
-    fly."""
 
     def ends_alone(self) -> bool:
         """See `CommandSettings`."""
@@ -35,13 +32,8 @@ class ServeCommand(CommandSettings, ServeSettings):
             recordings=folder / "recordings",
             **self.as_base(ServeSettings).values(),
         )
-        with server, contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as pages:
+        with server, contextlib.suppress(KeyboardInterrupt):
             address, port = server.address
             print(f"ready: AirSim's clients can connect to {address}:{port}", flush=True)
-            if self.watch:
-                from drone_rl.flight.fly_page.watch import watch  # slow to import
-
-                page = pages.enter_context(watch(server))
-                print(f"open {page.url} to watch", flush=True)
             server.wait()
         return 0, None

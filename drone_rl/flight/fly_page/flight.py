@@ -18,7 +18,6 @@ from drone_rl.config.inputs import ImageInput
 from drone_rl.envs import Pipeline
 from drone_rl.flight.fly_page.pilots import (
     CONTROLS,
-    Axes,
     Controls,
     VelocityPilot,
     make_pilot,
@@ -35,31 +34,29 @@ from drone_rl.sim.dynamics import BodyState
 from drone_rl.trust.plots.images import heated, shown_picture
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.models import Model
-from drone_rl.utils.schema import OneOf, Real, Several, as_mapping
+from drone_rl.utils.schema import OneOf, Real, as_mapping
 
 LIMITS = {"speed": (0.5, 10.0), "wind": (0.0, 12.0), "wind_from": (0.0, 360.0), "light": (0.2, 2.0)}
 """Lowest and highest values of the sliders: m/s, m/s, degrees, factor."""
-Camera = Annotated[str, OneOf(CAMERAS)]
 
 
-def message(**fields: Any) -> type[Model]:
+def _message(**fields: Any) -> type[Model]:
     """Return the kind of a browser's messages with these fields, each of a type."""
     kinds: dict[str, Any] = {name: (kind, ...) for name, kind in fields.items()}
     return pydantic.create_model("Message", __base__=Model, **kinds)
 
 
 _MESSAGES = {
-    "hold": message(controls=tuple[Annotated[str, OneOf(CONTROLS)], ...]),
-    "sticks": message(values=Annotated[Axes, Several(Real(-1.0, 1.0), 4, 4)]),
-    "pilot": message(pilot=Literal["person", "policy"]),
-    "mode": message(mode=Annotated[str, OneOf(FLY_MODES)]),
-    "camera": message(camera=Camera),
-    "set": message(name=Annotated[str, OneOf(tuple(LIMITS))], value=float),
-    "record": message(on=bool),
-    "saliency": message(on=bool),
-    "reset": message(),
-    "take_off": message(),
-    "land": message(),
+    "hold": _message(controls=tuple[Annotated[str, OneOf(CONTROLS)], ...]),
+    "pilot": _message(pilot=Literal["person", "policy"]),
+    "mode": _message(mode=Annotated[str, OneOf(FLY_MODES)]),
+    "camera": _message(camera=Annotated[str, OneOf(CAMERAS)]),
+    "set": _message(name=Annotated[str, OneOf(tuple(LIMITS))], value=float),
+    "record": _message(on=bool),
+    "saliency": _message(on=bool),
+    "reset": _message(),
+    "take_off": _message(),
+    "land": _message(),
 }
 """Fields of each type of message, which are the arguments of a method of `Flight`."""
 _PAUSE = 2.0
@@ -68,7 +65,7 @@ _LOOK_PERIOD = 0.1
 """Seconds between two observations while a person moves freely."""
 _SIZE = 1.0
 """Edge of objects on the map if the task does not state it, metres."""
-JPEG_QUALITY = 85
+_JPEG_QUALITY = 85
 _ACTIONS = "the policy's actions"
 _SALIENCY = {
     "off": "tested when it is switched on",
@@ -130,9 +127,6 @@ class Flight:
 
     def _hold(self, controls: Sequence[str]) -> None:
         self.controls.hold(controls)
-
-    def _sticks(self, values: Axes) -> None:
-        self.controls.set_sticks(values)
 
     def _take_off(self) -> None:
         self._flying("take_off").take_off()
@@ -363,7 +357,7 @@ class Flight:
 
     def _view(self) -> bytes:
         picture = Image.fromarray(self.world.render(self.camera).numpy())
-        return encode(picture, "jpeg", quality=JPEG_QUALITY)
+        return encode(picture, "jpeg", quality=_JPEG_QUALITY)
 
     def _observed(self) -> bytes:
         """Return the images among the inputs, the first with its heat map if there is one to show.

@@ -21,7 +21,6 @@ const SLIDERS = {
   speed: ["Speed", "m/s", .5], wind: ["Wind", "m/s", .5], wind_from: ["Wind from", "°", 5], light: ["Light", "×", .05],
 };
 const TRAIL = 1000;
-const DEAD = .12;
 const CHARTS_MS = 66; // between two drawings of map, attitude and bars
 
 let hello = null, state = null, socket = null;
@@ -101,7 +100,6 @@ function describe() {
   const s = state, isPerson = s.pilot === "person";
   write(s.texts);
   $("camera").value = s.camera;
-  if (hello.watch) return;
   $("person").setAttribute("aria-pressed", isPerson);
   $("policy").setAttribute("aria-pressed", !isPerson);
   $("mode").value = s.mode;
@@ -150,7 +148,7 @@ const byKey = {};
 for (const [name, [, keys]] of Object.entries(CONTROLS)) for (const key of keys) byKey[key] = name;
 
 $("deck").addEventListener("keydown", event => {
-  if (event.ctrlKey || event.altKey || event.metaKey || !hello || hello.watch) return;
+  if (event.ctrlKey || event.altKey || event.metaKey || !hello) return;
   const key = keyOf(event);
   if (byKey[key]) {
     event.preventDefault();
@@ -192,9 +190,6 @@ function begin() {
   state = null; // the next frame updates what is built here, also after a lost connection
   set("legend", `Seen from above, ahead is up. Triangle: drone. Line: trail. Squares: ${hello.object}s, dashed where one has gone.`);
   write(hello.texts);
-  document.title = $("title").textContent;
-  document.body.classList.toggle("watching", Boolean(hello.watch));
-  if (hello.watch) return;
   build();
   $("deck").focus({ preventScroll: true });
   hint();
@@ -294,31 +289,9 @@ function drawMap() {
 
 function drawNumbers() {
   const [roll, pitch, yaw] = state.attitude.map(angle => `${Math.round(angle)}°`);
-  const rows = { roll, pitch, yaw, height: `${state.position[2].toFixed(1)} m`, speed: `${state.velocity.toFixed(1)} m/s` };
-  if (hello.watch) rows.time = `${state.time.toFixed(2)} s`; else rows.steps = state.steps;
+  const rows = { roll, pitch, yaw, height: `${state.position[2].toFixed(1)} m`, speed: `${state.velocity.toFixed(1)} m/s`,
+    steps: state.steps };
   $("numbers").innerHTML = joined(Object.entries(rows), ([name, value]) => `<dt>${name}</dt><dd>${value}</dd>`);
-}
-
-// Gamepad: left stick climbs and turns, right stick flies forward and sideways
-
-let sentSticks = "0,0,0,0", sticksAt = 0, wasPressed = [];
-const ON_GAMEPAD = [() => handOver(), () => send({ type: "reset" }), () => toggleRecord(), () => nextCamera()];
-
-function readGamepad(now) {
-  const one = [...navigator.getGamepads()].find(Boolean);
-  const words = one ? `Gamepad: ${one.id}. Right stick: forward and sideways; left stick: height and turn; buttons: hand over, new episode, record, camera.` :
-    "No gamepad: press one of its buttons.";
-  set("gamepad", words);
-  const value = i => one && Math.abs(one.axes[i] || 0) > DEAD ? Math.max(-1, Math.min(1, one.axes[i])) : 0;
-  const values = [-value(3), -value(2), -value(1), -value(0)].map(v => Math.round(100 * v) / 100 || 0);
-  if (String(values) !== sentSticks && now - sticksAt > 30) {
-    sentSticks = String(values);
-    sticksAt = now;
-    send({ type: "sticks", values });
-  }
-  const pressed = one ? one.buttons.map(button => button.pressed) : [];
-  ON_GAMEPAD.forEach((act, i) => { if (pressed[i] && !wasPressed[i]) act(); });
-  wasPressed = pressed;
 }
 
 let drawn = null, drawnAt = 0;
@@ -332,11 +305,10 @@ function loop(now) {
     bitmaps = [];
     if (drawn !== state && now - drawnAt >= CHARTS_MS) {
       [drawn, drawnAt] = [state, now];
-      if (!hello.watch) drawBars();
+      drawBars();
       drawMap();
       drawNumbers();
     }
-    if (!hello.watch) readGamepad(now);
   }
   for (; pendingAcks > 0; pendingAcks -= 1) send({ type: "ack" });
   requestAnimationFrame(loop);

@@ -18,9 +18,6 @@ from drone_rl.sim.dynamics import FlightState, Obstacles, Quadrotor
 
 CONTROLS = tuple(KEYS)
 """Names of controls that can be held: those of `Pilot.press`."""
-Axes = tuple[float, float, float, float]
-"""Forward, left, up and turn left, each from -1 to 1."""
-CENTERED: Axes = (0.0, 0.0, 0.0, 0.0)
 _MOST_PRESSES = 8
 """Presses that wait for the next step."""
 _DELAY = 0.3
@@ -40,8 +37,6 @@ _STANDS = 0.25
 _AXES = (("forward", "backward"), ("left", "right"), ("up", "down"), ("yaw_left", "yaw_right"))
 _PARTS = {"backward": "back", "yaw_left": "turn left", "yaw_right": "turn right"}
 """Actions of controls with other names."""
-_HALF = 0.5
-"""Deflection from which a stick counts as a held control."""
 _MOST_STEPS = 5
 """Steps at once after a delay; more are dropped."""
 
@@ -53,43 +48,26 @@ def parts_of(actions: Actions) -> dict[str, int]:
 
 
 class Controls:
-    """Held keys and buttons, presses that were not used yet, and sticks."""
+    """Held keys and buttons, and presses that were not used yet."""
 
     def __init__(self) -> None:
         """Begin with nothing held."""
         self.presses: list[str] = []
-        self._keys: tuple[str, ...] = ()
         self._since: dict[str, float] = {}
         """Seconds since each held control was pressed, in order of the presses."""
-        self.sticks = CENTERED
 
     def hold(self, keys: Iterable[str]) -> None:
         """Take the names of all held keys; new ones are presses."""
-        self._keys = tuple(dict.fromkeys(keys))
-        self._update()
-
-    def set_sticks(self, sticks: Axes) -> None:
-        """Take the sticks' deflections; large ones count as held controls, too."""
-        self.sticks = sticks
-        self._update()
-
-    def release(self) -> None:
-        """Let go of everything."""
-        self._keys, self.sticks = (), CENTERED
-        self.presses.clear()
-        self._update()
-
-    def _update(self) -> None:
-        pushed = [
-            pair[0] if value > 0 else pair[1]
-            for pair, value in zip(_AXES, self.sticks, strict=True)
-            if abs(value) > _HALF
-        ]
-        held = dict.fromkeys((*self._keys, *pushed))
+        held = dict.fromkeys(keys)
         self.presses += [name for name in held if name not in self._since]
         del self.presses[:-_MOST_PRESSES]
         kept = {name: since for name, since in self._since.items() if name in held}
         self._since = kept | {name: 0.0 for name in held if name not in kept}
+
+    def release(self) -> None:
+        """Let go of everything."""
+        self.presses.clear()
+        self._since = {}
 
     def advance(self, seconds: float) -> None:
         """Let time pass for held controls."""
@@ -101,14 +79,9 @@ class Controls:
         return [name for name, since in self._since.items() if since >= _DELAY]
 
     @property
-    def axes(self) -> Axes:
-        """Deflections by sticks and held keys together."""
-        keys = self._keys
-        forward, left, up, turn = (
-            max(-1.0, min(1.0, stick + (plus in keys) - (minus in keys)))
-            for (plus, minus), stick in zip(_AXES, self.sticks, strict=True)
-        )
-        return forward, left, up, turn
+    def axes(self) -> list[float]:
+        """Forward, left, up and turn left by held keys: -1, 0 or 1 each."""
+        return [float((plus in self._since) - (minus in self._since)) for plus, minus in _AXES]
 
 
 class FlyPilot(abc.ABC):

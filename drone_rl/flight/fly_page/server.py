@@ -15,7 +15,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from drone_rl.config.configuration import from_arguments
 from drone_rl.flight.fly_page.flight import Flight
@@ -88,39 +88,11 @@ class _Page:
                 await self._changed.wait()
 
 
-class Shown(Protocol):
-    """What a page shows; see `Flight`."""
-
-    def hello(self) -> dict[str, Any]:
-        """Return what does not change."""
-        ...
-
-    def frame(self) -> bytes:
-        """Return the present state and images; nothing if there are no new ones."""
-        ...
-
-    def handle(self, message: Any) -> None:
-        """Do what a browser's message says."""
-        ...
-
-    def release(self) -> None:
-        """Let go of all controls."""
-        ...
-
-    def advance(self, seconds: float) -> None:
-        """Let time pass."""
-        ...
-
-    def close(self) -> None:
-        """End it."""
-        ...
-
-
 class FlyPage(ServerThread):
     """A page in threads of this process; a context manager that closes it."""
 
     def __init__(
-        self, make: Callable[[], Shown], *, port: int = 0, frames_per_second: int = 40
+        self, make: Callable[[], Flight], *, port: int = 0, frames_per_second: int = 40
     ) -> None:
         """Start the server and a thread that lets what `make` returns pass; see `fly`."""
         self._websockets = extra("websockets.asyncio.server", "fly", _ASKED_BY)
@@ -129,7 +101,7 @@ class FlyPage(ServerThread):
         self._pages: set[_Page] = set()
         self._messages: queue.SimpleQueue[tuple[Any, _Page]] = queue.SimpleQueue()
         self._holder: _Page | None = None
-        """The page whose keys or sticks were the last to change."""
+        """The page whose keys were the last to change."""
         self._flight = make()
         self._hello = json.dumps(self._flight.hello())
         self._is_stopping = threading.Event()
@@ -255,8 +227,7 @@ class FlyPage(ServerThread):
             self._handle_messages()
             if self._pages:
                 self._flight.advance(now - before)
-                if frame := self._flight.frame():
-                    self.call_soon(self._publish, frame)
+                self.call_soon(self._publish, self._flight.frame())
             before, due = now, max(due + period, time.monotonic() - period)
             self._is_stopping.wait(max(0.0, due - time.monotonic()))
 
@@ -269,7 +240,7 @@ class FlyPage(ServerThread):
                 continue
             try:
                 self._flight.handle(message)
-                if message["type"] in ("hold", "sticks"):
+                if message["type"] == "hold":
                     self._holder = page
             except InputError as error:
                 self.call_soon(page.tell, str(error))

@@ -150,20 +150,6 @@ def test_the_pad_flies_by_pointer_and_by_keyboard(browser):
     assert not hidden.is_displayed()  # no action of this policy
 
 
-def test_a_gamepad_flies(browser):
-    choose(browser, "mode", "simple_flight")
-    until(browser, "return state.mode === 'simple_flight'")
-    browser.execute_script(
-        """window.testPad = {id: "test pad", axes: [0, 0, 0, -1], buttons: [{pressed: false}]};
-        navigator.getGamepads = () => [null, testPad];"""
-    )
-    until(browser, "return state.velocity > 2")
-    assert "test pad" in text(browser, "gamepad")
-    browser.execute_script("testPad.axes = [0, 0, 0, 0]; testPad.buttons[0].pressed = true")
-    until(browser, "return state.pilot === 'policy'")
-    browser.execute_script("navigator.getGamepads = () => []")
-
-
 def test_messages_of_the_server_are_shown(browser):
     browser.execute_script("send({type: 'take_off'})")
     until(browser, "return /needs simple flight/.test($('problem').textContent)")

@@ -1,7 +1,6 @@
 """The flight: messages of browsers, hand-over, time, frames."""
 
 import io
-import math
 
 import numpy as np
 import pytest
@@ -94,7 +93,7 @@ def test_controls_are_released_when_something_else_flies(make_flight):
     flight.handle({"type": "mode", "mode": "computer_vision"})
     run(flight, 2.0)
     assert state_of(flight)["position"] == [1.0, 0.0, 2.5]
-    flight.handle({"type": "sticks", "values": [1.0, 0.0, 0.0, 0.0]})
+    flight.handle({"type": "hold", "controls": ["forward"]})
     flight.release()
     run(flight, 2.0)
     assert state_of(flight)["position"] == [1.0, 0.0, 2.5]
@@ -140,8 +139,6 @@ def test_taking_off_needs_simple_flight(make_flight):
         ({"type": "fly"}, "type='fly'"),
         ({"type": "hold"}, "hold.controls is missing"),
         ({"type": "hold", "controls": ["jump"]}, r"hold.controls\[0\]='jump'"),
-        ({"type": "sticks", "values": [0, 0, 0]}, "sticks.values"),
-        ({"type": "sticks", "values": [0, 0, 0, math.nan]}, "must be"),
         ({"type": "set", "name": "light", "value": 9.0}, "light=9.0"),
         ({"type": "reset", "now": True}, "^reset.now is unknown; leave it out$"),
     ],

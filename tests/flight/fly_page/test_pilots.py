@@ -36,7 +36,7 @@ def test_controls_note_each_press_once_and_repeat_after_a_while():
     controls.hold(["left", "forward"])
     controls.hold(["left"])
     assert controls.presses == ["left", "forward"]
-    assert controls.axes == (0.0, 1.0, 0.0, 0.0)
+    assert controls.axes == [0.0, 1.0, 0.0, 0.0]
     controls.advance(0.29)
     assert controls.repeating == []
     controls.advance(0.02)
@@ -45,16 +45,10 @@ def test_controls_note_each_press_once_and_repeat_after_a_while():
     assert controls.presses == [] and controls.repeating == [] and not any(controls.axes)
 
 
-def test_opposite_keys_cancel_and_sticks_add():
+def test_opposite_keys_cancel():
     controls = Controls()
     controls.hold(["forward", "backward", "right"])
-    assert controls.axes == (0.0, -1.0, 0.0, 0.0)
-    controls.hold([])
-    controls.set_sticks((0.25, 0.0, -0.75, 0.0))
-    assert controls.axes == (0.25, 0.0, -0.75, 0.0)
-    assert controls.presses[-1] == "down"  # beyond half its way a stick is a key, too
-    controls.hold(["forward"])
-    assert controls.axes[0] == 1.0
+    assert controls.axes == [0.0, -1.0, 0.0, 0.0]
 
 
 def test_the_policy_acts_at_the_speed(make_world):
@@ -115,7 +109,7 @@ def test_keys_choose_turns(make_world, kind, keys, expected):
     assert [action for _, action, _ in steps] == expected
 
 
-def test_continuous_actions_follow_keys_and_sticks(make_world):
+def test_continuous_actions_follow_keys(make_world):
     world, steps, controls = make_world("flight_velocity"), Steps(), Controls()
     pilot = make_pilot("actions", world, steps.note)
     fly(pilot, controls, 0.5)
@@ -123,10 +117,9 @@ def test_continuous_actions_follow_keys_and_sticks(make_world):
     controls.hold(["forward", "yaw_right"])
     fly(pilot, controls, 0.05)
     assert steps == [((1, 25, 64, 3), [[1.0, 0.0, -1.0]], 0.0)]
-    controls.hold([])
-    controls.set_sticks((0.0, 0.5, 0.0, 0.0))
+    controls.hold(["left"])
     fly(pilot, controls, 0.2)
-    assert steps[-1][1] == [[-1.0, 0.5, 0.0]] and len(steps) in (2, 3)
+    assert steps[-1][1] == [[-1.0, 1.0, 0.0]] and len(steps) in (2, 3)
 
 
 def test_computer_vision_keys_step_the_pose(make_world):
