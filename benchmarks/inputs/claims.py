@@ -35,7 +35,7 @@ def bench_inputs(setup: Setup) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         own = Path(folder)
         shutil.copy(TASK, own)
-        train(own, run, 0, 20_000 if setup.quick else 600_000, SEEING, *WALKING)
+        train(own, run, 0, 20_000 if setup.quick else 600_000, *SEEING, *WALKING)
     import_plugin(str(TASK))
     return measure_claims(load_policy(run), seeds, setup.quick)
 

@@ -68,9 +68,9 @@ class Quadrotor:
         """Return the drones after ticks under their controllers; `body` stays as it is."""
         device, count = body.numbers.device, len(body)
         after = torch.empty_like(body.numbers)
+        kernel, around = kernel_among(obstacles, str(device))
         command = flight_kernel.make_command(self.frame, goals, ticks, obstacles)
         arrays = [wp.from_torch(numbers.contiguous()) for numbers in (body.numbers, after)]
-        kernel, around = kernel_among(obstacles, str(device))
 
         def work(member: int, first: int, last: int) -> None:
             inputs = [first, command, *around, *arrays]
