@@ -23,6 +23,7 @@ WALKING = (
 FLYING = (
     *("experiment=reach_flight", "inputs=[depth,goal,velocity]", "inputs.goal.scale=5"),
     *("inputs.depth.size=[12,24]", "inputs.depth.horizontal_fov=110", "inputs.depth.maximum=6"),
+    "inputs.velocity.scale=2",
 )
 _MOST = {"moves": 3_000_000, "flight": 6_000_000}
 """Frames after which a training ends at the latest."""
