@@ -70,12 +70,16 @@ class FusedEpisodes:
         inputs.write(self._rollout, count, self._workers.size, geoms)
         size = network.offsets.outputs[-1]
         shape = (self._workers.size, int(rollout_kernel.TOGETHER) * size)
-        self._workspaces = wp.empty(shape, dtype=float, device="cpu")
+        self._rollout.workspaces = wp.empty(shape, dtype=float, device="cpu")
+        self._rollout.layers = network.arrays
         fitting = max(1, min(_MAX_STEPS, _MAX_NUMBERS // (count * inputs.size)))
         self._length = fitting if num_steps is None else num_steps
         self._num_rows = rows = count * self._length
         actions = worlds.dynamics.actions
         self._is_continuous = _is_continuous(env)
+        self._begins = wp.zeros(count, dtype=int, device="cpu")
+        self._num_shown = 0
+        """Environments whose appearance and poses the kernel has."""
         kind = torch.float32 if self._is_continuous else torch.int32
         self._num_draws = max(1, sum(actions.entry.shape))
         self._buffer = RolloutBuffer(
@@ -88,8 +92,10 @@ class FusedEpisodes:
             }
         )
         self.last_observations = torch.empty(count if inputs.num_frames > 1 else 0, inputs.size)
-        launches = _MAX_ACTIVATIONS // (rows * size)
         """Of each environment, if images have several frames."""
+        self._rollout.last_observations = wp.from_torch(self.last_observations)
+        self._rollout.num_steps = self._length
+        launches = _MAX_ACTIVATIONS // (rows * size)
         self.activations = ActivationRecorder(launches * rows, size)
         """Of the last batch, for a `FusedNetwork` that learns from it."""
         self._owner = getattr(self._actor.network, "owner", "the policy")
@@ -188,15 +194,16 @@ class FusedEpisodes:
         return self._actor.exploration in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC)
 
     def _prepare(self, state: State) -> None:
-        """Take the states of the first environments, their appearance and the weights."""
+        """Take the states of the first environments, their appearance and the weights.
+
+        Without randomization the kernel's own poses follow their states.
+        """
         load_kernels(self._kernel.module).result()
         self._rules.begin(state)
-        rollout = self._rollout
-        self._inputs.look(rollout, self._env, state)
+        if self._env.appearances.varies or self._num_shown != len(state):
+            self._inputs.look(self._rollout, self._env, state)
+            self._num_shown = len(state)
         self._network.pack()
-        rollout.layers, rollout.workspaces = self._network.arrays, self._workspaces
-        rollout.last_observations = wp.from_torch(self.last_observations)
-        rollout.num_steps = self._length
 
     def close(self) -> None:
         """End the threads."""
@@ -217,7 +224,7 @@ class FusedEpisodes:
         rollout.draws = wp.from_torch(draws)
         rollout.frames = self._frames(opened["observations"])
         rollout.observations = wp.from_torch(opened["observations"])
-        rollout.begins = wp.zeros(num_envs, dtype=int, device="cpu")
+        rollout.begins = self._begins
         rollout.logits = wp.from_torch(opened["logits"])
         if self._is_continuous:
             rollout.numbers = wp.from_torch(opened["action"])
