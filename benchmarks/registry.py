@@ -40,7 +40,7 @@ from benchmarks.shifts import bench_shifts
 from benchmarks.speed import bench_collector, bench_dm_control, bench_render
 from benchmarks.startup import bench_startup
 from benchmarks.sweeps import bench_kills, bench_sweeps
-from benchmarks.training import bench_experiment, bench_large, bench_seeds, bench_solve
+from benchmarks.training import bench_large, bench_presets, bench_seeds, bench_solve
 from benchmarks.verdicts import bench_verdicts
 from benchmarks.worlds.commands import bench_world_commands
 from benchmarks.worlds.contacts import bench_contacts
@@ -135,9 +135,7 @@ BENCHMARKS: dict[str, Benchmark] = {
         bench_exact_coverage, "verification", *_TRAINING, *_PROVING, "trust"
     ),
     "provable": _benchmark(bench_provable, "verification", *_TRAINING, *_PROVING),
-    "pillars": _benchmark(
-        bench_experiment, "libraries", *_SOLVING, experiment="pillars", num_seeds=3
-    ),
+    "presets": _benchmark(bench_presets, "several_inputs", *_SOLVING),
     "revisions": _benchmark(bench_revisions, "system", *_COMMANDS, "trust", "explanations"),
     "imitation": _benchmark(bench_imitation, "long", *_SOLVING),
     "original": _benchmark(bench_original, "long", *_TRAINING),
@@ -181,15 +179,6 @@ BENCHMARKS: dict[str, Benchmark] = {
     "flight_speed": _benchmark(bench_flight_speed, "flight", *_COLLECTING),
     "flight_parity": _benchmark(bench_flight_parity, "flight", "sim", *_parts("forces_kernel")),
     "flight_paths": _benchmark(bench_flight_paths, "flight", "sim", "flight/commands"),
-    "flight_moves": _benchmark(
-        bench_experiment, "flight", *_SOLVING, experiment="flight", num_seeds=5
-    ),
-    "flight_velocity": _benchmark(
-        bench_experiment, "flight", *_SOLVING, experiment="flight_velocity", num_seeds=3
-    ),
-    "flight_pillars": _benchmark(
-        bench_experiment, "flight", *_SOLVING, experiment="flight_pillars", num_seeds=3
-    ),
 }
 GROUPS = tuple(dict.fromkeys(benchmark.group for benchmark in BENCHMARKS.values()))
 """Names of groups of benchmarks: main (speed and training), adversarial (correctness of claims),

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,9 @@ import numpy as np
 from benchmarks.benchmark import Setup
 from benchmarks.commands import call, train
 from drone_rl.utils.files import read_json
+
+PRESETS = {"flight": 5, "pillars": 3, "flight_velocity": 3, "flight_pillars": 3, "robust": 3}
+"""Presets of trainings with the number of their seeds."""
 
 
 def bench_solve(setup: Setup) -> dict[str, Any]:
@@ -63,29 +67,29 @@ def bench_large(setup: Setup) -> dict[str, Any]:
     return {"learning_fps_large": result.frames / result.seconds}
 
 
-def bench_experiment(setup: Setup, experiment: str, num_seeds: int) -> dict[str, Any]:
-    """Train an experiment from each seed and evaluate the greedy policies.
-
-    Args:
-        setup: The setup.
-        experiment: Name of the experiment, and prefix of the figures' keys.
-        num_seeds: Number of seeds, at most those of the setup.
+def bench_presets(setup: Setup) -> dict[str, Any]:
+    """Train `PRESETS` from their numbers of seeds, and evaluate the policies.
 
     Returns:
-        For each seed "..._time_to_solve_s", seconds until the command ends, "..._frames", and
-        "..._success_lower95", the lower bound of the exact 95% interval of the success rate;
-        "..._solved", the number of seeds that reached the target.
+        For each preset lists with a value for each seed: "..._time_to_solve_s", seconds until the
+        command ends, "..._frames", and "..._success_lower95", the lower bound of the exact 95%
+        interval of the success rate; "..._solved", the number of seeds that reached the target; and
+        "inputs_solve_s", the median seconds of each preset, None if a success rate is below 0.9.
     """
     brief = ["trainer.total_frames=4000", "trainer.confirm_episodes=0"] if setup.quick else []
-    settings = [f"experiment={experiment}", *brief]
-    seeds = setup.seeds[:num_seeds]
-    results = train_and_evaluate(setup, setup.runs / experiment, seeds, settings)
-    return {
-        f"{experiment}_time_to_solve_s": results["seconds"],
-        f"{experiment}_frames": results["frames"],
-        f"{experiment}_success_lower95": results["lower95"],
-        f"{experiment}_solved": results["reason"].count("solved"),
-    }
+    figures: dict[str, Any] = {"inputs_solve_s": {}}
+    for preset, num_seeds in PRESETS.items():
+        settings, seeds = [f"experiment={preset}", *brief], setup.seeds[:num_seeds]
+        results = train_and_evaluate(setup, setup.runs / preset, seeds, settings)
+        is_solved = min(results["share"]) >= 0.9
+        figures["inputs_solve_s"][preset] = median(results["seconds"]) if is_solved else None
+        figures |= {
+            f"{preset}_time_to_solve_s": results["seconds"],
+            f"{preset}_frames": results["frames"],
+            f"{preset}_success_lower95": results["lower95"],
+            f"{preset}_solved": results["reason"].count("solved"),
+        }
+    return figures
 
 
 def train_and_evaluate(
@@ -101,9 +105,9 @@ def train_and_evaluate(
 
     Returns:
         Lists with a value for each seed: "seconds" of the command, "frames", "trained_s" (seconds
-        of the training loop), "reason" and "lower95".
+        of the training loop), "reason", and the success rate, "share", with its "lower95".
     """
-    names = ("seconds", "frames", "trained_s", "reason", "lower95")
+    names = ("seconds", "frames", "trained_s", "reason", "share", "lower95")
     results: dict[str, list] = {name: [] for name in names}
     for seed in seeds:
         run = folder / f"train_{seed}"
@@ -112,7 +116,9 @@ def train_and_evaluate(
         results["frames"].append(result.frames)
         results["trained_s"].append(result.seconds)
         results["reason"].append(result.reason)
-        results["lower95"].append(evaluate(setup, run)["lower95"])
+        success = evaluate(setup, run)
+        results["share"].append(success["share"])
+        results["lower95"].append(success["lower95"])
     return results
 
 

@@ -88,11 +88,13 @@ def test_a_training_is_evaluated_for_each_seed(setup, monkeypatch):
         return 2.0 * len(runs), result
 
     monkeypatch.setattr(training, "train", train)
-    monkeypatch.setattr(training, "evaluate", lambda setup, run: {"lower95": 0.9})
+    monkeypatch.setattr(training, "evaluate", lambda setup, run: {"share": 0.95, "lower95": 0.9})
     figures = training.bench_solve(setup)
     assert [settings[0] for settings in runs] == ["seed=3", "seed=4"]
     assert (figures["time_to_solve_s"], figures["median_time_to_solve_s"]) == ([2.0, 4.0], 3.0)
     assert figures["learning_fps"] == 30.0  # of 20 and 40
     assert (figures["seeds_solved"], figures["success_lower95"]) == (2, [0.9, 0.9])
-    figures = training.bench_experiment(setup, "flight", num_seeds=1)
+    monkeypatch.setattr(training, "PRESETS", {"flight": 1})
+    figures = training.bench_presets(setup)
     assert figures["flight_frames"] == [30] and "experiment=flight" in runs[-1]
+    assert figures["inputs_solve_s"] == {"flight": 6.0}

@@ -42,6 +42,7 @@ def make_blocks(root: Path) -> dict[str, str]:
         "flight": make_table(rows.FLIGHT, figures),
         "libraries": make_table(rows.LIBRARIES, figures),
         "tasks": make_table(rows.TASKS, figures),
+        "inputs": make_table(rows.INPUTS, figures),
         "worlds": make_table(rows.WORLDS, figures),
         "peers": make_peers(figures),
         "robust": make_robust(figures),

@@ -1,6 +1,7 @@
 """Rows of the tables of figures in README.md and docs/results.md."""
 
 import statistics
+from functools import partial
 
 from tools.readme.tables import Figures, Row
 
@@ -11,8 +12,8 @@ def _peer_seconds(figures: Figures) -> str:
     return "; ".join(f"{seconds:.1f}" for seconds in means)
 
 
-def _world_solved(figures: Figures) -> str:
-    solved = figures["world_solve_s"].values()
+def _solved(key: str, figures: Figures) -> str:
+    solved = figures[key].values()
     return "; ".join("not solved" if one is None else f"{one:.0f}" for one in solved)
 
 
@@ -437,20 +438,20 @@ FLIGHT = (
         "0.5; 0.3",
     ),
     Row(
-        "flight_moves",
+        "presets",
         "`experiment=flight`: seconds from the start of the command until solved, 5 seeds; success "
         "rate in 1,000 episodes, lower end of the exact 95% CI",
         "{flight_time_to_solve_s:.0f}; {flight_success_lower95:%}",
         "median 60; 95%",
     ),
     Row(
-        "flight_velocity",
+        "presets",
         "the same for `experiment=flight_velocity`, 3 seeds",
         "{flight_velocity_time_to_solve_s:.0f}; {flight_velocity_success_lower95:%}",
         "300; 95%",
     ),
     Row(
-        "flight_pillars",
+        "presets",
         "the same for `experiment=flight_pillars`, 3 seeds",
         "{flight_pillars_time_to_solve_s:.0f}; {flight_pillars_success_lower95:%}",
         "90%",
@@ -478,14 +479,14 @@ LIBRARIES = (
         "0.8",
     ),
     Row(
-        "pillars",
+        "presets",
         "task pillars: success rate in 1,000 held-out episodes, lower end of the exact 95% CI, "
         "3 seeds",
         "{pillars_success_lower95:%}",
         "95%",
     ),
     Row(
-        "pillars",
+        "presets",
         "minutes to train each seed, from the start of the command",
         "{pillars_time_to_solve_s:minutes}",
         "5",
@@ -542,6 +543,55 @@ TASKS = (
     ),
 )
 """Tasks that users define."""
+INPUTS = (
+    Row(
+        "presets",
+        "`experiment=flight`, `pillars`, `flight_velocity`, `flight_pillars`, `robust`: seconds "
+        "from the start of the command until solved, median of 3 seeds (5 of `flight`)",
+        partial(_solved, "inputs_solve_s"),
+        "60; 15; 20; 90; 60",
+    ),
+    Row(
+        "goal",
+        "a user's task, a goal behind boxes, by moves that turn: success rate with image, goal and "
+        "last action, lower end of the 95% CI, worst of 3 seeds; without the image; most seconds",
+        "{goal_lower95:%}; {goal_blind:%}; {goal_s:.0f}",
+        "85%; 30%; 400",
+    ),
+    Row(
+        "goal_flight",
+        "the same with depth, goal and velocity, flown by velocities",
+        "{goal_flight_lower95:%}; {goal_flight_blind:%}; {goal_flight_s:.0f}",
+        "85%; 30%; 900",
+    ),
+    Row(
+        "input_rates",
+        "rate of collecting 64x64 depth and a goal over 64x64 gray; of two stacked frames over "
+        "one; of velocities over moves",
+        "{inputs_over_gray:.2f}; {stack_over_one:.2f}; {velocity_over_moves:.2f}",
+        "0.7; 0.8; 0.3",
+    ),
+    Row(
+        "inputs",
+        "a policy of three inputs, `policy.act` and ONNX: largest difference; actions that differ",
+        "{inputs_onnx_difference:.1e}; {inputs_onnx_differ}",
+        "1e-05; 0",
+    ),
+    Row(
+        "inputs",
+        "policies that ignore an input, and are said to; verdicts on one that uses its inputs and "
+        "is said to ignore one",
+        "{ignored_input_found} of {ignored_input_tried}; {ignored_input_false} of 20",
+        "38; 1",
+    ),
+    Row(
+        "inputs",
+        "placebo vectors that are called important",
+        "{placebo_vectors} of {placebo_vectors_tried}",
+        "0",
+    ),
+)
+"""Policies with several inputs, and presets."""
 WORLDS = (
     Row(
         "world_drawing",
@@ -572,7 +622,7 @@ WORLDS = (
         "world_training",
         "`reach` indoors, by moves and in flight: seconds until a verdict's success is 90% (median "
         "of 3 seeds)",
-        _world_solved,
+        partial(_solved, "world_solve_s"),
         "600; 1800",
     ),
     Row(
