@@ -8,7 +8,12 @@ import warp as wp
 
 from drone_rl.sim.rendering import Scene
 from drone_rl.sim.rendering.devices import start_warp
-from drone_rl.sim.rendering.raytrace import cast_kernel
+from drone_rl.sim.rendering.raytrace import (
+    cast_kernel,
+    light_kernel,
+    shadows_kernel,
+    structs_kernel,
+)
 from drone_rl.sim.rendering.raytrace.world_renderer import SceneRaytracer
 from drone_rl.sim.rendering.scene import SemanticClass
 from tests import rays_kernel
@@ -79,9 +84,27 @@ def cast(scene: Scene, origin: np.ndarray, rays: np.ndarray) -> Any:
 
 def are_blocked(scene: Scene, origin: np.ndarray, rays: np.ndarray, distances: Any) -> Any:
     """Return whether a geom is on each ray from a point within a distance."""
-    given: Any = wp.array(rays, dtype=wp.vec3, device="cpu")
-    lengths: Any = wp.array(np.asarray(distances, np.float32), dtype=float, device="cpu")
+    world, kernel = _world(scene), shadows_kernel
+    count, shadows = len(world.geoms.kind), kernel.Shadows()
+    seen: Any = structs_kernel.GeomView
+    light: Any = light_kernel.PlacedLight()
+    light.kind = light_kernel.POINT
+    arrays = {
+        "geoms": (count, seen),
+        "boxes": (6 * count, float),
+        "points": (12 * 64, float),
+        "blocked": (16 * 64, int),
+        "is_known": (16, int),
+        "meshes": (count, int),
+    }
+    for name, (size, kind) in arrays.items():
+        setattr(shadows, name, wp.zeros(size, dtype=kind, device="cpu"))
+    place = wp.vec3(*map(float, origin))
+    ends: Any = wp.array(
+        origin + rays * np.asarray(distances)[:, None], dtype=wp.vec3, device="cpu"
+    )
+    lights: Any = wp.array([light], dtype=light_kernel.PlacedLight, device="cpu")
     blocked: Any = wp.zeros(len(rays), dtype=int, device="cpu")
-    inputs = [_world(scene), wp.vec3(*map(float, origin)), given, lengths, blocked]
-    wp.launch(rays_kernel.block_rays, len(rays), inputs=inputs, device="cpu")
+    inputs = [world, shadows, place, ends, lights, blocked]
+    wp.launch(rays_kernel.block_rays, 1, inputs=inputs, device="cpu")
     return blocked.numpy() == 1

@@ -15,6 +15,7 @@ from drone_rl.sim.rendering.raytrace.intersection_kernel import (
     BOX,
     CAPSULE,
     CYLINDER,
+    ELLIPSOID,
     FAR_AWAY,
     PLANE,
     ROUND,
@@ -286,42 +287,54 @@ for (int row = top / 8; row <= bottom / 8; ++row)
 """
 
 
-def _draw(code: str) -> str:
-    """The loop over tiles and rays for one kind of solid."""
-    loop = _DRAW.replace("KIND", code)
-    for name, value in (("SAME", f"{float(SAME)}f"), ("UPPER", UPPER), ("ROUND", ROUND)):
-        loop = loop.replace(name, str(int(value) if name != "SAME" else value))
-    return loop
+def of_each_kind(loop: str) -> str:
+    """Return a loop over rays for each kind of solid, by the kind of `geom`.
+
+    KIND becomes the test of a ray from (ex, ey, ez) along (u, v, w) in the frame of the geom, see
+    `SOLID`, which says whether `is_hit`, how far `along`, and which `face`.
+    """
+    tests = {PLANE: _PLANE, BOX: _BOX, CYLINDER: _CYLINDER, CAPSULE: _CAPSULE}
+    made = "".join(
+        f"if (geom.kind == {int(kind)}) {{{loop.replace('KIND', test)}}} else "
+        for kind, test in tests.items()
+    )
+    made += f"{{{loop.replace('KIND', _BALL)}}}"
+    for name, value in (("SAME", f"{float(SAME)}f"), ("UPPER", int(UPPER)), ("ROUND", int(ROUND))):
+        made = made.replace(name, str(value))
+    return made
+
+
+SOLID = f"""
+const float sx = geom.size[0], sy = geom.size[1], sz = geom.size[2];
+const bool is_sphere = geom.kind == {int(SPHERE)};
+const bool is_ball = is_sphere || geom.kind == {int(ELLIPSOID)};
+const float rx = is_ball ? 1.0f / sx : 1.0f;
+const float ry = is_sphere ? rx : (is_ball ? 1.0f / sy : 1.0f);
+const float rz = is_sphere ? rx : (is_ball ? 1.0f / sz : 1.0f);
+"""
+"""What all rays to a geom share: its size and the factors that make a ball of radius 1 of it, by
+which places and directions in its frame are multiplied."""
+START = f"""
+const float c0 = is_ball ? ex * ex + ey * ey + ez * ez - 1.0f : ex * ex + ey * ey - sx * sx;
+const float ends = wp::max(wp::abs(ez) - sy, 0.0f);
+const bool is_inside = (geom.kind == {int(CAPSULE)}) & (c0 + ends * ends < 0.0f);
+"""
+"""What depends on where rays start alone; `is_inside` is for capsules, which then are not hit."""
 
 
 @wp.func_native(f"""
-{_AXES}
+{_AXES.replace("ex =", "px =").replace("ey =", "py =").replace("ez =", "pz =")}
 const int left = part[0], right = part[1], top = part[2], bottom = part[3];
 const float far = canvas.far;
-float ui = m[0][0] / x_scale, vi = m[1][0] / x_scale, wi = m[2][0] / x_scale;
-float uj = -m[0][1] / y_scale, vj = -m[1][1] / y_scale, wj = -m[2][1] / y_scale;
-float ux = -m[0][2], vx = -m[1][2], wx = -m[2][2];
-const float sx = geom.size[0], sy = geom.size[1], sz = geom.size[2];
-if (geom.kind == {int(PLANE)}) {{
-    {_draw(_PLANE)}
-}} else if (geom.kind == {int(BOX)}) {{
-    {_draw(_BOX)}
-}} else if (geom.kind == {int(CYLINDER)}) {{
-    const float c0 = ex * ex + ey * ey - sx * sx;
-    {_draw(_CYLINDER)}
-}} else if (geom.kind == {int(CAPSULE)}) {{
-    const float c0 = ex * ex + ey * ey - sx * sx;
-    const float ends = wp::max(wp::abs(ez) - sy, 0.0f);
-    if (c0 + ends * ends < 0.0f) return;
-    {_draw(_CAPSULE)}
-}} else {{
-    const bool is_round = geom.kind == {int(SPHERE)};
-    const float rx = 1.0f / sx, ry = is_round ? rx : 1.0f / sy, rz = is_round ? rx : 1.0f / sz;
-    ui *= rx, uj *= rx, ux *= rx, vi *= ry, vj *= ry, vx *= ry, wi *= rz, wj *= rz, wx *= rz;
-    const float ex = geom.eye[0] * rx, ey = geom.eye[1] * ry, ez = geom.eye[2] * rz;
-    const float c0 = ex * ex + ey * ey + ez * ez - 1.0f;
-    {_draw(_BALL)}
-}}
+{SOLID}
+const float ui = rx * (m[0][0] / x_scale), vi = ry * (m[1][0] / x_scale);
+const float wi = rz * (m[2][0] / x_scale), uj = rx * (-m[0][1] / y_scale);
+const float vj = ry * (-m[1][1] / y_scale), wj = rz * (-m[2][1] / y_scale);
+const float ux = -m[0][2] * rx, vx = -m[1][2] * ry, wx = -m[2][2] * rz;
+const float ex = px * rx, ey = py * ry, ez = pz * rz;
+{START}
+if (is_inside) return;
+{of_each_kind(_DRAW)}
 """)
 def draw_solid(canvas: Canvas, geom: GeomView, number: int, part: wp.vec4i, least: float) -> None:
     """Draw a solid or plane, the rendered geom `number`, in the pixels of `part`; see `bounds`.

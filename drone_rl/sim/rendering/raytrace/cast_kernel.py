@@ -1,4 +1,4 @@
-"""Single rays through a scene of any geoms: what they hit, and whether they are blocked."""
+"""Single rays through a scene of any geoms: what they hit."""
 
 import mujoco
 import warp as wp
@@ -13,7 +13,6 @@ from drone_rl.sim.rendering.raytrace.intersection_kernel import (
 )
 from drone_rl.sim.rendering.raytrace.projection_kernel import frame_attitude, product, rotation
 from drone_rl.sim.rendering.raytrace.structs_kernel import (
-    DRONE_FRAME,
     NO_GEOM,
     Geoms,
     PoseArrays,
@@ -204,58 +203,3 @@ def complete_hit(
         hit.face_normal = axes @ hit.local_normal
         hit.normal = hit.face_normal
     return hit
-
-
-@wp.func
-def is_blocked(world: World, env: int, point: wp.vec3, towards: wp.vec3, distance: float) -> bool:
-    """Return whether a geom lies on the way from a point.
-
-    `towards` has length 1; `distance` in metres. Triangles and planes count from both sides, solids
-    from outside. The caller moves the point off its own surface.
-    """
-    geom = int(0)
-    while geom < world.geoms.kind.shape[0]:
-        if _is_near(world, env, geom, point, towards, distance):
-            along = _first_along(world, env, geom, point, towards, distance)
-            if along >= 0.0 and along <= distance:
-                return True
-        geom += 1
-    return False
-
-
-@wp.func
-def _is_near(
-    world: World, env: int, geom: int, point: wp.vec3, towards: wp.vec3, distance: float
-) -> bool:
-    """Return whether a ray passes the ball around a geom's box; planes are near all rays."""
-    if world.geoms.kind[geom] == PLANE:
-        return True
-    frame = world.geoms.frame[geom]
-    place = wp.vec3(world.geoms.position[geom])
-    if frame == DRONE_FRAME:
-        place = rotation(world.poses.attitudes[env]) @ place
-    away = world.poses.positions[env, frame] + place - point
-    radius = wp.length_sq(world.geoms.reach[geom])
-    if world.poses.scales:
-        radius *= world.poses.scales[env, frame] * world.poses.scales[env, frame]
-    nearest = away - wp.clamp(wp.dot(away, towards), 0.0, distance) * towards
-    return wp.length_sq(nearest) <= radius * 1.001
-
-
-@wp.func
-def _first_along(
-    world: World, env: int, geom: int, point: wp.vec3, towards: wp.vec3, distance: float
-) -> float:
-    """Return where a ray meets a geom, -1 for a miss; see `is_blocked`."""
-    local = to_geom(world, env, geom, point, towards)
-    along = float(-1.0)
-    if local.kind == PLANE:
-        along = intersect_both_sides(local.size, local.origin, local.ray)
-    elif local.kind == MESH:
-        found = trace_mesh(
-            world.triangles, world.mesh[geom], local.origin, local.ray, distance, True, True
-        )
-        along = float(found[0])
-    else:
-        along, _face = intersect_solid(local.kind, local.size, local.origin, local.ray)
-    return along

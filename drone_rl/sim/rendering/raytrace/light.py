@@ -67,10 +67,15 @@ class LookEncoder:
         }
         kind: Any = kernel.PlacedLight
         self._placed: Any = wp.empty((workers, len(self._lights)), dtype=kind, device="cpu")
-        kinds: dict[str, Any] = {"keys": wp.vec4i, "known": wp.vec3}
+        groups = 1 + int(kernel.MOST_LIGHTS)
+        sizes = {
+            "keys": (_CORNERS, wp.vec4i),
+            "known": (_CORNERS * groups, wp.vec3),
+            "lit": (groups, wp.vec3),
+        }
         self._corners = {
-            name: wp.empty((workers, _CORNERS), dtype=kind, device="cpu")
-            for name, kind in kinds.items()
+            name: wp.empty((workers, size), dtype=kind, device="cpu")
+            for name, (size, kind) in sizes.items()
         }
         self._textures = functools.cache(functools.partial(_load_textures, scene))
         plain = self._encode(Appearance(), 1)
@@ -93,7 +98,8 @@ class LookEncoder:
         look.lighting = self._lighting(appearance, num_envs)
         look.surfaces = self._paint(appearance, num_envs, names)
         look.textures, look.placed = self._textures(names), self._placed
-        look.keys, look.known = self._corners["keys"], self._corners["known"]
+        for name, values in self._corners.items():
+            setattr(look, name, values)
         return look
 
     def _paint(

@@ -30,7 +30,7 @@ CAMERA_FRAME = wp.constant(-1)
 
 _HIDDEN = wp.constant(-5000.0)
 """Metres: a frame below is out of sight, and so are its lights and its sky."""
-_MOST_LIGHTS = wp.constant(8)
+MOST_LIGHTS = wp.constant(8)
 """Lights that OpenGL has: later ones are off."""
 _GLOBAL = wp.constant(0.3)
 """Ambient light of a scene without lights, as MuJoCo has it."""
@@ -114,7 +114,8 @@ class Look:
     keys: wp.array2d[wp.vec4i]
     """Corners whose colors are known, in working memory: see `shade_kernel`."""
     known: wp.array2d[wp.vec3]
-    """Their colors."""
+    """Their colors, by group of lights: see `Shot.lit`."""
+    lit: wp.array2d[wp.vec3]
 
 
 @struct
@@ -148,6 +149,8 @@ class Shot:
     """Texture of the sky, of width 0 for none."""
     keys: wp.array[wp.vec4i]
     known: wp.array[wp.vec3]
+    lit: wp.array[wp.vec3]
+    """What a point reflects of all lights without shadows, and of each that casts shadows."""
 
 
 @wp.func
@@ -191,7 +194,7 @@ def start_image(
             if look.lighting.lights[light].is_sun != 0 and wp.length_sq(sun) > 0.0:
                 placed.direction = sun
         is_on = frame == CAMERA_FRAME or not _is_hidden(world, env, frame)
-        if is_on and shot.count < _MOST_LIGHTS:
+        if is_on and shot.count < MOST_LIGHTS:
             shot.lights[shot.count] = placed
             shot.count += 1
             if placed.casts != 0:
@@ -208,6 +211,7 @@ def start_image(
     shot.exposure = lighting.exposure[env % lighting.exposure.shape[0]]
     shot.keys = look.keys[worker]
     shot.known = look.known[worker]
+    shot.lit = look.lit[worker]
     fill(shot.keys, 0, shot.keys.shape[0], wp.vec4i(-1, 0, 0, 0))
     return shot
 

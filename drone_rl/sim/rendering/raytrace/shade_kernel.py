@@ -5,7 +5,7 @@ Colors of corners are kept until the image is done, in a table with a place for 
 
 import warp as wp
 
-from drone_rl.sim.rendering.raytrace.cast_kernel import MESH, Hit, World, cast, is_blocked
+from drone_rl.sim.rendering.raytrace.cast_kernel import MESH, Hit, World, cast
 from drone_rl.sim.rendering.raytrace.corners_kernel import (
     Cell,
     Face,
@@ -16,12 +16,17 @@ from drone_rl.sim.rendering.raytrace.corners_kernel import (
 )
 from drone_rl.sim.rendering.raytrace.intersection_kernel import PLANE
 from drone_rl.sim.rendering.raytrace.light_kernel import (
-    DIRECTIONAL,
     Look,
     Shot,
     finish,
     light_point,
     sky,
+)
+from drone_rl.sim.rendering.raytrace.shadows_kernel import (
+    Shadows,
+    is_in_shadow,
+    set_point,
+    start_block,
 )
 from drone_rl.sim.rendering.raytrace.structs_kernel import NO_GEOM, struct
 from drone_rl.sim.rendering.raytrace.surfaces_kernel import (
@@ -52,11 +57,9 @@ OPAQUE = wp.constant(0.995)
 _LAYERS = wp.constant(4)
 """Transparent surfaces that a ray passes."""
 _OFF = wp.constant(1e-4)
-"""How far off a surface rays to lights start, relative to the distance from the camera."""
+"""How far behind a transparent surface a ray goes on, relative to its length."""
 _FROM_BEHIND = wp.constant(0.3)
 """Factor of the opacity of planes that are seen from behind."""
-_SCOPES = wp.constant(16)
-"""Keys of corners are multiples of it, plus a light: more than there are."""
 
 
 @struct
@@ -150,6 +153,7 @@ def shade(
     hit: Hit,
     direction: wp.vec3,
     shot: Shot,
+    shadows: Shadows,
     faces: wp.array[Surface],
 ) -> wp.vec3:
     """Return the color, 0 to 1, of what a ray hits, and of what is behind transparent surfaces.
@@ -190,9 +194,11 @@ def shade(
             point.weights = triangle_weights(world.triangles, behind.part, eye, back @ direction)
         opacity = float(faces[1].opacity)
         is_clear = opacity < OPAQUE and layer + 1 < _LAYERS
-        color = light_surface(world.triangles, faces, 1, point, shot, -1, not is_clear)
-        if not is_clear:
-            color += light_with_shadows(world, faces, 1, point, shot)
+        if not is_clear and shot.num_casting > 0:
+            start_block(shadows, 1)
+            place = whole * direction
+            set_point(shadows, 1, 0, place, faces[1].axes @ point.normal, whole)
+        color = light_surface(world, faces, 1, point, shot, shadows, 1, 0, not is_clear)
         texel = sample_surface(look.textures.texels, world.triangles, faces, 1, point, shot)
         color = wp.cw_mul(color, texel)
         color = finish(color, whole, shot)
@@ -215,34 +221,45 @@ def shade(
 
 
 @wp.func
-def light_with_shadows(
-    world: World, faces: wp.array[Surface], which: int, point: Point, shot: Shot
+def light_surface(
+    world: World,
+    faces: wp.array[Surface],
+    which: int,
+    point: Point,
+    shot: Shot,
+    shadows: Shadows,
+    block: int,
+    number: int,
+    has_shadows: bool,
 ) -> wp.vec3:
-    """Return what an opaque surface reflects of lights that cast shadows."""
-    total = wp.vec3()
-    light = int(0)
-    while light < shot.count:
-        if shot.lights[light].casts != 0:
-            lit = light_surface(world.triangles, faces, which, point, shot, light, True)
-            if wp.length_sq(lit) > 0.0 and not _is_in_shadow(
-                world, faces[which], point, shot, light
-            ):
-                total += lit
-        light += 1
+    """Return the light that a surface reflects at a point, `number` of a block of shadows."""
+    _find_light(world.triangles, faces, which, point, shot, has_shadows)
+    total = wp.vec3(shot.lit[0])
+    if has_shadows and shot.num_casting > 0:
+        group = int(0)
+        light = int(0)
+        while light < shot.count:
+            if shot.lights[light].casts != 0:
+                group += 1
+                lit = shot.lit[group]
+                if wp.length_sq(lit) > 0.0 and not is_in_shadow(
+                    world, shadows, block, number, shot, light
+                ):
+                    total += lit
+            light += 1
     return total
 
 
 @wp.func
-def light_surface(
+def _find_light(
     triangles: Triangles,
     faces: wp.array[Surface],
     which: int,
     point: Point,
     shot: Shot,
-    group: int,
     has_shadows: bool,
-) -> wp.vec3:
-    """Return the light of a group that a surface reflects; see `light_point`."""
+) -> None:
+    """Write the light that a point reflects of each group, or of all lights, to `Shot.lit`."""
     pixel = point.depth * shot.pixel
     cell = Cell()
     if faces[which].face.kind == MESH:
@@ -250,21 +267,30 @@ def light_surface(
     else:
         cell = find_cell(faces[which].face, point.local, pixel)
     if cell.count == 1:
-        return _light_place(faces[which], point.local, point.smooth, shot, group, has_shadows)
-    scope = faces[which].number * _SCOPES + group + 1
-    if not has_shadows:
-        scope = -2 - faces[which].number
+        _light_place(faces[which], point.local, point.smooth, shot, has_shadows, shot.lit, 0)
+        return
+    groups = int(1)
+    scope = -2 - faces[which].number
+    if has_shadows:
+        groups += shot.num_casting
+        scope = faces[which].number
     part = 8 * faces[which].face.part + cell.side
-    total = wp.vec3()
+    group = int(0)
+    while group < groups:
+        shot.lit[group] = wp.vec3()
+        group += 1
     for corner in range(3):
         key = wp.vec4i(scope, part, cell.x[corner], cell.y[corner])
         at = _hash(key) & (shot.keys.shape[0] - 1)
+        first = at * (1 + shot.num_casting)
         if not _is_same(shot.keys[at], key):
             place, normal = _corner(triangles, faces[which].face, cell.side, key[2], key[3])
-            shot.known[at] = _light_place(faces[which], place, normal, shot, group, has_shadows)
+            _light_place(faces[which], place, normal, shot, has_shadows, shot.known, first)
             shot.keys[at] = key
-        total += cell.weights[corner] * shot.known[at]
-    return total
+        of = int(0)
+        while of < groups:
+            shot.lit[of] = shot.lit[of] + cell.weights[corner] * shot.known[first + of]
+            of += 1
 
 
 @wp.func
@@ -291,21 +317,33 @@ def _corner(triangles: Triangles, face: Face, side: int, x: int, y: int) -> tupl
 
 @wp.func
 def _light_place(
-    surface: Surface, place: wp.vec3, normal: wp.vec3, shot: Shot, group: int, has_shadows: bool
-) -> wp.vec3:
-    """Return the light at a place of a surface, geom's frame."""
-    return light_point(
-        shot.lights,
-        shot.count,
-        group,
-        has_shadows,
-        shot.ambient,
-        shot.position,
-        surface.center + surface.axes @ place,
-        surface.axes @ normal,
-        surface.color,
-        surface.shine,
-    )
+    surface: Surface,
+    place: wp.vec3,
+    normal: wp.vec3,
+    shot: Shot,
+    has_shadows: bool,
+    lit: wp.array[wp.vec3],
+    first: int,
+) -> None:
+    """Write the light of each group at a place of a surface, geom's frame, from `first` on."""
+    group = int(first)
+    light = int(-1)
+    while light < shot.count:
+        if light < 0 or (has_shadows and shot.lights[light].casts != 0):
+            lit[group] = light_point(
+                shot.lights,
+                shot.count,
+                light,
+                has_shadows,
+                shot.ambient,
+                shot.position,
+                surface.center + surface.axes @ place,
+                surface.axes @ normal,
+                surface.color,
+                surface.shine,
+            )
+            group += 1
+        light += 1
 
 
 @wp.func_native("""
@@ -323,22 +361,6 @@ def _hash(key: wp.vec4i) -> int:
 def _is_same(a: wp.vec4i, b: wp.vec4i) -> bool:
     """Return whether two keys are the same; Warp does not compare vectors."""
     ...
-
-
-@wp.func
-def _is_in_shadow(world: World, surface: Surface, point: Point, shot: Shot, light: int) -> bool:
-    place = surface.center + surface.axes @ point.local
-    normal = surface.axes @ point.normal
-    towards = -shot.lights[light].direction
-    distance = float(1e6)
-    if shot.lights[light].kind != DIRECTIONAL:
-        towards = shot.lights[light].position - place
-        distance = wp.length(towards)
-        towards = towards / distance
-    if wp.dot(normal, towards) <= 0.0:
-        return True
-    far = point.depth * wp.length(point.ray)
-    return is_blocked(world, shot.env, place + _OFF * (1.0 + far) * normal, towards, distance)
 
 
 @wp.func

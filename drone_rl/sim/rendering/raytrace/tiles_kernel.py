@@ -13,12 +13,18 @@ from drone_rl.sim.rendering.raytrace.shade_kernel import (
     Point,
     Surface,
     light_surface,
-    light_with_shadows,
     make_surface,
     sample_surface,
     shade,
 )
 from drone_rl.sim.rendering.raytrace.shading_kernel import gray_of, to_bytes
+from drone_rl.sim.rendering.raytrace.shadows_kernel import (
+    PIXELS,
+    Shadows,
+    set_point,
+    start_block,
+    start_shadows,
+)
 from drone_rl.sim.rendering.raytrace.structs_kernel import struct
 from drone_rl.sim.rendering.raytrace.triangles_kernel import (
     Triangles,
@@ -49,6 +55,11 @@ class TileScratch:
     """Pixels in which each geom is drawn."""
     faces: wp.array2d[Surface]
     """Two surfaces, while they are shaded."""
+    boxes: wp.array2d[float]
+    """See `Shadows`, as the rest."""
+    points: wp.array2d[float]
+    blocked: wp.array2d[int]
+    is_known: wp.array2d[int]
 
 
 @wp.kernel
@@ -76,8 +87,15 @@ def render_tiles(
         canvas = make_canvas(view, camera, scratch, buffer)
         draw(canvas, world, env, eye, to_world, scratch, buffer)
         shot = start_image(look, world, view, camera, env, buffer, eye, to_world)
-        geoms, faces = scratch.geoms[buffer], scratch.faces[buffer]
-        write(canvas, view, world, look, shot, to_world, geoms, faces, images, row)
+        shadows = Shadows()
+        shadows.geoms = scratch.geoms[buffer]
+        shadows.boxes = scratch.boxes[buffer]
+        shadows.points = scratch.points[buffer]
+        shadows.blocked = scratch.blocked[buffer]
+        shadows.is_known = scratch.is_known[buffer]
+        shadows.meshes = scratch.order[buffer]
+        faces = scratch.faces[buffer]
+        write(canvas, view, world, look, shot, to_world, shadows, faces, images, row)
         row += 1
 
 
@@ -180,7 +198,7 @@ def write(
     look: Look,
     shot: Shot,
     to_world: wp.mat33,
-    geoms: wp.array[structs.GeomView],
+    shadows: Shadows,
     faces: wp.array[Surface],
     images: structs.Images,
     row: int,
@@ -188,7 +206,7 @@ def write(
     """Write all modalities of the image `row` from a canvas."""
     what = view.what
     if (what & (structs.RGB | structs.GRAY)) != 0:
-        write_colors(canvas, what, world, look, shot, to_world, geoms, faces, images, row)
+        write_colors(canvas, what, world, look, shot, to_world, shadows, faces, images, row)
     if (what & structs.DEPTH) != 0:
         canvases.copy_depths(canvas, images.depth[row], False)
     if (what & structs.DISTANCE) != 0:
@@ -196,7 +214,7 @@ def write(
     if (what & structs.SEGMENTATION) != 0:
         canvases.copy_owners(canvas, world.geoms.number, images.segmentation[row])
     if (what & structs.NORMALS) != 0:
-        write_normals(canvas, world.triangles, geoms, images.normals[row])
+        write_normals(canvas, world.triangles, shadows.geoms, images.normals[row])
 
 
 @wp.func
@@ -254,17 +272,19 @@ def write_colors(
     look: Look,
     shot: Shot,
     to_world: wp.mat33,
-    geoms: wp.array[structs.GeomView],
+    shadows: Shadows,
     faces: wp.array[Surface],
     images: structs.Images,
     row: int,
 ) -> None:
     """Write colors. What consecutive pixels of a face share is computed once, in `faces[0]`."""
+    geoms = shadows.geoms
     last_owner = int(structs.NO_GEOM)
     last_part = int(0)
     tile = int(0)
     while tile < canvas.across * canvas.down:
         left, top = 8 * (tile % canvas.across), 8 * (tile // canvas.across)
+        _start_tile(canvas, world.triangles, shadows, shot, to_world, tile)
         k = int(0)
         while k < 64:
             x, y = left + (k & 7), top + (k >> 3)
@@ -283,11 +303,9 @@ def write_colors(
                     if faces[0].opacity < OPAQUE:
                         hit = hit_of(world, shot, geoms[owner], part, point, to_world @ ray)
                         direction = wp.normalize(to_world @ ray)
-                        shown = shade(look, world, hit, direction, shot, faces)
+                        shown = shade(look, world, hit, direction, shot, shadows, faces)
                     else:
-                        shown = light_surface(world.triangles, faces, 0, point, shot, -1, True)
-                        if shot.num_casting > 0:
-                            shown += light_with_shadows(world, faces, 0, point, shot)
+                        shown = light_surface(world, faces, 0, point, shot, shadows, 0, k, True)
                         texels = look.textures.texels
                         texel = sample_surface(texels, world.triangles, faces, 0, point, shot)
                         shown = wp.cw_mul(shown, texel)
@@ -297,6 +315,41 @@ def write_colors(
                 write_color(images, what, row, y * canvas.width + x, shown)
             k += 1
         tile += 1
+
+
+@wp.func
+def _start_tile(
+    canvas: canvases.Canvas,
+    triangles: Triangles,
+    shadows: Shadows,
+    shot: Shot,
+    to_world: wp.mat33,
+    tile: int,
+) -> None:
+    """Set the points that the pixels of a tile show, if there are shadows."""
+    if shot.num_casting == 0:
+        return
+    if tile == 0:
+        start_shadows(shadows, shadows.geoms.shape[0])
+    start_block(shadows, 0)
+    left, top = 8 * (tile % canvas.across), 8 * (tile // canvas.across)
+    k = int(0)
+    while k < PIXELS:
+        x, y = left + (k & 7), top + (k >> 3)
+        at = 64 * tile + k
+        owner = canvas.owner[at]
+        place, normal, far = wp.vec3(), wp.vec3(), float(0.0)
+        if x < canvas.width and y < canvas.height and owner != structs.NO_GEOM:
+            seen = shadows.geoms[owner]
+            ray, depth = pixel_ray(canvas, x, y), canvas.depth[at]
+            local = wp.vec3(0.0, 0.0, 1.0)  # planes have light on their upper sides
+            if seen.kind != PLANE:
+                local = _normal(triangles, seen, canvas.part[at], ray, depth)
+            normal = seen.axes @ local
+            place = depth * (to_world @ ray)
+            far = depth * wp.length(ray)
+        set_point(shadows, 0, k, place, normal, far)
+        k += 1
 
 
 @wp.func

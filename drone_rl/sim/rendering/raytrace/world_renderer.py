@@ -18,6 +18,7 @@ from drone_rl.sim.rendering.raytrace import tiles_kernel
 from drone_rl.sim.rendering.raytrace.canvas_kernel import TILE
 from drone_rl.sim.rendering.raytrace.cast_kernel import MESH, World
 from drone_rl.sim.rendering.raytrace.light import LookEncoder
+from drone_rl.sim.rendering.raytrace.light_kernel import MOST_LIGHTS
 from drone_rl.sim.rendering.raytrace.renderer import MODALITY_BITS, Raytracer, as_images
 from drone_rl.sim.rendering.raytrace.triangles import make_triangles, read_height_field, read_mesh
 from drone_rl.sim.rendering.renderer import Poses, Renderer
@@ -132,6 +133,10 @@ def _make_scratch(view: View, workers: int, geoms: int) -> Any:
         "least": (geoms, float),
         "parts": (geoms, wp.vec4i),
         "faces": (2, surface),
+        "boxes": (6 * geoms, float),
+        "points": (2 * 6 * TILE**2, float),
+        "blocked": (2 * int(MOST_LIGHTS) * TILE**2, int),
+        "is_known": (2 * int(MOST_LIGHTS), int),
     }
     scratch: Any = tiles_kernel.TileScratch()
     for name, (length, dtype) in arrays.items():
