@@ -168,7 +168,7 @@ class Solids:
         """Return where solids stop balls that go straight.
 
         A ball that touches or overlaps a solid may move along it and away from it; a ball whose
-        centre is inside of a closed mesh is not stopped by it.
+        centre is inside of a closed mesh is not stopped by it. Nothing stops a path with a NaN.
 
         Args:
             before: Where the balls start, metres, world frame. Shape: (N, 3).

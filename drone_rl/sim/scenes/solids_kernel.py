@@ -26,6 +26,8 @@ TOUCHING = wp.constant(wp.float64(1e-4))
 """Gap below which a ball touches a solid, metres."""
 _MEETING = wp.constant(wp.float64(1e-9))
 """Gap at which a path ends, metres."""
+_SIDE = wp.constant(wp.float64(5e-10))
+"""Gap that a path leaves, so that its end is on the side of a wall that it came from, metres."""
 _ALONG = wp.constant(wp.float64(1e-5))
 """Slope below which a path is parallel to a surface: vertices are rounded."""
 _NEWTON = wp.constant(60)
@@ -252,7 +254,10 @@ def _of_triangle(point: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> Foun
     else:
         whole = va + vb + vc
         near = a + vb / whole * ab + vc / whole * ac
-    return _around(point - near, _ZERO)
+    found = _around(point - near, _ZERO)
+    if wp.length_sq(found.normal) == _ZERO:  # on the triangle
+        found.normal = _unit(wp.cross(ab, ac))
+    return found
 
 
 @wp.func
@@ -321,9 +326,7 @@ def _of_mesh(solid: Solid, point: wp.vec3d, within: wp.float64) -> Found:
         b = _corner(solid.mesh, query.face, 1)
         c = _corner(solid.mesh, query.face, 2)
         found = _of_triangle(point, a, b, c)
-        if wp.length_sq(found.normal) == _ZERO:  # on the surface
-            found.normal = _unit(wp.cross(b - a, c - a))
-        elif inside:
+        if inside and found.distance > wp.float64(1e-12):
             found.distance = -found.distance
             found.normal = -found.normal
     return found
@@ -383,19 +386,19 @@ class _Search:
 def _search(near: Found, path: wp.vec3d, radius: wp.float64, fraction: wp.float64) -> _Search:
     """Return where the tangent of a convex distance reaches the radius, before the body itself."""
     step = _Search()
+    step.fraction = wp.float64(wp.inf)
+    step.is_over = True
     gap = near.distance - radius
     closing = -wp.dot(near.normal, path)
-    step.fraction = fraction
-    step.is_over = True
-    if gap <= _MEETING and fraction > _ZERO:
-        return step
-    if closing <= _ALONG * wp.length(path):
-        step.fraction = wp.float64(wp.inf)
-    elif gap > _MEETING:
-        step.fraction = fraction + gap / closing
-        step.is_over = step.fraction > _ONE
-        if step.is_over:
-            step.fraction = wp.float64(wp.inf)
+    is_closing = closing > _ALONG * wp.length(path)
+    if gap <= _MEETING:
+        if is_closing or fraction > _ZERO:
+            step.fraction = fraction
+    elif is_closing:
+        ahead = fraction + (gap - _SIDE) / closing
+        if ahead <= _ONE:
+            step.fraction = ahead
+            step.is_over = False
     return step
 
 
@@ -414,8 +417,12 @@ def _sweep_convex(solid: Solid, start: wp.vec3d, path: wp.vec3d, radius: wp.floa
 def _sweep_mesh(
     solid: Solid, start: wp.vec3d, path: wp.vec3d, radius: wp.float64, within: wp.float64
 ) -> wp.float64:
-    """Return the least fraction of all triangles; inside of a body nothing stops a ball."""
+    """Return the least fraction of all triangles; inside of a body nothing stops a ball.
+
+    A ball whose centre is on the surface of a body is outside of it.
+    """
     first = wp.float64(wp.inf)
+    is_outside = solid.kind == SURFACE
     end = start + wp.min(within, _ONE) * path
     slack = radius + TOUCHING + wp.float64(1e-6) * (wp.length(start) + wp.length(path))
     wide = wp.vec3d(slack, slack, slack)
@@ -431,10 +438,13 @@ def _sweep_mesh(
         count = int(0)
         while count < _NEWTON and not step.is_over:
             near = _of_triangle(start + step.fraction * path, a, b, c)
+            if count == 0 and solid.kind == BODY and near.distance <= _MEETING:
+                near.normal = _unit(wp.cross(b - a, c - a))
+                is_outside = True
             step = _search(near, path, radius, step.fraction)
             count += 1
         first = wp.min(first, step.fraction)
-    if first < wp.float64(wp.inf) and solid.kind == BODY:
+    if first < wp.float64(wp.inf) and not is_outside:
         is_inside = _is_inside(solid.mesh, start, solid.size[2])
         if is_inside:
             first = wp.float64(wp.inf)
@@ -447,7 +457,8 @@ def sweep(
 ) -> Stop:
     """Return where the first solid stops a ball that goes straight.
 
-    A ball that touches or overlaps a solid may move along it and away from it.
+    A ball that touches or overlaps a solid may move along it and away from it. A path with a place
+    that is no number meets nothing.
     """
     found = Stop()
     found.fraction = wp.float64(wp.inf)

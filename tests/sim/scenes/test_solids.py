@@ -172,6 +172,31 @@ def test_a_ball_that_touches_may_move_along_and_away(tmp_path: Path) -> None:
         assert found.tolist() == pytest.approx((0.0, math.inf, math.inf, 0.0))
 
 
+@pytest.mark.parametrize("height", [0.0, 0.123456789])
+def test_a_point_on_a_wall_does_not_pass_it(tmp_path: Path, height: float) -> None:
+    """Of a closed mesh: on its top, away and along, not in. Of a single wall: from both sides."""
+    top = solids(tmp_path, l_shape().replace('mesh="l"', f'mesh="l" pos="0 0 {height}"'))
+    here = points((0.5, 0.5, 1 + height)).repeat(3, 1)
+    found = top.sweep(here, here + points((0, 0.1, -3), (0, 0, 3), (0.3, 0, 0))).fraction
+    assert found.tolist() == pytest.approx((0.0, math.inf, math.inf), abs=1e-6)
+    wall = solids(tmp_path, room())
+    for start in ((0.2, 0.3, 1.1), (4.2, 0.3, 1.1)):
+        before, way = points(start), points((2, 0.1, 0)) - points((0.3, 0.1, 0))
+        way = way if start[0] < 2 else -way
+        there = before + wall.sweep(before, before + 2 * way).fraction[:, None] * 2 * way
+        assert float(there[0, 0]) == pytest.approx(2.0, abs=1e-8)
+        ways = torch.cat([way, -way])
+        again = wall.sweep(there.repeat(2, 1), there + ways).fraction
+        assert again.tolist() == pytest.approx((0.0, math.inf), abs=1e-8)
+
+
+def test_a_path_without_a_place_meets_nothing(tmp_path: Path) -> None:
+    """NaN is no contact, of primitives or meshes."""
+    scene = solids(tmp_path, l_shape().replace("</worldbody>", '<geom size="1"/></worldbody>'))
+    before, now = points((math.nan, 0, 0), (5, 0, 0)), points((5, 0, 0), (math.nan, 0, 0))
+    assert scene.sweep(before, now, 0.3).fraction.tolist() == [math.inf, math.inf]
+
+
 def test_each_environment_has_its_own_scene(tmp_path: Path) -> None:
     """A group below the world is absent, also where it has a plane without bounds."""
     two = solids(tmp_path, world('type="sphere" size="1"'), world('type="plane" size="1 1 1"'))
