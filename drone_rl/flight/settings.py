@@ -49,7 +49,7 @@ class ServeSettings(Settings):
     scene: str = "cubes"
     """Objects in the scene: cubes, which vanish when touched; blocks; pillars; empty; indoor;
     outdoor; or the path of an MJCF file or mesh, in which vehicles start below the first site
-    start*, else at its origin."""
+    start*, else in free space near to its origin."""
     clock: Literal["wall", "lockstep"] = "wall"
     """wall: real time, multiplied by ClockSpeed. lockstep: time advances only while a call waits
     for it, as fast as the machine can, with the same results every time if clients send their

@@ -2,6 +2,7 @@
 
 import dataclasses
 import logging
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,13 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from drone_rl.config import TaskSettings
+from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.sim.dynamics import BodyState, Obstacles
 from drone_rl.sim.entities import Pillar, SceneEntity, VisualEntity
 from drone_rl.sim.quiet_dm_control import mjcf
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.scenes import SceneFile, load_scene, scene_names
-from drone_rl.sim.scenes.solids import PlacedSolids, solids_of
+from drone_rl.sim.scenes.solids import PlacedSolids, Solids, solids_of
 from drone_rl.sim.tasks import CollectCubes, Task, as_task
 from drone_rl.utils.errors import InputError, did_you_mean
 
@@ -26,6 +27,10 @@ _BLOCK = (4.0, 4.0)
 """Width and height of a block, metres."""
 _HIGHEST = 100.0
 """Metres that a start of a file may be above the ground."""
+_ACROSS = 31
+"""Points across a region in which vehicles may start."""
+_UNEVEN = 0.05
+"""Metres by which floors are uneven."""
 
 
 class _Fixed(Task[Any]):
@@ -74,9 +79,10 @@ class _Fixed(Task[Any]):
 
 
 class _InFile(_Fixed):
-    """A scene file, placed so that its first site start* is above the vehicles' start.
+    """A scene file, placed so that vehicles start on what is below its first site start*.
 
-    Without such a site vehicles start at the file's origin.
+    In a region they start near to its middle, but not on furniture; without such a site they start
+    at the file's origin, or else near to it in free space.
     """
 
     def __init__(self, path: str) -> None:
@@ -85,19 +91,46 @@ class _InFile(_Fixed):
             _log.warning("scene=%s: %s", path, warning)
         self.scenes = (scene,)
         self.solids = solids_of(self.scenes, "cpu")
-        place = torch.zeros(1, 3, dtype=torch.float64)
-        starts = [site.position for site in scene.sites if site.name.startswith("start")]
-        if starts:
-            start = torch.tensor(starts[:1], dtype=torch.float64)
-            deep = start - start.new_tensor([0.0, 0.0, _HIGHEST])
-            fraction = float(self.solids.sweep(start, deep).fraction)
-            place = -(torch.lerp(start, deep, fraction) if fraction <= 1.0 else start)
+        start, fall = _find_start(scene, self.solids)
+        self.origin = (0.0, 0.0, fall)
+        place = (start.new_tensor(self.origin) - start)[None]
         super().__init__([SceneEntity(scene, name=scene.name)], place, None)
 
     def obstacles(self, state: Any) -> Obstacles | None:
         """Return the solids of the file."""
         placed = PlacedSolids(self.solids, state.sampled, 0.5 * self.drone_size)
         return Obstacles(state.sampled[:, :0], (0.0, 0.0, 0.0), placed)
+
+
+def _find_start(scene: SceneFile, solids: Solids) -> tuple[Tensor, float]:
+    """Return a free place in the file, (3,), and how far it is above what is below, metres."""
+    radius = DynamicsSettings().radius
+    low, high = scene.bounds
+    middle, half = (low + high) / 2, (high - low) / 2
+    near, heights, heading = np.zeros(2), [middle[2], high[2] + 2 * radius], 0.0
+    sites = [site for site in scene.sites if site.name.startswith("start")]
+    stand = torch.tensor([[0.0, 0.0, radius]], dtype=torch.float64)
+    if not sites and float(solids.distances(stand)) >= radius:
+        return stand.new_tensor(_Fixed.origin), _Fixed.origin[2]
+    for site in sites[:1]:
+        middle, half = np.array(site.position), np.array(site.half_size)
+        near, heights, heading = middle[:2], [middle[2]], math.radians(site.heading)
+    across = [np.linspace(-reach, reach, _ACROSS if reach else 1) for reach in half[:2]]
+    x, y = np.stack(np.meshgrid(*across), -1).reshape(-1, 2).T
+    cos, sin = math.cos(heading), math.sin(heading)
+    flat = middle[:2] + np.stack([cos * x - sin * y, sin * x + cos * y], -1)
+    flat = np.concatenate([near[None], flat])
+    flat = flat[np.hypot(*(flat - near).T).argsort(kind="stable")]
+    for height in heights:
+        points = torch.from_numpy(np.column_stack([flat, np.full(len(flat), height)]))
+        free = points[solids.distances(points) >= radius]
+        below = free - free.new_tensor([0.0, 0.0, _HIGHEST])
+        fall = _HIGHEST * solids.sweep(free, below, radius).fraction + radius
+        free, fall = free[fall.isfinite()], fall[fall.isfinite()]
+        if len(free):
+            first = int((fall >= fall.median() - _UNEVEN).nonzero()[0])
+            return free[first], float(fall[first])
+    return torch.from_numpy(np.append(near, heights[0])), 0.0
 
 
 def make_task(scene: str) -> Task[Any]:

@@ -96,6 +96,26 @@ def test_vehicles_collide_with_a_file_and_start_below_its_start(tmp_path):
     simulation.close()
 
 
+@pytest.mark.parametrize("site", ['<site name="start" type="box" size="2 2 .2" pos="2 0 1"/>', ""])
+def test_vehicles_start_on_the_floor_where_they_are_free(tmp_path, site):
+    """Not on the table in the middle of the start, nor in the post at the file's origin."""
+    path = tmp_path / "house.xml"
+    path.write_text(
+        '<mujoco><worldbody><geom name="floor" type="box" size="6 6 .1" pos="0 0 -.1"/>'
+        '<geom name="table" type="cylinder" size=".6 .1" pos="2 0 .4"/>'
+        f'<geom name="post" type="box" size=".2 .2 2" pos="0 0 2"/>{site}</worldbody></mujoco>'
+    )
+    simulation = Simulation(AirsimSettings(), ServeSettings(scene=str(path), clock="lockstep"))
+    (vehicle,) = simulation.vehicles.values()
+    radius = vehicle.settings.radius
+    assert float(vehicle.body.position[0, 2]) == pytest.approx(radius)
+    assert simulation.stage.object_pose("floor").position[2] == pytest.approx(0.1)
+    near = "table" if site else "post"
+    away = math.hypot(*simulation.stage.object_pose(near).position[:2])
+    assert 0.2 + radius <= away < 1.5
+    simulation.close()
+
+
 def test_vehicles_fly_into_the_walls_of_a_file_and_land_on_its_floor(tmp_path):
     """The wall is one mesh with single triangles; the floor is 3 m deeper behind an edge."""
     path = tmp_path / "house.xml"
