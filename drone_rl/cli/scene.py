@@ -43,8 +43,10 @@ class SceneCommand(CommandSettings):
         from drone_rl.sim.scenes import load_scene
 
         scene = load_scene(self.file, self.up, self.scale)
-        given = {"scene": self.file, "scene_up": self.up, "scene_scale": self.scale}
-        task = {name: value for name, value in given.items() if value not in ("z", 1.0)}
+        given = {"scene_up": self.up, "scene_scale": self.scale, "drone_size": self.drone_size}
+        usual = ("z", 1.0, type(self)().drone_size)
+        task = {name: value for name, value in given.items() if value not in usual}
+        task = {"scene": self.file, **task}
         print(describe(scene, task, self.drone_size), flush=True)
         images = {"above.png": render_above(scene), "start.png": render_start(scene)}
         contents = {}

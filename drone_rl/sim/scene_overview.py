@@ -189,11 +189,12 @@ def _free_space(
 def _reach(task: Mapping[str, Any]) -> str:
     """Return what the task `reach` lacks, or how it is trained."""
     try:
-        as_task(BaseTaskSettings.read({"name": "reach", **task}, "task"))
+        made = as_task(BaseTaskSettings.read({"name": "reach", **task}, "task"))
+        made.check_dynamics(made.make_dynamics())
     except InputError as error:
         return f"not yet: {error}"
     words = [f"task.{name}={value}" for name, value in task.items()]
-    return f"ready: drone-rl train task=reach {' '.join(words)}"
+    return f"ready: drone-rl train experiment=reach {' '.join(words)}"
 
 
 def _drawn(model: Any) -> str:

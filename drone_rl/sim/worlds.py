@@ -25,7 +25,7 @@ from drone_rl.sim.rendering import (
 from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.scene_model import SceneModel
-from drone_rl.sim.tasks import State, Task, as_task, check_actions
+from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.tasks.objects import follows_rules
 from drone_rl.utils.errors import InputError
@@ -94,7 +94,7 @@ class Worlds:
         self.task = as_task(task)
         self.camera = camera or CameraSettings()
         self.dynamics = make_dynamics(self.task.make_dynamics, dynamics, actions)
-        check_actions(self.task, self.dynamics.actions)
+        self.task.check_dynamics(self.dynamics)
         self._needs_obstacles = self.dynamics.needs_obstacles or (
             bool(getattr(self.task, "scenes", ()))
             and getattr(self.dynamics, "stops_at_solids", False)

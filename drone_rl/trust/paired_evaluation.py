@@ -33,7 +33,7 @@ from drone_rl.policies.baselines import (
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.dynamics import draw_seeds, make_dynamics
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.tasks import as_task, check_actions
+from drone_rl.sim.tasks import as_task
 from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.sim.worlds import Worlds
 from drone_rl.trust.baselines import reference
@@ -145,7 +145,7 @@ class PairedEvaluator:
             task = self.subject.task.replace(**condition.task)
         with prefixed_errors("camera"):
             camera = self.subject.camera.replace(**condition.camera)
-        check_actions(as_task(task), self._dynamics.actions)
+        as_task(task).check_dynamics(self._dynamics)
         return task, camera
 
     def worlds(self, condition: Condition) -> Worlds:

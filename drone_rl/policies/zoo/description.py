@@ -184,7 +184,10 @@ class TaskDescription(Model):
     def _check(self) -> Self:
         count = len(getattr(self.parameters, "scene", None) or ())
         if count != len(self.scene or ()):
-            raise InputError(f"scene has {len(self.scene or ())} files, its settings {count}")
+            raise InputError(
+                f"scene names {len(self.scene or ())} files, but parameters.scene {count}; earlier "
+                "versions named none: train the policy again"
+            )
         if self.code is not None and self.code != source_of(type(self.parameters)):
             _log.warning(
                 "%s, which registers task=%s, is not the file of this policy's training; it is "

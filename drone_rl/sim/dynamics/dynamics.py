@@ -34,6 +34,8 @@ class Dynamics(Protocol):
     """Whether `step` needs them in scene files, whose solids stop the drones."""
     timestep: float | None = None
     """Seconds that an action lasts; None if it is done at once."""
+    stride: float = math.inf
+    """Metres that an action goes at most; infinite if that is unknown."""
 
     def start(self, position: Tensor, seeds: Tensor | None = None) -> BodyState:
         """Return drones at the start of an episode; by default they are level and at rest.
@@ -67,7 +69,7 @@ class ComputerVision(Dynamics):
         self, step_length: float = 1.0, actions: Actions = MOVES, turn_step: float = 0.0
     ) -> None:
         """Set the length of a move, metres, the set of moves, and the angle of a turn, degrees."""
-        self.step_length = step_length
+        self.step_length = self.stride = step_length
         self.actions: Actions = actions
         speeds = actions.speeds_of(torch.arange(len(actions))).double()
         half = 0.5 * math.radians(turn_step) * speeds[:, 3]
@@ -100,6 +102,7 @@ class Kinematic(Dynamics):
         self._continuous = ContinuousActions.of(actions)
         self.actions: Actions = self._continuous
         self.timestep = self._seconds = timestep
+        self.stride = actions.forward_speed * timestep
 
     def step(
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None

@@ -16,5 +16,4 @@ from drone_rl.sim.tasks.task import State as State
 from drone_rl.sim.tasks.task import Task as Task
 from drone_rl.sim.tasks.task import as_settings as as_settings
 from drone_rl.sim.tasks.task import as_task as as_task
-from drone_rl.sim.tasks.task import check_actions as check_actions
 from drone_rl.sim.tasks.task import register_task as register_task

@@ -3,7 +3,7 @@
 import functools
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 import torch
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from drone_rl.config.term_task import ANYWHERE, ObjectSettings, TermTaskSettings
 from drone_rl.sim.scenes import SceneFile, Site
 from drone_rl.sim.scenes.free_space import Distances, FreeSpace
+from drone_rl.sim.scenes.meshes import ENDINGS
 from drone_rl.sim.scenes.path_kernel import Grid, Route
 from drone_rl.sim.scenes.solids import solids_of
 from drone_rl.utils.errors import InputError
@@ -55,8 +56,6 @@ class Goal(NamedTuple):
     """Number of its route."""
     starts: dict[int, Place]
     """By number of the start, see `Routes.start_names`."""
-    most_metres: float
-    """Length of the longest path from a start."""
 
 
 class Routes:
@@ -77,6 +76,8 @@ class Routes:
         """Distances to the nearest solid around the paths of each route, metres."""
         self.start_names: list[str] = []
         """Names of the starts of all scenes, by number."""
+        self.most_metres = 0.0
+        """Length of the longest path from a start to a goal."""
         self.is_level = True
         """Whether no path climbs."""
         self.goals: dict[tuple[int, str], list[Goal]] = {}
@@ -145,25 +146,32 @@ class Routes:
             goal = self._goal(spaces[level], distances, site, size, starts, where)
             self.goals.setdefault((number, name), []).append(goal)
         every = [goal for (scene, _), of in self.goals.items() if scene == number for goal in of]
-        self._check_limit(every, where)
-        for start in starts:
+        for start, site in starts.items():
             if not any(start in goal.starts for goal in every):
-                raise InputError(
-                    f"{where}: no path of a drone of {s.drone_size:g} m leads from "
-                    f"{self.start_names[start]} to {' or '.join(site.name for _, site in goals)}; "
-                    "open a wider way, move a site, or give a smaller task.drone_size"
-                )
+                around = self._start(spaces[levels[0]], distances, site, goals[0][1], None, where)
+                ends = [site for _, site in goals]
+                self._refuse(self.start_names[start], spaces[levels[0]], around, ends, where)
 
-    def _check_limit(self, goals: Sequence[Goal], where: str) -> None:
-        """Refuse a step limit that is too small for most paths."""
-        s = self._settings
-        steps = [goal.most_metres / s.step_length for goal in goals]
-        if max(steps) > s.step_limit:
-            raise InputError(
-                f"{where}: the way to a goal is up to {max(steps) * s.step_length:.0f} m, "
-                f"{max(steps):.0f} moves of task.step_length={s.step_length:g}, but "
-                f"task.step_limit={s.step_limit}; give more steps or longer ones"
-            )
+    def _refuse(
+        self, start: str, space: FreeSpace, around: Place, goals: Sequence[Site], where: str
+    ) -> NoReturn:
+        """Raise an `InputError` about goals to which no path leads from the points of a start."""
+        parts = np.unique(space.parts[space.numbers_of(around.points)])
+        free = space.centers[np.isin(space.parts, parts[parts >= 0])]
+        low, high = (free.min(0), free.max(0)) if len(free) else (self.low, self.high)
+        remedy = "open a wider way, move a site, or give a smaller task.drone_size"
+        for goal in goals:
+            x, y, z = goal.position
+            if not (low[:2] <= (x, y)).all() or not ((x, y) <= high[:2]).all():
+                remedy = (
+                    f"from there it gets to x = {low[0]:.1f} to {high[0]:.1f} m and y = "
+                    f"{low[1]:.1f} to {high[1]:.1f} m, and {goal.name} is outside of this, at "
+                    f"({x:g}, {y:g}, {z:g}); move it"
+                )
+        raise InputError(
+            f"{where}: no path of a drone of {self._settings.drone_size:g} m leads from {start} to "
+            f"{' or '.join(goal.name for goal in goals)}; {remedy}"
+        )
 
     def _starts(self, scene: SceneFile, where: str) -> list[Site | None]:
         """Return the sites of starts; None stands for all free space."""
@@ -246,7 +254,8 @@ class Routes:
             np.concatenate([np.empty((0, 3)), *(of.points for of in leading.values())])
         )
         most = float(lengths.values.ravel()[numbers].max(initial=0.0))
-        return Goal(place, len(self.routes) - 1, leading, most)
+        self.most_metres = max(self.most_metres, most)
+        return Goal(place, len(self.routes) - 1, leading)
 
     def _start(
         self,
@@ -254,20 +263,21 @@ class Routes:
         distances: Distances,
         start: Site | None,
         goal: Site,
-        is_reached: NDArray[np.bool_],
+        is_reached: NDArray[np.bool_] | None,
         where: str,
     ) -> Place:
-        """Return where a start has paths to a goal; without points if nowhere."""
+        """Return where a start has paths to a goal, without points if nowhere; None for all."""
         s, height = self._settings, self._height(start, goal)
         around = self.radius + s.start.apart
         fits = space.clearance.values.ravel() >= around + _HALF_DIAGONAL * space.cell
         is_inside, points = np.ones_like(fits), space.centers
+        is_reached = np.ones_like(fits) if is_reached is None else is_reached
         if start is not None and any(start.half_size[:2]):
             half = np.append(start.half_size[:2], np.inf)
             is_inside = (np.abs(_seen_from(start, points)) <= half).all(1)
         if start is not None and not (any(start.half_size[:2]) and is_inside.any()):
             point = np.append(start.position[:2], height)
-            is_fitting = distances(point[None])[0] >= self.radius
+            room, needed = float(distances(point[None])[0]), self.radius
             is_near = np.linalg.norm(points - point, axis=1) <= 2 * space.cell
             has_path = bool((is_near & is_reached).any())
             place = Place(point[None][:has_path], site=start)
@@ -279,14 +289,19 @@ class Routes:
                     points[:, 2] <= high + 0.5 * space.cell
                 )
                 is_inside &= at_height | is_free_height
-            is_fitting = bool((is_inside & fits).any())
+            room = float(space.clearance.values.ravel()[is_inside].max(initial=0.0))
+            needed = around + _HALF_DIAGONAL * space.cell
             place = Place(points[is_inside & fits & is_reached], 0.5 * space.cell, start)
-        if not is_fitting:
+        if room < needed:
             name = start.name if start else "free space"
+            more = 1.05 * (needed - room)
+            at = f"at most {room:.2f} m away from" if room > 0 else "inside of"
+            less = f" give task={s.name} task.start.apart={s.start.apart - more:.2f}, or"
             raise InputError(
-                f"{where}: a drone of {s.drone_size:g} m at {name}, {height:g} m high, is inside "
-                f"of something solid or within {s.start.apart:g} m of it; move the site, or give a "
-                "smaller task.drone_size or task.start.apart"
+                f"{where}: a drone of {s.drone_size:g} m at {name}, {height:g} m high, is {at} "
+                f"something solid and needs {needed:.2f} m;"
+                f"{less if needed > self.radius and more <= s.start.apart else ''} move the site, "
+                "or give a smaller task.drone_size"
             )
         return place
 
@@ -299,6 +314,12 @@ def find_routes(settings: TermTaskSettings, scenes: tuple[SceneFile, ...]) -> Ro
 
 def _sites(scene: SceneFile, prefix: str, setting: str, where: str) -> list[Site]:
     found = [site for site in scene.sites if site.name.startswith(prefix)]
+    if not found and scene.path.suffix.lower() in ENDINGS:
+        raise InputError(
+            f"{where} is a mesh, which marks no sites; name it, as OBJ or STL, in an MJCF file: "
+            f'<asset><mesh name="m" file="{scene.path.stem}.obj"/></asset><worldbody><geom '
+            f'type="mesh" mesh="m"/><site name="{prefix}" pos="4 2 1.2"/></worldbody>'
+        )
     if not found:
         names = ", ".join(site.name for site in scene.sites if site.name) or "none"
         raise InputError(

@@ -195,6 +195,12 @@ class Task(abc.ABC, Generic[S]):
         """Return the default dynamics of the drone: moves of a metre."""
         return ComputerVision()
 
+    def check_dynamics(self, dynamics: Dynamics) -> None:
+        """Raise an `InputError` if no policy could do the task by these actions."""
+        for name, problem in self.needed_actions.items():
+            if name not in dynamics.actions.names:
+                raise InputError(problem)
+
     def make_props(self) -> Sequence[Prop]:
         """Return new entities besides field and drone, positioned by `places`."""
         return ()
@@ -244,13 +250,6 @@ class Task(abc.ABC, Generic[S]):
         """
         for number, stratum in enumerate(self.strata):
             yield "side", stratum, goals.stratum == number
-
-
-def check_actions(task: Task[Any], actions: Actions) -> None:
-    """Raise an `InputError` if no policy could do a task by these actions."""
-    for name, problem in task.needed_actions.items():
-        if name not in actions.names:
-            raise InputError(problem)
 
 
 MAKERS: dict[type[BaseTaskSettings], Callable[[Any], Task[Any]]] = {}

@@ -13,7 +13,7 @@ from torch import Tensor
 from drone_rl.config.term_task import ObjectSettings, TermTaskSettings
 from drone_rl.config.terms import ENDS, EVENTS, SUCCESSES
 from drone_rl.sim.actions import Entry
-from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.scenes import SceneFile, load_scene
 from drone_rl.sim.tasks.applied_rules import AppliedRules, reward_terms
 from drone_rl.sim.tasks.common import Side
@@ -30,6 +30,8 @@ from drone_rl.utils.errors import InputError
 
 _MOST_TRIES, _TRIES = 1000, 20
 """Most samples of all objects until none is too near to another one; samples of each object."""
+_DETOURS = 2.0
+"""Least quotient of the metres that an episode's actions can go and those of the longest path."""
 _EXAMPLES = 300
 """Episodes that show where starts and goals of a scene are."""
 _LAST_ENDS = ("STEP_LIMIT", "LOST_CONTROL")
@@ -203,6 +205,20 @@ class TermTask(ObjectTask):
                 "not arrive; give actions=moves_full, actions.climb_speed=1 (of actions=velocity), "
                 "or a height for all, such as task.start.z=1.2"
             }
+
+    def check_dynamics(self, dynamics: Dynamics) -> None:
+        """See `Task.check_dynamics`; there must be steps for the way to a goal, and for detours."""
+        super().check_dynamics(dynamics)
+        metres = _DETOURS * (0.0 if self.routes is None else self.routes.most_metres)
+        stride, limit = getattr(dynamics, "stride", math.inf), self.settings.step_limit
+        if metres > limit * stride:
+            raise InputError(
+                f"task.step_limit={limit}, but to a goal of {self.name} it is up to "
+                f"{metres / _DETOURS / stride:.0f} actions of {stride:.2g} m, without turns and "
+                f"detours; give task.step_limit={math.ceil(metres / stride)}, or actions of "
+                f"{metres / limit:.2g} m or more (task.step_length of moves, actions.forward_speed "
+                "of velocities)"
+            )
 
     @property
     def goals(self) -> Tensor:

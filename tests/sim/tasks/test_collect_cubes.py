@@ -11,7 +11,7 @@ from hypothesis import settings
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.sim.actions import DOWN, MOVES_3D, UP, Move
 from drone_rl.sim.dynamics import BodyState, ComputerVision
-from drone_rl.sim.tasks import FailureReplayTask, check_actions
+from drone_rl.sim.tasks import FailureReplayTask
 from drone_rl.sim.tasks.collect_cubes import (
     CollectCubes,
     CubeGoals,
@@ -219,8 +219,8 @@ TALL = TaskSettings(vertical_bound=6.0, altitude=10.0)  # out of bounds beyond 7
 def test_drones_without_moves_up_and_down_are_refused_if_cubes_are_out_of_reach():
     with pytest.raises(InputError, match=r"vertical_bound=6.0 puts cubes .* or actions=moves_3d"):
         Worlds(1, TALL)
-    check_actions(CollectCubes(TALL), MOVES_3D)
-    check_actions(CollectCubes(SETTINGS), ComputerVision().actions)
+    CollectCubes(TALL).check_dynamics(ComputerVision(actions=MOVES_3D))
+    CollectCubes(SETTINGS).check_dynamics(ComputerVision())
 
 
 @pytest.mark.parametrize(

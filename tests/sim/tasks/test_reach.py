@@ -140,12 +140,37 @@ def test_goals_in_a_region_are_all_over_it(tmp_path):
         ('<site name="goal" pos="3 0.7 1"/>', {"drone_size": 1.0}, "does not fit at goal"),
         (SITES, {"drone_size": 1.2}, "no path of a drone of 1.2 m leads from start to goal"),
         (SITES, {"step_limit": 10}, "step_limit=10"),
+        (
+            SITES.replace("5 3.2 1", "9 3.2 1"),
+            {},
+            r"x = 0\.3 to 5\.8 m .* goal is outside of this, at \(9, 3.2, 1\); move it",
+        ),
+        (SITES.replace("1.5 2 1", "0.2 2 1").replace("1 1.5", "0.06 1.5"), {}, "start.apart=0"),
     ],
 )
 def test_what_can_not_work_is_one_line(tmp_path, sites, changes, message):
     with pytest.raises(InputError, match=message) as error:
         Worlds(1, reach(write_house(tmp_path, sites), **changes), actions=TURNING)
     assert "\n" not in str(error.value)
+
+
+def test_an_episode_has_twice_the_steps_of_the_longest_path(tmp_path):
+    """4 m from (1, 3) to (5, 3) through the doorway: 10 steps of 0.4 m, and as many again."""
+    sites = '<site name="start" pos="1 2 1"/><site name="goal" pos="5 2 1"/>'
+    scene, speeds = write_house(tmp_path, sites), ActionSettings(kind="velocity", forward_speed=2)
+    flight = DynamicsSettings(mode="simple_flight", tick=0.004, control_ticks=50)  # 0.2 s
+    how: Any
+    for how in ({"actions": TURNING}, {"actions": speeds, "dynamics": flight}):
+        Worlds(1, reach(scene, step_limit=21, step_length=0.4), **how)
+        with pytest.raises(InputError, match=r"step_limit=19, .* up to 10 actions of 0.4 m"):
+            Worlds(1, reach(scene, step_limit=19, step_length=0.4), **how)
+
+
+def test_a_mesh_without_sites_gets_the_mjcf_that_has_them(tmp_path):
+    path = tmp_path / "hall.obj"
+    path.write_text("v 0 0 0\nv 4 0 0\nv 0 4 0\nv 0 0 2\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n")
+    with pytest.raises(InputError, match=r'<mesh name="m" file="hall\.obj"/>.*<site name="goal"'):
+        as_task(reach(path))
 
 
 def test_a_scene_without_solids_is_refused(tmp_path):
