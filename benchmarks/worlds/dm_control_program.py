@@ -9,7 +9,7 @@ from drone_rl.config import BaseTaskSettings
 from drone_rl.sim.composer_task import make_environment
 
 task = BaseTaskSettings.read({"name": "reach", "scene": sys.argv[1]}, "task")
-env = make_environment(task.replace(step_limit=30), pixels=False)
+env = make_environment(task.replace(step_limit=60), pixels=False)
 random = np.random.RandomState(0)
 timestep, episodes = env.reset(), 0
 for _ in range(100):

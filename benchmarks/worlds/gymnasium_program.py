@@ -10,7 +10,7 @@ import drone_rl  # noqa: F401 (registers the task)
 
 NAME, SCENE = "drone_rl/Reach-v0", sys.argv[1]
 check_env(gymnasium.make(NAME, scene=SCENE).unwrapped, skip_render_check=True)
-worlds = gymnasium.make_vec(NAME, num_envs=16, scene=SCENE, step_limit=30)
+worlds = gymnasium.make_vec(NAME, num_envs=16, scene=SCENE, step_limit=60)
 worlds.reset(seed=0)
 worlds.action_space.seed(0)
 episodes = 0
