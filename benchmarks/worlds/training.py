@@ -25,9 +25,12 @@ FLYING = (
     *("inputs.depth.size=[12,24]", "inputs.depth.horizontal_fov=110", "inputs.depth.maximum=6"),
     "inputs.velocity.scale=2",
 )
+PLACES = "task.start.site=anywhere", "task.objects.goal.site=kitchen"
+"""Starts in all free space and a goal around corners: 19% of them have a free straight path to it.
+To the scene's `goal`, 54% of its starts have one, which needs no image."""
 _MOST = {"moves": 3_000_000, "flight": 6_000_000}
 """Frames after which a training ends at the latest."""
-_WAYS = {"moves": WALKING, "flight": FLYING}
+_WAYS = {"moves": (*PLACES, *WALKING), "flight": (*PLACES, *FLYING)}
 
 
 def task_in(scene: str) -> tuple[str, ...]:

@@ -5,9 +5,11 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+import torch
 
 import drone_rl
 from drone_rl.config import BaseTaskSettings
+from drone_rl.config.reach import ReachSettings
 from drone_rl.sim.scenes.scene_file import load_scene
 from drone_rl.sim.worlds import Worlds
 
@@ -40,6 +42,18 @@ def test_indoor_doorways_are_wide_enough():
         for way in (side, -side):
             place = np.array([x, y, 1.2])
             assert mujoco.mj_ray(model, data, place, way, None, 1, -1, geom) >= 0.45
+
+
+def test_most_straight_paths_to_the_kitchen_are_blocked():
+    goal = {"goal": {**ReachSettings().objects["goal"].values(), "site": "kitchen"}}
+    given = {"name": "reach", "start": {"site": "anywhere"}, "objects": goal}
+    worlds = Worlds(1, BaseTaskSettings.read(given, "task"))
+    rng = np.random.RandomState(0)
+    state = worlds.start(torch.stack([worlds.task.sample(rng) for _ in range(300)]))
+    solids = worlds.task.solids(state).solids
+    place, goal = state.body.position, state.places[:, 0]
+    fraction = solids.sweep_at(place, goal, 0.15, worlds.task.solids(state).places).fraction
+    assert 0.1 < float((fraction > 1.0).double().mean()) < 0.3
 
 
 def test_outdoor_trees_stand_on_the_ground():
