@@ -19,6 +19,8 @@ _ALTITUDE = 2.5
 """Height of starts without sites, metres."""
 ANYWHERE = "anywhere"
 """Name of the sites of a start in free space."""
+_AROUND: dict[str, Any] = {"x": (5.0, 20.0), "y": (-6.0, 6.0)}
+"""Where objects are by default."""
 ROLES = ("goal", "obstacle", "decoration")
 SHAPES = ("ball", "cylinder", "box")
 
@@ -42,6 +44,9 @@ class ObjectSettings(Settings):
 
     shape: Annotated[str, OneOf(SHAPES)] = "box"
     """ball, cylinder (upright) or box."""
+    body: Annotated[str, Text(100)] = ""
+    """Name of the scene file's body that it is, with all that is fixed to it, instead of a shape
+    with a size and a color; x, y and z are of the middle of the box around it."""
     role: Annotated[str, OneOf(ROLES)] = "obstacle"
     """goal, which vanishes when the drone touches it; obstacle, which is solid; decoration."""
     count: Annotated[int, Whole(1, 200, "objects")] = 1
@@ -49,14 +54,15 @@ class ObjectSettings(Settings):
     size: Annotated[tuple[float, float, float], Several(Size, 3, 3)] = (1.0, 1.0, 1.0)
     """Edges along x, y and z; of a ball the diameter thrice, of a cylinder the diameter twice."""
     heading: Annotated[float, Real(-360.0, 360.0, unit="deg")] = 0.0
-    """By which a box is turned to the left, so that its own x points there."""
+    """By which a box or a body is turned to the left, so that its own x points there."""
     color: Color = (0.25, 0.16, 0.12)
     """Red, green, blue in [0, 1]."""
-    x: Coordinate = (5.0, 20.0)
-    """Of the centre: a number, or the range in which each episode places it."""
-    y: Coordinate = (-6.0, 6.0)
-    """See x."""
-    z: Annotated[Any, Span(Real(-1000.0, 1000.0, unit="m"))] | None = None
+    x: Coordinate | None = None
+    """Of the centre: a number, or the range in which each episode places it. None for 5 to 20, or
+    for where the file has its body, as in y and z."""
+    y: Coordinate | None = None
+    """See x; None for -6 to 6."""
+    z: Coordinate | None = None
     """See x; None stands it on the ground."""
     site: SiteName = ""
     """Where it is instead of x, y and z: at one of the sites of the scene file whose names begin
@@ -83,7 +89,7 @@ class ObjectSettings(Settings):
     def range_of(self, axis: str) -> tuple[float, float]:
         """Return the lowest and highest value of a coordinate of the centre."""
         value = getattr(self, axis)
-        value = self.half_size[2] if value is None else value
+        value = {**_AROUND, "z": self.half_size[2]}[axis] if value is None else value
         return value if isinstance(value, tuple) else (value, value)
 
     def check(self) -> None:
@@ -92,7 +98,7 @@ class ObjectSettings(Settings):
         if (x != y and self.shape != "box") or (x != z and self.shape == "ball"):
             equal = "three equal sizes" if self.shape == "ball" else "equal sizes along x and y"
             raise InputError(f"size={list(self.size)} is no {self.shape}; give {equal}, or a box")
-        if self.heading and self.shape != "box":
+        if self.heading and self.shape != "box" and not self.body:
             raise InputError(f"heading={self.heading:g} turns a {self.shape}; turn only boxes")
 
 
@@ -213,7 +219,7 @@ class TermTaskSettings(BaseTaskSettings):
     @property
     def object_region(self) -> ObjectRegion | None:
         """Where the objects are; see `BaseTaskSettings`. None if a scene file says so."""
-        if self.has_sites:
+        if self.has_sites or any(of.body for of in self.objects.values()):
             return None
         every = self.objects.values()
         size = 2 * max(max(of.reach[:2]) for of in every)

@@ -206,6 +206,8 @@ REWARDS.declare("altitude", -0.01, height=2.5)
 ENDS.declare("contact")
 ENDS.declare("out_of_bounds")
 SUCCESSES.declare("all_goals")
+EVENTS.declare("orbit", radius=2.0, period=10.0)
+EVENTS.declare("shuttle", distance=2.0, period=10.0, heading=90.0)
 _Read = dict[str, TermSettings]
 Rewards = Annotated[_Read, REWARDS, BeforeValidator(REWARDS.read)]
 """Terms of a reward by name, each with a weight and parameters of its own."""

@@ -107,11 +107,17 @@ class Field(composer.Arena):
 
 
 class SceneEntity(composer.Entity):
-    """A scene file; its frame is the file's."""
+    """A scene file, or a body of it; its frame is the file's."""
 
-    semantic_class = SemanticClass.OBSTACLE
+    semantic_class: SemanticClass
 
-    def _build(self, scene: SceneFile, name: str = "scene") -> None:
+    def _build(
+        self,
+        scene: SceneFile,
+        name: str = "scene",
+        semantic_class: SemanticClass = SemanticClass.OBSTACLE,
+    ) -> None:
+        self.semantic_class = semantic_class
         root: Any = mjcf.from_xml_string(
             scene.mjcf, escape_separators=True, assets=dict(scene.assets)
         )

@@ -12,7 +12,7 @@ from drone_rl.config.terms import REWARDS, Term, TermSettings
 from drone_rl.sim.dynamics import Dynamics, FlightState
 from drone_rl.sim.rendering.devices import on_torch_stream, start_warp
 from drone_rl.sim.scenes.path_kernel import Route, make_paths
-from drone_rl.sim.tasks.geometry_kernel import NOTHING, Objects
+from drone_rl.sim.tasks.geometry_kernel import BODY, NOTHING, Objects
 from drone_rl.sim.tasks.rules_kernel import Rules
 from drone_rl.sim.tasks.step_kernel import Step, World
 from drone_rl.sim.tasks.torch_terms import values_of
@@ -70,13 +70,31 @@ class AppliedRules:
         """Choose what is ahead in states, `ObjectState`, in place."""
         self._run(state, state.drone, torch.zeros_like(state.action), None, is_start=True)
 
+    def move(self, state: Any, before: Tensor, dynamics: Dynamics | None) -> Tensor | None:
+        """Let events move objects in states, in place, and return by how much, (N, P, 3).
+
+        `before` is where the drones were, metres, (N, 3). Without events nothing moves: None.
+        """
+        if not self._events:
+            return None
+        device = state.places.device
+        steps, end_reasons = state.steps.int(), state.end_reason.int()
+        world = self.world(state, steps, end_reasons, dynamics)
+        moved = torch.zeros_like(state.places)
+        world.objects = _with_moved(world.objects, moved)
+        inputs = [world, _ctype(before.double(), wp.vec3d)]
+        with on_torch_stream(device):
+            wp.launch(self.compiled.move_all, len(state), inputs=inputs, device=str(device))
+        return moved
+
     def step(
         self,
         state: Any,
         before: Tensor,
         speeds: Tensor,
         dynamics: Dynamics | None,
-        around: tuple[Tensor, Tensor] | None = None,
+        around: tuple[Tensor, ...] | None = None,
+        moved: Tensor | None = None,
     ) -> Tensor:
         """Write states after drones have moved, and return the rewards.
 
@@ -85,12 +103,13 @@ class AppliedRules:
             before: Where the drones were, metres. Shape: (N, 3).
             speeds: See `Step.action`. Shape: (N, 4).
             dynamics: What moved the drones; None for moves that are done at once.
-            around: In scenes, `World.struck` and `World.gaps`.
+            around: In scenes, `World.struck` and `World.gaps`, with bodies also `World.hits`.
+            moved: By how much objects have moved before; see `move`.
 
         Raises:
             InputError: A reward term or an event is not finite.
         """
-        rewards = self._run(state, before, speeds, dynamics, around, is_start=False)
+        rewards = self._run(state, before, speeds, dynamics, around, moved, is_start=False)
         self.check(state)
         return rewards
 
@@ -100,7 +119,8 @@ class AppliedRules:
         before: Tensor,
         speeds: Tensor,
         dynamics: Dynamics | None,
-        around: tuple[Tensor, Tensor] | None = None,
+        around: tuple[Tensor, ...] | None = None,
+        moved: Tensor | None = None,
         *,
         is_start: bool,
     ) -> Tensor:
@@ -115,7 +135,10 @@ class AppliedRules:
         timestep = getattr(dynamics, "timestep", None)
         world = self._constants(state, timestep, is_kept=around is None)
         if around is not None:
-            world.struck, world.gaps = map(_warp, around)
+            for name, values in zip(("struck", "gaps", "hits"), around, strict=False):
+                setattr(world, name, _warp(values))
+        if moved is not None:
+            world.objects = _with_moved(world.objects, moved)
         inputs = [
             world,
             is_start,
@@ -205,9 +228,7 @@ class AppliedRules:
             events = torch.tensor(self._events, dtype=torch.int32, device=state.places.device)
             world.events = _warp(events)
             world.phases = wp.from_torch(state.sampled[:, -len(self._events) :])
-            objects: Any = world.objects
-            objects.moved = _warp(torch.zeros_like(state.places), wp.vec3d)
-            world.objects = objects
+            world.objects = _with_moved(world.objects, torch.zeros_like(state.places))
 
     def _prepare_paths(self, world: Any, state: Any) -> None:
         """Give the routes, with those of states, whose memory they share."""
@@ -224,7 +245,8 @@ class AppliedRules:
     def _make_constants(self, device: str, timestep: float | None) -> Any:
         start_warp(device)
         world, objects = World(), Objects()
-        shapes = torch.tensor([SHAPES.index(of.shape) for of in self._objects], dtype=torch.int32)
+        kinds = [int(BODY) if of.body else SHAPES.index(of.shape) for of in self._objects]
+        shapes = torch.tensor(kinds, dtype=torch.int32)
         sizes = torch.tensor([of.half_size for of in self._objects], dtype=torch.float64)
         roles = torch.tensor([ROLES.index(of.role) for of in self._objects], dtype=torch.int32)
         objects.shapes, objects.roles = _warp(shapes.to(device)), _warp(roles.to(device))
@@ -258,6 +280,12 @@ def largest_reward(rewards: Mapping[str, Any], **largest: float) -> float | None
     if weights.keys() - known:
         return None
     return float(sum(weight * known[name] for name, weight in weights.items()))
+
+
+def _with_moved(objects: Any, moved: Tensor) -> Any:
+    """Return objects with the array of their movements in a step."""
+    objects.moved = _warp(moved, wp.vec3d)
+    return objects
 
 
 def _warp(tensor: Tensor, kind: Any = None) -> Any:

@@ -11,6 +11,8 @@ BALL = wp.constant(0)
 CYLINDER = wp.constant(1)
 BOX = wp.constant(2)
 """Shapes; a cylinder stands upright, and a box is turned about the vertical axis alone."""
+BODY = wp.constant(3)
+"""Shape of a scene's body, which other queries touch; its size is that of the box around it."""
 GOAL = wp.constant(0)
 OBSTACLE = wp.constant(1)
 DECORATION = wp.constant(2)
@@ -76,10 +78,14 @@ def turned(objects: Objects, thing: int, vector: wp.vec3d) -> wp.vec3d:
 
 @wp.func
 def nearest(objects: Objects, env: int, point: wp.vec3d, role: int) -> Nearest:
-    """Return the nearest present object of a role; at an infinite distance if there is none."""
+    """Return the nearest present object of a role; at an infinite distance if there is none.
+
+    Obstacles that are bodies of a scene are not among them.
+    """
     found = Nearest(wp.float64(wp.inf), int(NOTHING))
     for i in range(objects.shapes.shape[0]):
-        if objects.roles[i] == role and objects.present[env, i]:
+        is_known = role == GOAL or objects.shapes[i] != BODY
+        if is_known and objects.roles[i] == role and objects.present[env, i]:
             away = turned(objects, i, point - objects.places[env, i])
             distance = distance_to(objects.shapes[i], objects.sizes[i], away)
             if distance < found.distance:

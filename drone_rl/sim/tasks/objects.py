@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import torch
@@ -14,9 +14,10 @@ from drone_rl.sim.entities import SceneEntity, VisualEntity
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.scenes import SceneFile
 from drone_rl.sim.scenes.solids import PlacedSolids, solids_of
+from drone_rl.sim.scenes.solids_kernel import TOUCHING
 from drone_rl.sim.tasks.applied_rules import AppliedRules
 from drone_rl.sim.tasks.common import FAR_BELOW, HIDDEN_DEPTH, SIDES
-from drone_rl.sim.tasks.geometry_kernel import NOTHING
+from drone_rl.sim.tasks.geometry_kernel import NOTHING, OBSTACLE
 from drone_rl.sim.tasks.task import State, Task
 
 _CLASSES = (SemanticClass.TARGET, SemanticClass.OBSTACLE, SemanticClass.DECORATION)
@@ -50,11 +51,16 @@ class ObjectState(State):
     """What a task of terms sampled for the episode; K is 0 for other tasks."""
 
 
+def class_of(settings: ObjectSettings) -> SemanticClass:
+    """Return the semantic class of an object's role."""
+    return _CLASSES[ROLES.index(settings.role)]
+
+
 class ObjectEntity(VisualEntity):
     """An object; its frame is at its centre. Metres."""
 
     def _build(self, settings: ObjectSettings, name: str) -> None:
-        self.semantic_class = _CLASSES[ROLES.index(settings.role)]
+        self.semantic_class = class_of(settings)
         half = settings.half_size
         size = {"ball": half[:1], "cylinder": (half[0], half[2]), "box": half}[settings.shape]
         self._add_geom(_KINDS[settings.shape], size, settings.color, name)
@@ -70,6 +76,10 @@ class ObjectTask(Task[ObjectState]):
     """K of `ObjectState.sampled`."""
     scenes: tuple[SceneFile, ...] = ()
     """The S scenes, one of which each episode takes place in; none for an empty field."""
+    bodies: Mapping[str, SceneFile] = {}
+    """The objects that are bodies of the scene, by name; all of one scene."""
+    surroundings: tuple[SceneFile, ...] = ()
+    """The scenes without these bodies."""
 
     def __init__(
         self,
@@ -93,6 +103,9 @@ class ObjectTask(Task[ObjectState]):
         """Settings of each of the P objects."""
         self.roles = torch.tensor([ROLES.index(of.role) for of in self.each], dtype=torch.int32)
         self.num_goals = len(self.each) if num_goals is None else num_goals
+        numbers = [number for number, name in enumerate(objects) if name in self.bodies]
+        self._bodies = torch.tensor(numbers, dtype=torch.int64)
+        """Numbers of the objects that are bodies of the scene. Shape: (B,)."""
         self.reward_terms = tuple(term.name for term in rules.compiled.rewards)
 
     def __reduce__(self) -> Any:
@@ -105,8 +118,13 @@ class ObjectTask(Task[ObjectState]):
 
     def make_props(self) -> list[ObjectEntity | SceneEntity]:
         """Return the objects, in order, then the scenes."""
-        objects = [ObjectEntity(of, name=name) for name, of in self.objects.items()]
-        scenes = [SceneEntity(of, name=f"scene_{i}") for i, of in enumerate(self.scenes)]
+        objects = [
+            SceneEntity(self.bodies[name], name, class_of(of))
+            if name in self.bodies
+            else ObjectEntity(of, name=name)
+            for name, of in self.objects.items()
+        ]
+        scenes = [SceneEntity(of, name=f"scene_{i}") for i, of in enumerate(self.surroundings)]
         return [*objects, *scenes]
 
     def begun(self, body: BodyState, places: Tensor, sampled: Tensor | None = None) -> ObjectState:
@@ -164,22 +182,55 @@ class ObjectTask(Task[ObjectState]):
         speeds = torch.zeros_like(state.action)
         if action is not None and dynamics is not None:
             speeds = dynamics.actions.speeds_of(action)
+        moved = self.rules.move(new, state.drone, dynamics)
         around = None
         if self.scenes:
-            around = self._around(state, body, dynamics)
-        return new, self.rules.step(new, state.drone, speeds, dynamics, around)
+            around = self._around(state, new, dynamics)
+        return new, self.rules.step(new, state.drone, speeds, dynamics, around, moved)
 
     def _around(
-        self, state: ObjectState, body: BodyState, dynamics: Dynamics | None
-    ) -> tuple[Tensor, Tensor]:
-        """Return which drones have touched solids, and how far these are; see `World.struck`."""
+        self, state: ObjectState, new: ObjectState, dynamics: Dynamics | None
+    ) -> tuple[Tensor, ...]:
+        """Return `World.struck`, `gaps` and `hits` of a step between states."""
+        body = new.body
         is_stopped = getattr(dynamics, "stops_at_solids", False)
         is_flown = isinstance(body, FlightState)  # not straight
         before = None if is_stopped and not is_flown else state.drone
-        struck, gaps = self.solids(state).touched(before, body.position)
+        struck, gaps = self._solids(new, ()).touched(before, body.position)
         if isinstance(body, FlightState) and isinstance(state.body, FlightState):
             struck |= body.contact.time > state.body.contact.time
-        return struck, gaps
+        if not self.bodies:
+            return struck, gaps
+        fractions, distances = self._meet(state, new)
+        hits = torch.full_like(state.places[..., 0], torch.inf)
+        hits[:, self._bodies] = fractions
+        is_there = new.present & (self.roles == OBSTACLE).to(new.present.device)
+        distances = distances.where(is_there[:, self._bodies], torch.inf)
+        return struck, gaps.minimum(distances.amin(1)), hits
+
+    def _meet(self, state: ObjectState, new: ObjectState) -> tuple[Tensor, Tensor]:
+        """Return where straight ways of drones and bodies meet, and how far apart they end.
+
+        Returns:
+            Fraction of the step, infinite if they don't meet, and metres. Shapes: (N, B).
+        """
+        count = len(self._bodies)
+        before, now = (
+            (of.drone[:, None] - of.places[:, self._bodies]).flatten(0, 1) for of in (state, new)
+        )
+        solids = self._solids(new, ()).solids
+        places = before.new_zeros(count, solids.count, 3)
+        places[..., 2] = -FAR_BELOW
+        places[torch.arange(count), torch.arange(count)] = 0.0
+        rows, radius = (
+            torch.arange(count, device=before.device).repeat(len(state)),
+            0.5 * self.drone_size,
+        )
+        distance = solids.nearest_at(now, places, rows).distance
+        fraction = solids.sweep_at(before, now, radius, places, rows).fraction
+        is_touching = distance <= radius + float(TOUCHING)
+        fraction = fraction.where(~is_touching, fraction.clamp(max=1.0))
+        return fraction.unflatten(0, (-1, count)), distance.unflatten(0, (-1, count))
 
     def touch(
         self, state: ObjectState, position: Tensor, before: Tensor | None = None
@@ -196,7 +247,7 @@ class ObjectTask(Task[ObjectState]):
 
     def places(self, state: ObjectState) -> Tensor:
         """Return the objects' centres, then the scenes' origins; those of absent ones below."""
-        hidden = (~state.present).double() * HIDDEN_DEPTH
+        hidden = (~state.present).double() * (FAR_BELOW if self.scenes else HIDDEN_DEPTH)
         objects = state.places - torch.nn.functional.pad(hidden[..., None], (2, 0))
         if not self.scenes:
             return objects
@@ -207,8 +258,16 @@ class ObjectTask(Task[ObjectState]):
 
     def solids(self, state: ObjectState) -> PlacedSolids:
         """Return what is solid in the scene of each episode; not for an empty field."""
-        places = self.places(state)[:, len(self.each) :]
-        solids = solids_of(self.scenes, str(places.device))
+        obstacles = (self.roles[self._bodies] == OBSTACLE).nonzero()[:, 0]
+        return self._solids(state, obstacles.tolist())
+
+    def _solids(self, state: ObjectState, bodies: Sequence[int]) -> PlacedSolids:
+        """Return what is solid with some of the bodies, by number; their groups come first."""
+        every = self.places(state)
+        places = every[:, [*self._bodies.tolist(), *range(len(self.each), every.shape[1])]]
+        absent = [i for i in range(len(self._bodies)) if i not in bodies]
+        places[:, absent, 2] = -FAR_BELOW
+        solids = solids_of((*self.bodies.values(), *self.surroundings), str(places.device))
         return PlacedSolids(solids, places, 0.5 * self.drone_size)
 
     def scene_of(self, state: ObjectState) -> Tensor:
@@ -217,7 +276,11 @@ class ObjectTask(Task[ObjectState]):
 
     def obstacles(self, state: ObjectState) -> Obstacles | None:
         """Return the scene, and solid objects if all are of one size and parallel to the axes."""
-        solid = [i for i, of in enumerate(self.each) if of.role == "obstacle"]
+        solid = [
+            i
+            for i, (name, of) in enumerate(self.objects.items())
+            if of.role == "obstacle" and name not in self.bodies
+        ]
         is_turned = any(self.each[i].heading for i in solid)
         if is_turned or len({self.each[i].half_size for i in solid}) != 1:
             if not self.scenes:

@@ -295,10 +295,15 @@ class Rules:
             world.parameters = parameters[env]
             rewards[env] = settle(world, env, shown.seen[env], is_lost[env])
 
+        @wp.kernel(module="unique", module_options=_OPTIONS)
+        def move_all(world: World, before: wp.array[wp.vec3d]) -> None:
+            """Move the objects of environments, before `step_all`."""
+            env = wp.tid()
+            move_objects(world, env, before[env])
+
         @wp.func
-        def advance(world: World, env: int, motion: Motion) -> wp.float64:
-            """Apply all rules; write the end reason and return the reward."""
-            move_objects(world, env, motion.before)
+        def judge(world: World, env: int, motion: Motion) -> wp.float64:
+            """Apply the rules once objects have moved; write the end, return the reward."""
             axes = axes_of(motion.attitude)
             step = see(
                 world,
@@ -308,6 +313,12 @@ class Rules:
                 choose(world, env, motion, axes, touch(world, env, motion)),
             )
             return finish(world, env, step, motion.is_lost)
+
+        @wp.func
+        def advance(world: World, env: int, motion: Motion) -> wp.float64:
+            """Apply all rules; write the end reason and return the reward."""
+            move_objects(world, env, motion.before)
+            return judge(world, env, motion)
 
         @wp.kernel(module="unique", module_options=_OPTIONS)
         def step_all(
@@ -333,7 +344,7 @@ class Rules:
             action: wp.array[wp.vec4],
             rewards: wp.array[wp.float64],
         ) -> None:
-            """Apply all rules to environments, a thread each; at a start only choose a goal."""
+            """Apply rules once objects have moved, a thread each; at a start only choose a goal."""
             env = wp.tid()
             of = constants.objects
             world = World(
@@ -362,6 +373,7 @@ class Rules:
                 constants.seen,
                 constants.struck,
                 constants.gaps,
+                constants.hits,
                 constants.paths,
             )
             motion = Motion()
@@ -375,7 +387,7 @@ class Rules:
                 motion.is_lost = is_lost[env]
                 motion.thing = thing[env]
                 motion.action = action[env]
-                rewards[env] = advance(world, env, motion)
+                rewards[env] = judge(world, env, motion)
 
         @wp.func
         def move(envs: Episodes, env: int, action: int) -> float:
@@ -416,6 +428,8 @@ class Rules:
             return float(advance(envs.world, env, motion))
 
         self.step_all, self.move, self.steer = step_all, move, steer
+        self.move_all = move_all if events else None
+        """First kernel of a step, if events move objects."""
         self.settle_all = settle_all if self.in_torch else None
         """Second kernel of a step, which reads the values of terms in torch."""
 
@@ -428,7 +442,7 @@ class Rules:
         """
         start_warp("cpu")
         try:
-            for kernel in filter(None, (self.step_all, self.settle_all)):
+            for kernel in filter(None, (self.move_all, self.step_all, self.settle_all)):
                 wp.load_module(kernel.module, device="cpu")
         except Exception as error:
             raise InputError(self._compile_error(str(error))) from error

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from drone_rl.config.terms import ENDS, REWARDS, SUCCESSES, event
+from drone_rl.config.terms import ENDS, EVENTS, REWARDS, SUCCESSES
 from drone_rl.sim.tasks.step_kernel import Mover, Step
 
 
@@ -73,14 +73,14 @@ def has_all_goals(step: Step) -> bool:
     return step.remaining == 0
 
 
-@event("orbit")
+@EVENTS.implement("orbit")
 def orbit(mover: Mover, radius: float = 2.0, period: float = 10.0) -> wp.vec3:
     """Flies a circle of `radius` metres in `period` seconds, at first in a random direction."""
     angle = wp.tau * (mover.time / period + mover.phase)
     return wp.tau * radius / period * wp.vec3(wp.cos(angle), wp.sin(angle), 0.0)
 
 
-@event("shuttle")
+@EVENTS.implement("shuttle")
 def shuttle(
     mover: Mover, distance: float = 2.0, period: float = 10.0, heading: float = 90.0
 ) -> wp.vec3:

@@ -6,6 +6,8 @@ from drone_rl.sim.dynamics.rigid_body_kernel import Axes
 from drone_rl.sim.rendering.raytrace.structs_kernel import struct
 from drone_rl.sim.scenes.path_kernel import Paths, path_length
 from drone_rl.sim.tasks.geometry_kernel import (
+    BODY,
+    DECORATION,
     GOAL,
     NOTHING,
     OBSTACLE,
@@ -127,6 +129,9 @@ class World:
     """
     gaps: wp.array[wp.float64]
     """Distance from each drone's centre to the nearest solid, after the step."""
+    hits: wp.array2d[wp.float64]
+    """Fraction of the step after which each object that is a scene's body was touched; inf for
+    never. Shape: (N, P), or no array if there are none."""
     paths: Paths
     """To goals at sites of scenes; no arrays if there are none."""
 
@@ -152,6 +157,19 @@ class Motion:
 
 
 @wp.func
+def _touches(world: World, env: int, thing: int, motion: Motion) -> bool:
+    """Return whether a drone touches an obstacle or a goal on its way."""
+    objects = world.objects
+    when = wp.float64(wp.inf)
+    if objects.present[env, thing] and objects.roles[thing] != DECORATION:
+        if objects.shapes[thing] == BODY:
+            when = world.hits[env, thing]
+        else:
+            when = sweep(objects, env, thing, motion.before, motion.now, world.radius)
+    return when <= wp.float64(1.0)
+
+
+@wp.func
 def touch_solid(world: World, env: int, motion: Motion) -> Step:
     """Apply the rules of contact after a motion, and return the step with what was touched.
 
@@ -161,16 +179,14 @@ def touch_solid(world: World, env: int, motion: Motion) -> Step:
     step = Step()
     for i in range(objects.shapes.shape[0]):
         is_solid = objects.roles[i] == OBSTACLE
-        if objects.present[env, i] and (is_solid or objects.roles[i] == GOAL):
-            when = sweep(objects, env, i, motion.before, motion.now, world.radius)
-            if when <= wp.float64(1.0):
-                objects.touched[env, i] = True
-                if is_solid:
-                    step.contact = True
-                else:
-                    objects.present[env, i] = False
-                    world.reached[env, i] = True
-                    step.reached += 1
+        if _touches(world, env, i, motion):
+            objects.touched[env, i] = True
+            if is_solid:
+                step.contact = True
+            else:
+                objects.present[env, i] = False
+                world.reached[env, i] = True
+                step.reached += 1
         if objects.roles[i] == GOAL and not world.reached[env, i]:
             step.remaining += 1
     if world.struck.shape[0] > 0:

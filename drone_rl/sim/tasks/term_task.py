@@ -15,6 +15,7 @@ from drone_rl.config.terms import ENDS, EVENTS, SUCCESSES
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.scenes import SceneFile, load_scene
+from drone_rl.sim.scenes.bodies import take_bodies
 from drone_rl.sim.tasks.applied_rules import AppliedRules, reward_terms
 from drone_rl.sim.tasks.common import Side
 from drone_rl.sim.tasks.geometry_kernel import GOAL
@@ -87,13 +88,45 @@ def _routes(s: TermTaskSettings, scenes: Sequence[SceneFile]) -> Any:
     return find_routes(s, scenes)
 
 
-def _named(settings: TermTaskSettings) -> dict[str, ObjectSettings]:
-    """Return the objects of a task by name."""
+def _named(settings: TermTaskSettings, kinds: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a value of each object of a task by name, from those of some kinds."""
     return {
-        f"{name}_{i}" if of.count > 1 else name: of
-        for name, of in settings.objects.items()
-        for i in range(of.count)
+        f"{name}_{i}" if settings.objects[name].count > 1 else name: value
+        for name, value in kinds.items()
+        for i in range(settings.objects[name].count)
     }
+
+
+def _with_bodies(
+    s: TermTaskSettings, scenes: tuple[SceneFile, ...]
+) -> tuple[TermTaskSettings, tuple[SceneFile, ...], dict[str, SceneFile]]:
+    """Return settings with places and sizes of a scene's bodies, the scenes without, and these.
+
+    Raises:
+        InputError: There is not one scene with these bodies, or one of them can't be touched.
+    """
+    named = {name: of for name, of in s.objects.items() if of.body}
+    if not named:
+        return s, scenes, {}
+    for name, of in named.items():
+        setting = f"task.objects.{name}.body={of.body}"
+        if len(scenes) != 1:
+            raise InputError(f"{setting} needs one scene; give one file, task.scene=FILE")
+        if of.replace(shape="box", size=(1.0, 1.0, 1.0)) != of:
+            raise InputError(f"{setting} has its own shape and size; leave out shape and size")
+    rest, bodies = take_bodies(scenes[0], tuple((of.body, of.heading) for of in named.values()))
+    objects = dict(s.objects)
+    for (name, of), body in zip(named.items(), bodies, strict=True):
+        if of.role != "decoration" and not any(body.scene.solid):
+            raise InputError(
+                f"task.objects.{name}.body={of.body}: nothing in it can be touched; give geoms a "
+                "contype or conaffinity other than 0, or the object role=decoration"
+            )
+        place = zip("xyz", body.center, strict=True)
+        at = {axis: value for axis, value in place if getattr(of, axis) is None}
+        objects[name] = of.replace(heading=0.0, size=tuple(max(0.01, of) for of in body.size), **at)
+    scenes_of = {name: body.scene for name, body in zip(named, bodies, strict=True)}
+    return s.replace(objects=objects), (rest,), scenes_of
 
 
 def _has_room(
@@ -131,7 +164,11 @@ class TermTask(ObjectTask):
     def __init__(self, settings: TermTaskSettings) -> None:
         """Take the settings of a task of terms."""
         s = settings
-        self.name = s.name
+        self.scenes = tuple(load_scene(path, s.scene_up, s.scene_scale) for path in s.scene or ())
+        s, self.surroundings, bodies = _with_bodies(s, self.scenes)
+        self._whole = s
+        self.bodies = _named(s, bodies)
+        self.name, objects = s.name, _named(s, s.objects)
         ends = tuple(ENDS.by_name[name] for name in s.end)
         (success,) = (SUCCESSES.by_name[name] for name in s.success)
         kinds = [*s.objects.values()]
@@ -142,9 +179,7 @@ class TermTask(ObjectTask):
             *(e for of in kinds for e in of.event.values()),
         )
         named = zip((*ends, success, *(term for _, term in events)), given, strict=True)
-        objects = _named(s)
-        self.scenes = tuple(load_scene(path, s.scene_up, s.scene_scale) for path in s.scene or ())
-        self.routes = _routes(s, self.scenes)
+        self.routes = _routes(s, self.surroundings)
         """Starts, goals and paths at sites of the scenes; None without sites."""
         low, high = s.low, s.high
         if self.routes is not None:
@@ -166,7 +201,7 @@ class TermTask(ObjectTask):
                 if events
             ],
         )
-        super().__init__(s, objects, rules)
+        super().__init__(settings, objects, rules)
         self.num_sampled = 4 + (4 if events else 3) * len(objects) + bool(self.scenes)
         if self.routes is not None:
             self.num_sampled += 1 + len(objects)
@@ -251,7 +286,7 @@ class TermTask(ObjectTask):
         Raises:
             InputError: A region has no room left for an object.
         """
-        s = self.settings if self.curriculum is None else self.curriculum.ranges
+        s = self._whole if self.curriculum is None else self.curriculum.ranges
         crowded = ""
         for _ in range(_MOST_TRIES):
             at_sites = self._at_sites(s, random_state)
@@ -373,7 +408,7 @@ class TermTask(ObjectTask):
     def _drawn(self) -> tuple[Tensor, Tensor]:
         """Return examples of starts and goals, as `seen_from_start` takes them."""
         if self.routes is None:
-            return drawn(self.settings)
+            return drawn(self._whole)
         source = np.random.RandomState(0)
         sampled = torch.stack([self.sample(source) for _ in range(_EXAMPLES)])
         return sampled[:, :4], self._sampled_places(sampled)[:, self.goals]
