@@ -16,6 +16,7 @@ from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.scenes import SceneFile, load_scene
 from drone_rl.sim.scenes.bodies import take_bodies
+from drone_rl.sim.scenes.solids import solids_of
 from drone_rl.sim.tasks.applied_rules import AppliedRules, reward_terms
 from drone_rl.sim.tasks.common import Side
 from drone_rl.sim.tasks.geometry_kernel import GOAL
@@ -35,6 +36,11 @@ _DETOURS = 2.0
 """Least quotient of the metres that an episode's actions can go and those of the longest path."""
 _EXAMPLES = 300
 """Episodes that show where starts and goals of a scene are."""
+_SLACK = 0.01
+"""Metres by which objects in a scene may reach into its solids, such as into a floor."""
+_AROUND = torch.cartesian_prod(*[torch.linspace(-1.0, 1.0, 7, dtype=torch.float64)] * 3)
+_AROUND = _AROUND[_AROUND.abs().amax(1) == 1.0]
+"""Points of the surface of a box, half edges from its middle. Shape: (218, 3)."""
 _LAST_ENDS = ("STEP_LIMIT", "LOST_CONTROL")
 
 
@@ -293,21 +299,22 @@ class TermTask(ObjectTask):
             start = at_sites.start
             if start is None:
                 start = [random_state.uniform(*s.start.range_of(axis)) for axis in START_AXES]
-            placed, crowded = self._placed(s, start[:3], random_state, at_sites.places)
+            scene = [*at_sites.numbers[:1]]
+            if self.scenes and not scene:
+                scene = [random_state.randint(len(self.scenes))]
+            placed, crowded = self._placed(s, start[:3], random_state, at_sites.places, *scene)
             if not crowded:
                 phases = random_state.uniform(
                     size=len(self.each) if self.rules.compiled.events else 0
                 )
-                scene = at_sites.numbers
-                if self.scenes and not scene:
-                    scene = [random_state.randint(len(self.scenes))]
                 begun = [*start[:3], math.radians(start[3])]
-                numbers = np.concatenate([begun, *placed, scene, phases])
+                numbers = np.concatenate([begun, *placed, scene, at_sites.numbers[1:], phases])
                 return torch.from_numpy(numbers)
         raise InputError(
             f"task.objects: found no room for {crowded} in {_MOST_TRIES} tries that keeps "
             f"{s.objects[crowded].apart:g} m from other objects and {s.start.apart:g} m from the "
-            "start; give a larger range of x or y, a smaller apart, or fewer objects"
+            f"start{', outside of what is solid' if self.scenes else ''}; give a larger range of x "
+            "or y, a smaller apart, or fewer objects"
         )
 
     def _at_sites(self, s: TermTaskSettings, random_state: np.random.RandomState) -> "_AtSites":
@@ -336,22 +343,36 @@ class TermTask(ObjectTask):
         start: Any,
         random_state: np.random.RandomState,
         given: Mapping[tuple[str, int], Any],
+        scene: int = 0,
     ) -> tuple[list[Any], str]:
-        """Return centres of the objects, and the name of those that found no room, if any."""
+        """Return centres of the objects, and the name of those that found no room, if any.
+
+        Those that are not `given` have none inside of a scene's solids, if they have a range.
+        """
         placed: list[Any] = []
         for name, of in s.objects.items():
             for i in range(of.count):
                 for _ in range(_TRIES):
-                    place = given.get((name, i))
+                    place, ranges = given.get((name, i)), [of.range_of(axis) for axis in "xyz"]
+                    is_drawn = place is None and any(low < high for low, high in ranges)
                     if place is None:
-                        at = (random_state.uniform(*of.range_of(axis)) for axis in "xyz")
-                        place = np.array([*at])
-                    if _has_room(s, of, place, placed, start):
+                        place = np.array([random_state.uniform(*of) for of in ranges])
+                    if _has_room(s, of, place, placed, start) and not (
+                        is_drawn and self.scenes and self._is_solid(scene, of, place)
+                    ):
                         placed.append((of, place))
                         break
                 else:
                     return [], name
         return [place for _, place in placed], ""
+
+    def _is_solid(self, scene: int, of: ObjectSettings, place: Any) -> bool:
+        """Return whether something solid is in the box around an object; a floor touches it."""
+        solids = solids_of((self.surroundings[scene],), "cpu")
+        middle = torch.from_numpy(place)
+        ends = middle + (torch.tensor(of.reach, dtype=torch.float64) - _SLACK) * _AROUND
+        ways = solids.sweep(middle.expand_as(ends), ends).fraction
+        return bool((ways <= 1.0).any() | (solids.distances(middle[None]) <= 0.0).any())
 
     def start(self, sampled: Tensor, body: BodyState) -> ObjectState:
         """Return initial states; see `sample`."""

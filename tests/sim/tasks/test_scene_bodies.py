@@ -119,6 +119,18 @@ def test_a_body_is_drawn_and_touched_where_each_episode_places_it(tmp_path):
     assert worlds.state.touched[:, 1].tolist() == is_stopped.tolist()
 
 
+def test_a_body_is_placed_outside_of_what_is_solid(tmp_path):
+    """A crate of 1 m has 0.7 m before a wall at x = 18.2, and as much from there to one at 19.9."""
+    crate = {"body": "crate", "x": [17.0, 20.0], "y": 0.0}
+    of = settings(tmp_path, crate=crate)
+    file = Path(of.scene[0])  # pyright: ignore[reportAttributeAccessIssue]
+    thin = '<geom name="thin" type="box" size="0.001 5 5" pos="18.2 0 0"/></worldbody>'
+    file.write_text(SCENE.replace("</worldbody>", thin))
+    x = begun(of, 100).state.places[:, 1, 0]
+    assert bool(((x < 17.71) | (x > 18.69) & (x < 19.41)).all())
+    assert 0.3 < (x < 17.71).double().mean() < 0.7
+
+
 def test_a_body_that_is_touched_is_removed_until_the_next_episode(tmp_path):
     """Behind the coin, 5.7 m ahead, is the wall, 19.9 m ahead."""
     worlds = begun(settings(tmp_path))
