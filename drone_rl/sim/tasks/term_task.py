@@ -172,7 +172,7 @@ class TermTask(ObjectTask):
         s = settings
         self.scenes = tuple(load_scene(path, s.scene_up, s.scene_scale) for path in s.scene or ())
         s, self.surroundings, bodies = _with_bodies(s, self.scenes)
-        self._whole = s
+        self._whole: Any = s
         self.bodies = _named(s, bodies)
         self.name, objects = s.name, _named(s, s.objects)
         ends = tuple(ENDS.by_name[name] for name in s.end)
@@ -356,7 +356,7 @@ class TermTask(ObjectTask):
                     place, ranges = given.get((name, i)), [of.range_of(axis) for axis in "xyz"]
                     is_drawn = place is None and any(low < high for low, high in ranges)
                     if place is None:
-                        place = np.array([random_state.uniform(*of) for of in ranges])
+                        place = np.array([random_state.uniform(low, high) for low, high in ranges])
                     if _has_room(s, of, place, placed, start) and not (
                         is_drawn and self.scenes and self._is_solid(scene, of, place)
                     ):

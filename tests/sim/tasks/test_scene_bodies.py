@@ -187,8 +187,9 @@ def test_segmentation_and_names_are_those_of_the_role(tmp_path):
     scene = worlds.scene
     of_coin = worlds.render(worlds.state, worlds.view(modality="segmentation", height=9, width=9))
     assert scene.semantic_classes[of_coin[0, 4, 4]] is SemanticClass.TARGET
-    names = [(box.name, box.semantic_class) for box in scene.prop_boxes()]
-    assert names[:2] == [("coin", SemanticClass.TARGET), ("lamp", SemanticClass.DECORATION)]
+    lamp = scene.props.index(1)
+    assert scene.semantic_classes[lamp] is SemanticClass.DECORATION
+    assert scene.model.body(scene.model.geom_bodyid[lamp]).name == "lamp/lamp"
 
 
 @pytest.mark.parametrize(
