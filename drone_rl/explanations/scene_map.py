@@ -20,7 +20,7 @@ def section(context: Context) -> SceneMap | None:
         return None
     paths = fly_paths(context.env, context.restart())
     maps = []
-    for number, scene in enumerate(task.scenes):
+    for number, scene in enumerate(task.surroundings):
         if own := [path for path in paths if path.scene == number]:
             maps.append(Image.open(io.BytesIO(to_png(draw_map(scene, own)))).convert("RGB"))
     return SceneMap(by_start=by_start(paths), picture=np.array(stacked(maps)))

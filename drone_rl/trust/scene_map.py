@@ -196,7 +196,7 @@ def save_maps(policy: BasePolicy, folder: Path, settings: HeldOutSettings, seed:
     where: dict[str, Any] = {"device": settings.device, "renderer": settings.renderer}
     with policy.flying(EPISODES, seed=seed, **where) as (env, actor):
         task: Task[Any] = base_env(env).worlds.task
-        scenes = getattr(task, "scenes", ())
+        scenes = getattr(task, "surroundings", ())
         paths = fly_paths(env, actor) if scenes else []
     files = []
     for number, scene in enumerate(scenes):
