@@ -1,6 +1,8 @@
 """Maps of scenes: the floor plan with the paths of episodes, and the success rate by start."""
 
 import dataclasses
+import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from drone_rl.config.commands import HeldOutSettings
@@ -17,7 +20,7 @@ from drone_rl.envs import base_env
 from drone_rl.envs.rollout import Agent, as_agent, steps
 from drone_rl.policies.actor import Exploring
 from drone_rl.policies.policy import BasePolicy
-from drone_rl.sim.scenes import SceneFile
+from drone_rl.sim.scenes import SceneFile, Site
 from drone_rl.sim.scenes.solids import solids_of
 from drone_rl.sim.tasks import Task
 from drone_rl.sim.tasks.geometry_kernel import GOAL
@@ -32,7 +35,9 @@ _MARGIN = 0.3
 """Metres around the scene."""
 _LOWER = 0.5
 """Height of the lower section of the plan, as a fraction of the flight height above the floor."""
-_COLORS = {"success": css(GOOD), "contact": css(BAD), "other": css(FAINT)}
+_COLORS = {"success": css(GOOD), "contact": css(BAD), "other": css(INK)}
+_MARKS = {"success": "", "contact": "X", "other": "s"}
+"""Where episodes end."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -111,6 +116,7 @@ def draw_map(scene: SceneFile, paths: list[Path3D]) -> Figure:
     plan, bars = figure.subplots(1, 2, width_ratios=[3.4, 1])
     height = float(np.median([path.points[0, 2] for path in paths]))
     _draw_plan(plan, scene, height)
+    _draw_starts(plan, [site for site in scene.sites if site.name in rates])
     for path in sorted(paths, key=lambda path: path.outcome != "success"):
         _draw_path(plan, path)
     goals = np.unique(np.concatenate([path.goals for path in paths]).round(3), axis=0)
@@ -141,27 +147,50 @@ def _draw_plan(axis: Axes, scene: SceneFile, height: float) -> None:
     axis.spines[["top", "right"]].set_visible(False)
 
 
+def _draw_starts(axis: Axes, sites: Sequence[Site]) -> None:
+    """Outline the regions of starts, with the names that the success rates have."""
+    for site in sites:
+        x, y = site.half_size[:2]
+        angle, corners = math.radians(site.heading), np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
+        turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+        corners = corners @ turn + site.position[:2]
+        axis.fill(*corners.T, fill=False, ec=css(FAINT), ls="--", lw=1, zorder=4)
+        white = [withStroke(linewidth=3, foreground="white")]
+        low = corners[corners.sum(1).argmin()]
+        axis.text(
+            low[0],
+            low[1],
+            site.name,
+            color=css(FAINT),
+            size=9,
+            va="top",
+            path_effects=white,
+            zorder=6,
+        )
+
+
 def _draw_path(axis: Axes, path: Path3D) -> None:
-    color, x, y = _COLORS[path.outcome], *path.points[:, :2].T
-    style = ":" if path.outcome == "other" else "-"
-    axis.plot(x, y, style, color=color, lw=1.1, alpha=0.65, zorder=2)
-    axis.plot(x[0], y[0], "o", color=color, ms=3.5, zorder=3)
-    if path.outcome == "contact":
-        axis.plot(x[-1], y[-1], "X", color=color, mec="white", mew=0.5, ms=9, zorder=4)
+    color, mark, x, y = _COLORS[path.outcome], _MARKS[path.outcome], *path.points[:, :2].T
+    fails = path.outcome != "success"
+    style, alpha, z = ("--" if path.outcome == "other" else "-"), (1.0 if fails else 0.5), 2 + fails
+    axis.plot(x, y, style, color=color, lw=1.6 if fails else 1.0, alpha=alpha, zorder=z)
+    axis.plot(x[0], y[0], "o", color=color, ms=3.5, zorder=z)
+    axis.plot(x[-1], y[-1], marker=mark, color=color, mec="white", mew=0.5, ms=9, zorder=5)
 
 
 def _add_legend(figure: Figure, counts: dict[str, int], height: float) -> None:
     lines = {
-        "success": ("reaches the goal", "-", "o"),
-        "contact": ("touches something (X)", "-", "X"),
-        "other": ("neither: out of time or bounds", ":", "o"),
+        "success": ("reaches the goal", "-"),
+        "contact": ("touches something (X)", "-"),
+        "other": ("neither: out of time or bounds", "--"),
     }
     handles: list[Any] = [
-        Line2D([], [], color=_COLORS[name], ls=style, marker=mark, ms=5, label=f"{text}: {count}")
-        for name, (text, style, mark) in lines.items()
+        Line2D([], [], color=_COLORS[name], ls=style, marker=_MARKS[name], label=f"{text}: {count}")
+        for name, (text, style) in lines.items()
         if (count := counts[name])
     ]
     handles += [
+        Line2D([], [], color=css(INK), marker="o", ls="", ms=3.5, label="start of an episode"),
         Line2D([], [], color=css(NEXT_CUBE), marker="*", ls="", ms=12, label="goal"),
         Patch(color=css(INK), label=f"solid at {height:.1f} m, the height of flight"),
         Patch(color=css(EMPTY), label=f"solid at {_LOWER * height:.1f} m, flown over"),
