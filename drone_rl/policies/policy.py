@@ -236,6 +236,14 @@ class Policy(BasePolicy):
         return self.state.description.appearance
 
     @property
+    def unlike(self) -> dict[str, dict[str, Any]]:
+        """See `BasePolicy.unlike`; also "task.scene"."""
+        tasks = {"own": self.state.description.task.parameters, "flown": self.task}
+        scenes = {name: getattr(task, "scene", None) for name, task in tasks.items()}
+        is_other = scenes["own"] != scenes["flown"]
+        return super().unlike | ({"task.scene": scenes} if is_other else {})
+
+    @property
     def source(self) -> str:
         """Its file."""
         return str(self.path)
