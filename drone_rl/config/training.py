@@ -59,6 +59,8 @@ class TrainerSettings(Settings):
     stops the training; 0 skips the confirmation."""
     confirm_share: Fraction = 1.0
     """Fraction of these episodes that must reach every goal."""
+    confirm_interval: Annotated[int, Whole(1, unit="updates")] = 1
+    """Updates from one confirmation to the next while `target_share` is reached."""
     running_decay: Annotated[float, Real(0.0, 1.0, is_below=True)] = 0.99
     """Weight of the old value in the running reward, per episode: 0.99 averages about 100."""
     max_grad_norm: Annotated[float, Real(0.0, is_above=True)] | None = None

@@ -51,6 +51,7 @@ MAY_CHANGE = (
     "trainer.target_share",
     "trainer.confirm_episodes",
     "trainer.confirm_share",
+    "trainer.confirm_interval",
     "trainer.checkpoint_interval_s",
     "evaluate_after",
     "renderer",
@@ -263,14 +264,15 @@ def target_of(settings: TrainSettings) -> float | None:
 
 
 def confirm_interval_of(settings: TrainSettings) -> int | None:
-    """Return the updates between confirmations in a task whose largest reward is unknown.
+    """Return the updates between confirmations; None for no confirmations.
 
-    Confirmations are then a tenth of all episodes. None if they follow the target, or for none.
+    In a task whose largest reward is unknown they are a tenth of all episodes.
     """
     trainer = settings.trainer
-    is_known = as_task(settings.task).largest_reward is not None
-    if is_known or trainer.target_share is None or not trainer.confirm_episodes:
+    if trainer.target_share is None or not trainer.confirm_episodes:
         return None
+    if as_task(settings.task).largest_reward is not None:
+        return trainer.confirm_interval
     episodes = _EPISODES_PER_CONFIRMED * trainer.confirm_episodes
     return math.ceil(episodes / settings.collector.num_envs)
 

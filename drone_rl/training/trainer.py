@@ -65,7 +65,8 @@ class Trainer:
     """Called with the number of updates when the target is reached; returns whether the policy has
     solved its task. By default the target is enough."""
     confirm_interval: int | None = None
-    """Updates between two calls of `confirm` in a task without a target; None for no calls."""
+    """Updates between two calls of `confirm`; None for one at each update that reaches the target,
+    and for no calls without a target."""
     running_decay: float = 0.99
     """Weight of the old value in the running mean, per episode."""
     ends: Iterable[enum.IntEnum] = ()
@@ -190,11 +191,11 @@ class Trainer:
 
     def _is_solved(self) -> bool:
         progress, interval = self.progress, self.confirm_interval
-        if self.target is not None:
-            is_due = progress.running_reward >= self.target
+        if self.target is None:
+            is_due = interval is not None
         else:
-            is_due = interval is not None and progress.updates and progress.updates % interval == 0
-        if not is_due:
+            is_due = progress.running_reward >= self.target
+        if not is_due or not progress.updates or progress.updates % (interval or 1):
             return False
         begin = time.perf_counter()
         is_confirmed = self.confirm is None or self.confirm(progress.updates)

@@ -62,7 +62,7 @@ def test_a_task_whose_largest_reward_is_unknown_is_confirmed_regularly():
         assert confirm_interval_of(settings) == 125  # 2,000 episodes, 16 at a time: 200 confirm
         never = settings.trainer.replace(target_share=None)
         assert confirm_interval_of(settings.replace(trainer=never)) is None
-    assert confirm_interval_of(TrainSettings()) is None
+    assert confirm_interval_of(TrainSettings()) == 1
 
 
 def test_a_task_that_no_verdict_accepts_is_refused_before_the_training(tmp_path):

@@ -127,6 +127,11 @@ def test_training_is_solved_only_after_confirmation(make_trainer):
     assert run(trainer) == "solved"
     assert calls[0] == first and calls[2] == trainer.progress.updates
     assert calls == sorted(set(calls)) and trainer.progress.running_reward >= 0.5
+    calls.clear()
+    trainer = make_trainer(target=0.5, running_decay=0.9, total_frames=100_000)
+    trainer.confirm, trainer.confirm_interval = confirm, 7
+    assert run(trainer) == "solved"
+    assert calls[0] >= first and [n % 7 for n in calls] == [0, 0, 0]
 
 
 def test_without_a_target_confirmations_at_intervals_decide(make_trainer):
