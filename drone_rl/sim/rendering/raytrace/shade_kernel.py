@@ -198,7 +198,9 @@ def shade(
             start_block(shadows, 1)
             place = whole * direction
             set_point(shadows, 1, 0, place, faces[1].axes @ point.normal, whole)
-        color = light_surface(world, faces, 1, point, shot, shadows, 1, 0, not is_clear)
+        color = find_light(world.triangles, faces, 1, point, shot, not is_clear)
+        if not is_clear and shot.num_casting > 0:
+            color = add_casting(world, shadows, 1, 0, shot, color)
         texel = sample_surface(look.textures.texels, world.triangles, faces, 1, point, shot)
         color = wp.cw_mul(color, texel)
         color = finish(color, whole, shot)
@@ -221,45 +223,37 @@ def shade(
 
 
 @wp.func
-def light_surface(
-    world: World,
-    faces: wp.array[Surface],
-    which: int,
-    point: Point,
-    shot: Shot,
-    shadows: Shadows,
-    block: int,
-    number: int,
-    has_shadows: bool,
+def add_casting(
+    world: World, shadows: Shadows, block: int, number: int, shot: Shot, total: wp.vec3
 ) -> wp.vec3:
-    """Return the light that a surface reflects at a point, `number` of a block of shadows."""
-    _find_light(world.triangles, faces, which, point, shot, has_shadows)
-    total = wp.vec3(shot.lit[0])
-    if has_shadows and shot.num_casting > 0:
-        group = int(0)
-        light = int(0)
-        while light < shot.count:
-            if shot.lights[light].casts != 0:
-                group += 1
-                lit = shot.lit[group]
-                if wp.length_sq(lit) > 0.0 and not is_in_shadow(
-                    world, shadows, block, number, shot, light
-                ):
-                    total += lit
-            light += 1
+    """Add the light of `Shot.lit` that reaches a point, `number` of a block of shadows."""
+    group = int(0)
+    light = int(0)
+    while light < shot.count:
+        if shot.lights[light].casts != 0:
+            group += 1
+            lit = shot.lit[group]
+            if wp.length_sq(lit) > 0.0 and not is_in_shadow(
+                world, shadows, block, number, shot, light
+            ):
+                total += lit
+        light += 1
     return total
 
 
 @wp.func
-def _find_light(
+def find_light(
     triangles: Triangles,
     faces: wp.array[Surface],
     which: int,
     point: Point,
     shot: Shot,
     has_shadows: bool,
-) -> None:
-    """Write the light that a point reflects of each group, or of all lights, to `Shot.lit`."""
+) -> wp.vec3:
+    """Return the light that a point reflects without shadows.
+
+    If any light casts them, that of each such light is written to `Shot.lit`, see `add_casting`.
+    """
     pixel = point.depth * shot.pixel
     cell = Cell()
     if faces[which].face.kind == MESH:
@@ -268,14 +262,15 @@ def _find_light(
         cell = find_cell(faces[which].face, point.local, pixel)
     if cell.count == 1:
         _light_place(faces[which], point.local, point.smooth, shot, has_shadows, shot.lit, 0)
-        return
+        return wp.vec3(shot.lit[0])
     groups = int(1)
     scope = -2 - faces[which].number
     if has_shadows:
         groups += shot.num_casting
         scope = faces[which].number
     part = 8 * faces[which].face.part + cell.side
-    group = int(0)
+    total = wp.vec3()
+    group = int(1)
     while group < groups:
         shot.lit[group] = wp.vec3()
         group += 1
@@ -287,10 +282,12 @@ def _find_light(
             place, normal = _corner(triangles, faces[which].face, cell.side, key[2], key[3])
             _light_place(faces[which], place, normal, shot, has_shadows, shot.known, first)
             shot.keys[at] = key
-        of = int(0)
+        total += cell.weights[corner] * shot.known[first]
+        of = int(1)
         while of < groups:
             shot.lit[of] = shot.lit[of] + cell.weights[corner] * shot.known[first + of]
             of += 1
+    return total
 
 
 @wp.func

@@ -12,7 +12,8 @@ from drone_rl.sim.rendering.raytrace.shade_kernel import (
     OPAQUE,
     Point,
     Surface,
-    light_surface,
+    add_casting,
+    find_light,
     make_surface,
     sample_surface,
     shade,
@@ -305,7 +306,9 @@ def write_colors(
                         direction = wp.normalize(to_world @ ray)
                         shown = shade(look, world, hit, direction, shot, shadows, faces)
                     else:
-                        shown = light_surface(world, faces, 0, point, shot, shadows, 0, k, True)
+                        shown = find_light(world.triangles, faces, 0, point, shot, True)
+                        if shot.num_casting > 0:
+                            shown = add_casting(world, shadows, 0, k, shot, shown)
                         texels = look.textures.texels
                         texel = sample_surface(texels, world.triangles, faces, 0, point, shot)
                         shown = wp.cw_mul(shown, texel)
