@@ -86,7 +86,7 @@ def run_commands(own: Path, quick: bool) -> dict[str, str | None]:
     """Run all commands in a folder that holds `SCENE`; return why those that fail do, by name."""
     few = ["frames=100", "perplexity=10", "episodes=50"] if quick else []
     policy = f"policy={own / 'train'}"
-    frames = 20_000 if quick else 300_000
+    frames = 150_000 if quick else 400_000
 
     def has(*names: str) -> Callable[[Path], bool]:
         return lambda made: all(any(made.rglob(name)) for name in names)

@@ -18,7 +18,7 @@ from drone_rl.config.commands import (
 from drone_rl.config.values import NumEpisodes, Seed
 from drone_rl.utils.models import Seeded
 from drone_rl.utils.overrides import COMMAND
-from drone_rl.utils.progress import log, silent
+from drone_rl.utils.progress import bar_or_lines, log
 from drone_rl.utils.schema import FileName, Whole
 
 _log = logging.getLogger(__name__)
@@ -135,8 +135,8 @@ class VerdictCommand(AppearanceCommandSettings, JudgeSettings):
         """Judge one policy; return the exit status and the kind's name."""
         names = ("dynamics", "appearance", "certificate", "require", "shifts", "require_domain")
         options = {name: getattr(self, name) for name in names}
-        options["progress"] = None if self.require == "proved" else silent  # a bar of the proof
-        result = drone_rl.judge(self.policy, self, **options, **self.shared())
+        options |= {"progress": bar_or_lines(), **self.shared()}
+        result = drone_rl.judge(self.policy, self, **options)
         finish(result, folder / "verdict.json")
         if result.camera is not None:  # it is no baseline
             _draw_maps(self.load_policy(), folder, self, result)

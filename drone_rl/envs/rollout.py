@@ -53,7 +53,9 @@ class StepContext:
         sources, look = self.observer.sources, self.appearance
         return {name: s.read(self.state, self.inputs[name], look) for name, s in sources.items()}
 
-    def part(self, which: Tensor, inputs: Mapping[str, Tensor] | None = None) -> "StepContext":
+    def part(
+        self, which: Tensor | slice, inputs: Mapping[str, Tensor] | None = None
+    ) -> "StepContext":
         """Return the context of some of these environments, by their position, (j,).
 
         `inputs`, shapes (j, *), replace what their policies observe.

@@ -131,6 +131,7 @@ def evaluate(
     settings, seed = with_seed(from_arguments(EvaluateSettings, settings, changes, evaluate))
     progress = as_progress(progress)
     policy = as_policy(policy, outputs, task=task, dynamics=dynamics, appearance=appearance)
+    progress("repeated episodes")
     require_repeatable(policy, seed=seed.value, device=settings.device, renderer=settings.renderer)
     episodes, steps = settings.episodes, 3 if settings.baselines else 2
     with held_out_environments(policy, settings, seed) as (env, actor):

@@ -194,7 +194,6 @@ def judge_one(
     require = Instance(Literal["good", "proved"] | None).read(require, "require")
     changed = {"task": task, "dynamics": dynamics, "appearance": appearance}
     loaded = _loaded(policy, outputs, changed)
-    progress("policy and baselines", 0, 1)
     name = str(policy) if loaded is None or isinstance(policy, str | Path) else loaded.name
     if isinstance(loaded, Policy) and policy == "latest":  # which changes with the next run
         name = str(loaded.path)
@@ -240,8 +239,8 @@ def judge_one(
             claim=claim,
             unlike=None if loaded is None else loaded.unlike,
             seed=seed,
+            progress=progress,
         )
-    progress("judged", 1, 1)
     return Judgement(
         **dict(verdict) | {"known_scene": _known_scene(loaded)},
         policy=name,

@@ -44,9 +44,9 @@ class InGroups:
 
     def act(self, context: StepContext) -> Act:
         """See `Agent`."""
-        groups = torch.arange(len(context.rows), device=context.rows.device).split(self._size)
-        acts = [self._agent.act(context.part(group)).action for group in groups]
-        return Act(torch.cat(acts))
+        firsts = range(0, len(context.rows), self._size)
+        groups = (context.part(slice(first, first + self._size)) for first in firsts)
+        return Act(torch.cat([self._agent.act(group).action for group in groups]))
 
 
 class WithOtherInputs:
@@ -79,7 +79,7 @@ class WithOtherInputs:
         rows = context.rows
         other = (rows + by) % self._count
         inputs = {**context.inputs, **{name: self._last[name][other] for name in names}}
-        return context.part(torch.arange(len(rows), device=rows.device), inputs)
+        return context.part(slice(None), inputs)
 
 
 class CountsChanges:

@@ -91,6 +91,7 @@ def shifts(
     check_axes(settings.axes or ())
     loaded = as_policy(policy, outputs, task=task, dynamics=dynamics)
     begin = time.perf_counter()
+    progress("repeated episodes")
     require_repeatable(loaded, seed=seed.value, device=settings.device, renderer=settings.renderer)
     subject = EvaluatedPolicy.of(loaded, device=settings.device, renderer=settings.renderer)
     if settings.domain:

@@ -35,7 +35,7 @@ from drone_rl.trust.results import (
 from drone_rl.trust.rule import USABLE, Quantity, Rule, VerdictKind, decide, kinds_within
 from drone_rl.utils.exit_codes import NOT_CERTAIN
 from drone_rl.utils.intervals import mean_bounds, proportion, rate_of
-from drone_rl.utils.progress import Progress
+from drone_rl.utils.progress import Progress, silent
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed
 
 MANY = (2, 3, 5, 10, 20, 50, 100)
@@ -71,12 +71,13 @@ def judge_policy(
     claim: Proof | None = None,
     unlike: Mapping[str, Any] | None = None,
     seed: RootSeed | None = None,
+    progress: Progress = silent,
 ) -> Verdict:
     """Run so many episodes of a policy and of each baseline, and apply the rule.
 
-    Initial states are the same. `sampled` also runs the policy with sampled actions; for the other
-    arguments see `apply_rule`. In environments with images the policy's episodes are repeated, see
-    `drone_rl.trust.repetition`.
+    Initial states are the same. `sampled` also runs the policy with sampled actions; `progress` is
+    called with the name of each step; for the other arguments see `apply_rule`. In environments
+    with images the policy's episodes are repeated, see `drone_rl.trust.repetition`.
 
     Raises:
         InputError: The task has no baselines or strata, or an output is not finite.
@@ -84,16 +85,27 @@ def judge_policy(
     base, worlds = base_env(env), worlds_of(env)
     check_judged(worlds.task, worlds.dynamics.actions)  # before its episodes
     state = base.state_dict()
+    progress("baselines", 0, 6)
     baselines = run_baselines(
         env.batch_size[0], worlds.task, state, episodes, str(worlds.device), worlds.dynamics
     )
     drawn = None
+    progress("most probable actions", 1, 6)
     greedy = rollout(actor, env, episodes, compiled=True)
     if sampled:
         base.load_state_dict(state)
+        progress("sampled actions", 2, 6)
         drawn = rollout(actor, env, episodes, greedy=False)
     base.load_state_dict(state)
-    sees = base.pixels
+    repetition = camera = inputs = None
+    if base.pixels:
+        progress("repeated episodes", 3, 6)
+        repetition = repeat(env, actor, greedy)
+        progress("images of other episodes", 4, 6)
+        camera = exchange_images(env, actor, greedy)
+        progress("inputs of other episodes", 5, 6)
+        inputs = exchange_inputs(env, actor, greedy)
+    progress("judged", 6, 6)
     return apply_rule(
         greedy,
         baselines,
@@ -102,9 +114,9 @@ def judge_policy(
         claim=claim,
         unlike=unlike,
         seed=seed,
-        repetition=repeat(env, actor, greedy) if sees else None,
-        camera=exchange_images(env, actor, greedy) if sees else None,
-        inputs=exchange_inputs(env, actor, greedy) if sees else None,
+        repetition=repetition,
+        camera=camera,
+        inputs=inputs,
     )
 
 
