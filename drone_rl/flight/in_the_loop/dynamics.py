@@ -51,6 +51,7 @@ class InTheLoopDynamics:
         self._quadrotor = Quadrotor(settings, actions)
         self.actions = self._quadrotor.actions
         self.mount, self.timestep = self._quadrotor.mount, self._quadrotor.timestep
+        self.stride = self._quadrotor.stride
         self.is_random = self._quadrotor.is_random
         """As without the loop, so that the same worlds are sampled."""
         self.needs_obstacles = True
