@@ -37,8 +37,8 @@ class Quadrotor:
         """Whether there are gusts, which `seeds` make different."""
         self.needs_obstacles = self.stops_at_solids = True
         self.timestep: float | None = settings.control_timestep
-        speeds = {"velocity": actions.forward_speed}
-        self.stride = speeds.get(actions.kind, actions.move_speed) * settings.control_timestep
+        speed = actions.forward_speed if actions.kind == "velocity" else actions.move_speed
+        self.stride = speed * settings.control_timestep
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copy the settings; Warp's structs can't be copied."""

@@ -222,10 +222,8 @@ class ObjectTask(Task[ObjectState]):
         places = before.new_zeros(count, solids.count, 3)
         places[..., 2] = -FAR_BELOW
         places[torch.arange(count), torch.arange(count)] = 0.0
-        rows, radius = (
-            torch.arange(count, device=before.device).repeat(len(state)),
-            0.5 * self.drone_size,
-        )
+        rows = torch.arange(count, device=before.device).repeat(len(state))
+        radius = 0.5 * self.drone_size
         distance = solids.nearest_at(now, places, rows).distance
         fraction = solids.sweep_at(before, now, radius, places, rows).fraction
         is_touching = distance <= radius + float(TOUCHING)
