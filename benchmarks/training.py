@@ -131,5 +131,5 @@ def evaluate(setup: Setup, run: Path) -> dict[str, float]:
     folder = run / "evaluation"
     settings = ["seed=0", "baselines=false", "videos=0", f"device={setup.device}"]
     settings += [f"episodes={setup.episodes}", f"hydra.run.dir={folder}"]
-    call("evaluate", f"checkpoint={run}", *settings)
+    call("evaluate", f"policy={run}", *settings)
     return read_json(folder / "evaluation.json")["greedy"]["success"]
