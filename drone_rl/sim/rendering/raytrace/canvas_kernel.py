@@ -114,14 +114,33 @@ def copy_owners(canvas: Canvas, numbers: wp.array[int], values: wp.array[int]) -
     ...
 
 
-_AXES = """
+@wp.func_native("""
+const int left = tile % canvas.across * 8, top = tile / canvas.across * 8;
+const int wide = canvas.width - left < 8 ? canvas.width - left : 8;
+const int tall = canvas.height - top < 8 ? canvas.height - top : 8;
+const float *const __restrict from = (const float *)colors.data;
+unsigned char bytes[192];
+for (int i = 0; i < 192; ++i) bytes[i] = (unsigned char)(int)(255.0f * from[i]);
+for (int row = 0; row < tall; ++row) {
+    auto *const to = (unsigned char *)(pixels.data + (top + row) * canvas.width + left);
+    for (int i = 0; i < 3 * wide; ++i) to[i] = bytes[24 * row + i];
+}""")
+def copy_colors(
+    canvas: Canvas, tile: int, colors: wp.array[wp.vec3], pixels: wp.array[wp.vec3ub]
+) -> None:
+    """Write the colors of a tile, 0 to 1, to an image, rounded down to bytes."""
+    ...
+
+
+AXES = """
 const auto &m = geom.into.data;
 const float x_scale = canvas.x_scale, y_scale = canvas.y_scale;
 const float ex = geom.eye[0], ey = geom.eye[1], ez = geom.eye[2];
 """
+"""The camera's attitude `m` and position in the frame of a geom."""
 
 _BOUNDS = f"""
-{_AXES}
+{AXES}
 float x[8], y[8], z[8];
 for (int k = 0; k < 8; ++k) {{
     const float px = (k & 1 ? geom.reach[0] : -geom.reach[0]) - ex;
@@ -173,7 +192,7 @@ def bounds(canvas: Canvas, geom: GeomView) -> wp.vec4i:
 
 
 @wp.func_native(f"""
-{_AXES}
+{AXES}
 float depth = m[0][2] * ex + m[1][2] * ey + m[2][2] * ez;
 for (int c = 0; c < 3; ++c) depth -= wp::abs(m[c][2]) * geom.reach[c];
 return wp::max(depth, 0.0f);
@@ -323,7 +342,7 @@ const bool is_inside = (geom.kind == {int(CAPSULE)}) & (c0 + ends * ends < 0.0f)
 
 
 @wp.func_native(f"""
-{_AXES.replace("ex =", "px =").replace("ey =", "py =").replace("ez =", "pz =")}
+{AXES.replace("ex =", "px =").replace("ey =", "py =").replace("ez =", "pz =")}
 const int left = part[0], right = part[1], top = part[2], bottom = part[3];
 const float far = canvas.far;
 {SOLID}
@@ -494,7 +513,7 @@ _LEAF = """
 
 
 @wp.func_native(f"""
-{_AXES}
+{AXES}
 const float x0 = x_scale * m[0][0], x1 = x_scale * m[1][0], x2 = x_scale * m[2][0];
 const float y0 = -y_scale * m[0][1], y1 = -y_scale * m[1][1], y2 = -y_scale * m[2][1];
 const float z0 = -m[0][2], z1 = -m[1][2], z2 = -m[2][2];

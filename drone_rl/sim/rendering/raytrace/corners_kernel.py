@@ -1,13 +1,14 @@
 """Triangles into which MuJoCo's OpenGL divides geoms: it lights their corners.
 
 Flat faces have a grid of rectangles, round solids slices and stacks; a corner is a pair of whole
-numbers on that grid, so that the next pixels can use its color again.
+numbers on that grid, so that the next pixels can use its color again. Light changes evenly over a
+triangle, so that it is found once for a `Patch` of a flat face.
 """
 
 import warp as wp
 
 from drone_rl.sim.rendering.raytrace.cast_kernel import MESH
-from drone_rl.sim.rendering.raytrace.intersection_kernel import BOX, CAPSULE, PLANE
+from drone_rl.sim.rendering.raytrace.intersection_kernel import BOX, CAPSULE, PLANE, ROUND
 from drone_rl.sim.rendering.raytrace.structs_kernel import struct
 from drone_rl.sim.rendering.raytrace.surfaces_kernel import (
     DISK,
@@ -19,10 +20,11 @@ from drone_rl.sim.rendering.raytrace.surfaces_kernel import (
     round_part,
     unroll,
 )
+from drone_rl.sim.rendering.raytrace.triangles_kernel import Triangles, triangle_corner
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-_SMALL = wp.constant(2.0)
+SMALL = wp.constant(2.0)
 """Pixels: in smaller triangles the point itself is lit, which is faster and looks the same."""
 
 
@@ -36,6 +38,8 @@ class Face:
     size: wp.vec3
     normal: wp.vec3
     """Of a flat face or triangle."""
+    is_round: bool
+    has_patches: bool
     axes: wp.vec2i
     """Of the grid on a flat face."""
     first: wp.vec2
@@ -53,13 +57,42 @@ class Face:
 
 
 @struct
+class Patch:
+    """A rectangle of a flat face's grid, or a triangle of a mesh: where its corners are.
+
+    A place p, geom's frame, has the coordinates (across @ p, up @ p) + shift, from 0 to 1.
+    """
+
+    state: int
+    """NEW, PLACED or LIT."""
+    across: wp.vec3
+    up: wp.vec3
+    shift: wp.vec2
+    cut: wp.vec3
+    """Its second half is where the coordinates (x, y, 1) and this have a positive product."""
+    edge: float
+    """Metres; patches with a shorter edge than `SMALL` pixels are lit at each point."""
+    column: int
+    """The first corner's place on the grid."""
+    row: int
+
+
+NEW = wp.constant(0)
+"""The patch of another face was lit last."""
+PLACED = wp.constant(1)
+"""Coordinates are known, ..."""
+LIT = wp.constant(2)
+"""... and so is the light."""
+
+
+@struct
 class Cell:
-    """The triangle that a point is on."""
+    """The triangle of a round solid that a point is on."""
 
     count: int
     """3, or 1 if the triangle is so small that the point itself is lit."""
     x: wp.vec3i
-    """Each corner's place on the grid; of a mesh, its number."""
+    """Each corner's place on the grid."""
     y: wp.vec3i
     weights: wp.vec3
     side: int
@@ -67,11 +100,42 @@ class Cell:
 
 
 @wp.func
-def find_cell(face: Face, local: wp.vec3, pixel: float) -> Cell:
-    """Return the triangle around a point of a face that shows `pixel` metres in a pixel."""
-    if face.kind == PLANE or face.kind == BOX:
-        return _find_rectangle(face, local, pixel)
-    return _find_round(face, local, pixel)
+def place_rectangle(face: Face, local: wp.vec3) -> Patch:
+    """Return the rectangle around a place on the grid of a plane or a box."""
+    column, row = _number(face, 0, local[face.axes[0]]), _number(face, 1, local[face.axes[1]])
+    left, low = _line(face, 0, column), _line(face, 1, row)
+    wide = wp.max(_line(face, 0, column + 1) - left, 1e-9)
+    high = wp.max(_line(face, 1, row + 1) - low, 1e-9)
+    patch = Patch()
+    patch.state = PLACED
+    patch.across[face.axes[0]] = 1.0 / wide
+    patch.up[face.axes[1]] = 1.0 / high
+    patch.shift = wp.vec2(-left / wide, -low / high)
+    patch.cut = wp.vec3(1.0, 1.0, -1.0)
+    if face.is_main:
+        patch.cut = wp.vec3(-1.0, 1.0, 0.0)
+    patch.edge = wp.max(wide, high)
+    patch.column = column
+    patch.row = row
+    return patch
+
+
+@wp.func
+def place_triangle(triangles: Triangles, triangle: int) -> Patch:
+    """Return a triangle of a mesh, whose coordinates are the weights of its later corners."""
+    first = triangle_corner(triangles, triangle, 0)
+    one = triangle_corner(triangles, triangle, 1) - first
+    two = triangle_corner(triangles, triangle, 2) - first
+    normal = wp.cross(one, two)
+    per_area = 1.0 / wp.max(wp.length_sq(normal), 1e-30)
+    patch = Patch()
+    patch.state = PLACED
+    patch.across = per_area * wp.cross(two, normal)
+    patch.up = per_area * wp.cross(normal, one)
+    patch.shift = -wp.vec2(wp.dot(patch.across, first), wp.dot(patch.up, first))
+    patch.cut = wp.vec3(0.0, 0.0, -1.0)
+    patch.edge = wp.length(one)
+    return patch
 
 
 @wp.func
@@ -90,26 +154,6 @@ def _number(face: Face, axis: int, place: float) -> int:
     if face.counts[axis] < 0:
         return number
     return wp.clamp(number, -1, face.counts[axis])
-
-
-@wp.func
-def _point_alone() -> Cell:
-    cell = Cell()
-    cell.count = 1
-    return cell
-
-
-@wp.func
-def _find_rectangle(face: Face, local: wp.vec3, pixel: float) -> Cell:
-    x, y = local[face.axes[0]], local[face.axes[1]]
-    column, row = _number(face, 0, x), _number(face, 1, y)
-    left, low = _line(face, 0, column), _line(face, 1, row)
-    wide = wp.max(_line(face, 0, column + 1) - left, 1e-9)
-    high = wp.max(_line(face, 1, row + 1) - low, 1e-9)
-    if wp.max(wide, high) < _SMALL * pixel:
-        return _point_alone()
-    right, up = wp.clamp((x - left) / wide, 0.0, 1.0), wp.clamp((y - low) / high, 0.0, 1.0)
-    return _halve(column, row, right, up, face.is_main)
 
 
 @wp.func
@@ -139,14 +183,16 @@ def _halve(column: int, row: int, x: float, y: float, is_main: bool) -> Cell:
 
 
 @wp.func
-def _find_round(face: Face, local: wp.vec3, pixel: float) -> Cell:
-    """Find a triangle of a ball, ellipsoid, capsule or cylinder, in slices and stacks.
+def find_cell(face: Face, local: wp.vec3, pixel: float) -> Cell:
+    """Return the triangle around a point of a round solid that shows `pixel` metres in a pixel.
 
-    Triangles around a pole have it as one corner.
+    Triangles are in slices and stacks; those around a pole have it as one corner.
     """
     size = radii(face.kind, face.size)
-    if TURN * wp.max(size[0], size[2]) < _SMALL * pixel * float(face.slices):
-        return _point_alone()
+    if TURN * wp.max(size[0], size[2]) < SMALL * pixel * float(face.slices):
+        alone = Cell()
+        alone.count = 1
+        return alone
     part = round_part(face.kind, face.part, face.size, local)
     stacks = _stacks(face, part)
     at = unroll(face.kind, face.size, part, local)
@@ -207,12 +253,6 @@ def find_corner(face: Face, side: int, x: int, y: int) -> tuple[wp.vec3, wp.vec3
 
 
 @wp.func
-def is_tiny(first: wp.vec3, second: wp.vec3, pixel: float) -> bool:
-    """Return whether a triangle of a mesh with these corners is lit at the point itself."""
-    return wp.length_sq(second - first) < (_SMALL * pixel) * (_SMALL * pixel)
-
-
-@wp.func
 def grid_face(
     kind: int,
     part: int,
@@ -231,6 +271,8 @@ def grid_face(
     face.part = part
     face.size = size
     face.normal = normal
+    face.is_round = kind != MESH and part == ROUND
+    face.has_patches = True
     face.slices = slices
     face.stacks = stacks
     if kind == PLANE:
@@ -251,6 +293,7 @@ def grid_face(
         face.is_main = part == 0 or part == 3 or part == 4
     elif kind != MESH:
         face.level = size[1] * normal[2]
+        face.has_patches = False
     return face
 
 

@@ -72,6 +72,7 @@ class LookEncoder:
             "keys": (_CORNERS, wp.vec4i),
             "known": (_CORNERS * groups, wp.vec3),
             "lit": (groups, wp.vec3),
+            "slopes": (2 * 6 * groups, wp.vec3),
         }
         self._corners = {
             name: wp.empty((workers, size), dtype=kind, device="cpu")

@@ -116,6 +116,7 @@ class Look:
     known: wp.array2d[wp.vec3]
     """Their colors, by group of lights: see `Shot.lit`."""
     lit: wp.array2d[wp.vec3]
+    slopes: wp.array2d[wp.vec3]
 
 
 @struct
@@ -151,6 +152,9 @@ class Shot:
     known: wp.array[wp.vec3]
     lit: wp.array[wp.vec3]
     """What a point reflects of all lights without shadows, and of each that casts shadows."""
+    slopes: wp.array[wp.vec3]
+    """Light on two patches, by group of lights: of each half at coordinates (0, 0) and its change
+    along each coordinate; see `corners_kernel`."""
 
 
 @wp.func
@@ -212,6 +216,7 @@ def start_image(
     shot.keys = look.keys[worker]
     shot.known = look.known[worker]
     shot.lit = look.lit[worker]
+    shot.slopes = look.slopes[worker]
     fill(shot.keys, 0, shot.keys.shape[0], wp.vec4i(-1, 0, 0, 0))
     return shot
 
@@ -254,15 +259,18 @@ def _place_light(lighting: Lighting, number: int, env: int) -> PlacedLight:
 
 
 @wp.func
-def sky(texels: wp.array[wp.uint32], direction: wp.vec3, shot: Shot) -> wp.vec3:
-    """Return the color, 0 to 1, of a ray that hits nothing. `direction`: world frame."""
+def sky(texels: wp.array[wp.uint32], ray: wp.vec3, shot: Shot) -> wp.vec3:
+    """Return the color, 0 to 1, of a ray that hits nothing.
+
+    `ray`: world frame, with length 1 along the camera's axis.
+    """
     color = wp.vec3()
     if shot.horizon[0] >= 0.0:
-        color = shot.horizon + wp.max(direction[2], 0.0) * (shot.zenith - shot.horizon)
+        up = wp.max(wp.normalize(ray)[2], 0.0)
+        color = shot.horizon + up * (shot.zenith - shot.horizon)
     elif shot.skybox.width > 0:
-        ray = _turn_sky(direction / wp.dot(direction, shot.forward))
         right, down = _turn_sky(shot.right), _turn_sky(shot.down)
-        color = sample_cube(texels, shot.skybox, ray, right, down)
+        color = sample_cube(texels, shot.skybox, _turn_sky(ray), right, down)
     return clip(shot.exposure * color)
 
 

@@ -7,12 +7,16 @@ import warp as wp
 
 from drone_rl.sim.rendering.raytrace.cast_kernel import MESH, Hit, World, cast
 from drone_rl.sim.rendering.raytrace.corners_kernel import (
-    Cell,
+    LIT,
+    NEW,
+    SMALL,
     Face,
+    Patch,
     find_cell,
     find_corner,
     grid_face,
-    is_tiny,
+    place_rectangle,
+    place_triangle,
 )
 from drone_rl.sim.rendering.raytrace.intersection_kernel import PLANE
 from drone_rl.sim.rendering.raytrace.light_kernel import (
@@ -46,8 +50,9 @@ from drone_rl.sim.rendering.raytrace.texels_kernel import (
 )
 from drone_rl.sim.rendering.raytrace.triangles_kernel import (
     Triangles,
+    smooth_normal,
     triangle_corner,
-    triangle_weights,
+    triangle_normal,
 )
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -80,6 +85,13 @@ class Surface:
     mapping: Mapping
     image: Image
     """Its texture, if any."""
+    patch: Patch
+    """Of a flat face: what was lit last."""
+    is_simple: bool
+    """Whether `shade_patch` shades it: it is opaque and has patches on which textures are even."""
+    right: wp.vec3
+    """Step between pixels at distance 1 along the camera's axis, geom's frame."""
+    down: wp.vec3
 
 
 @struct
@@ -93,10 +105,6 @@ class Point:
     """Metres along the camera's axis."""
     normal: wp.vec3
     """Of the surface."""
-    smooth: wp.vec3
-    """Unit normal for shading; of a mesh, interpolated."""
-    weights: wp.vec3
-    """Of the corners of a mesh's triangle."""
 
 
 @wp.func
@@ -143,6 +151,52 @@ def make_surface(
         made.mapping.scale = surfaces.scale[row, number]
         made.mapping.shift = surfaces.shift[number]
         made.image = get_image(textures, made.mapping.texture)
+    back = wp.transpose(axes)
+    made.right = back @ shot.right
+    made.down = back @ shot.down
+    return made
+
+
+@wp.func
+def start_face(triangles: Triangles, faces: wp.array[Surface], which: int, part: int) -> None:
+    """Prepare `faces[which]`, which `make_surface` made, for points of a face or triangle."""
+    kind = faces[which].face.kind
+    patch = Patch()
+    if kind == MESH:
+        faces[which].face.part = part
+        faces[which].face.normal = triangle_normal(triangles, part)
+        patch = place_triangle(triangles, part)
+    faces[which].patch = patch
+    mapping, face = faces[which].mapping, faces[which].face
+    if mapping.texture >= 0 and mapping.kind != CUBE and not face.is_round:
+        faces[which].mapping = _even_mapping(triangles, face, mapping, patch)
+    is_even = mapping.texture < 0 or faces[which].mapping.is_even
+    faces[which].is_simple = face.has_patches and is_even and faces[which].opacity >= OPAQUE
+
+
+@wp.func
+def _even_mapping(triangles: Triangles, face: Face, mapping: Mapping, patch: Patch) -> Mapping:
+    """Return how a texture lies on a flat face or a triangle; see `Mapping.is_even`."""
+    made = mapping
+    made.is_even = True
+    if face.kind == MESH and mapping.kind == WRAPPED:
+        first = triangles.texcoords[3 * face.part]
+        one = triangles.texcoords[3 * face.part + 1] - first
+        two = triangles.texcoords[3 * face.part + 2] - first
+        scale, shift = mapping.scale, mapping.shift
+        origin = first + patch.shift[0] * one + patch.shift[1] * two
+        made.start = wp.cw_mul(origin, wp.vec2(scale[0], scale[1])) + shift
+        made.across = scale[0] * (one[0] * patch.across + two[0] * patch.up)
+        made.down = scale[1] * (one[1] * patch.across + two[1] * patch.up)
+        return made
+    start = texture_place(mapping, face.kind, face.part, face.size, face.normal, wp.vec3())
+    made.start = wp.vec2(start[0], start[1])
+    for axis in range(3):
+        unit = wp.vec3()
+        unit[axis] = 1.0
+        step = texture_place(mapping, face.kind, face.part, face.size, face.normal, unit) - start
+        made.across[axis] = step[0]
+        made.down[axis] = step[1]
     return made
 
 
@@ -182,16 +236,12 @@ def shade(
             eye,
             behind.local_normal,
         )
+        start_face(world.triangles, faces, 1, behind.part)
         point = Point()
         point.local = behind.local
         point.ray = back @ direction / cosine
         point.depth = whole * cosine
         point.normal = behind.local_normal
-        point.smooth = back @ behind.normal
-        if behind.kind == PLANE:
-            point.smooth = faces[1].face.normal
-        if behind.kind == MESH:
-            point.weights = triangle_weights(world.triangles, behind.part, eye, back @ direction)
         opacity = float(faces[1].opacity)
         is_clear = opacity < OPAQUE and layer + 1 < _LAYERS
         if not is_clear and shot.num_casting > 0:
@@ -201,7 +251,7 @@ def shade(
         color = find_light(world.triangles, faces, 1, point, shot, not is_clear)
         if not is_clear and shot.num_casting > 0:
             color = add_casting(world, shadows, 1, 0, shot, color)
-        texel = sample_surface(look.textures.texels, world.triangles, faces, 1, point, shot)
+        texel = sample_surface(look.textures.texels, faces, 1, point)
         color = wp.cw_mul(color, texel)
         color = finish(color, whole, shot)
         if is_clear:
@@ -218,7 +268,7 @@ def shade(
             left = 0.0
             layer = _LAYERS
     if left > 0.0:
-        total += left * sky(look.textures.texels, direction, shot)
+        total += left * sky(look.textures.texels, direction / cosine, shot)
     return total
 
 
@@ -254,52 +304,169 @@ def find_light(
 
     If any light casts them, that of each such light is written to `Shot.lit`, see `add_casting`.
     """
-    pixel = point.depth * shot.pixel
-    cell = Cell()
-    if faces[which].face.kind == MESH:
-        cell = _mesh_cell(triangles, faces[which].face.part, pixel, point.weights)
-    else:
-        cell = find_cell(faces[which].face, point.local, pixel)
-    if cell.count == 1:
-        _light_place(faces[which], point.local, point.smooth, shot, has_shadows, shot.lit, 0)
+    kind = faces[which].face.kind
+    if not faces[which].face.has_patches:
+        return _light_cell(triangles, faces, which, point, shot, has_shadows)
+    is_lit = reach_patch(triangles, faces, which, point, shot, has_shadows)
+    x, y = _coordinates(faces, which, point.local)
+    if not is_lit:
+        normal = faces[which].face.normal
+        if kind == MESH:
+            weights = wp.vec3(1.0 - x - y, x, y)
+            normal = smooth_normal(triangles, faces[which].face.part, weights)
+        _light_place(faces[which], point.local, normal, shot, has_shadows, shot.lit, 0)
         return wp.vec3(shot.lit[0])
-    groups = int(1)
-    scope = -2 - faces[which].number
-    if has_shadows:
-        groups += shot.num_casting
-        scope = faces[which].number
-    part = 8 * faces[which].face.part + cell.side
-    total = wp.vec3()
-    group = int(1)
-    while group < groups:
-        shot.lit[group] = wp.vec3()
+    first = 6 * which * (1 + shot.num_casting)
+    if wp.dot(faces[which].patch.cut, wp.vec3(x, y, 1.0)) > 0.0:
+        first += 3
+    group = int(0)
+    while group < _groups(shot, has_shadows):
+        at = first + 6 * group
+        shot.lit[group] = shot.slopes[at] + x * shot.slopes[at + 1] + y * shot.slopes[at + 2]
         group += 1
-    for corner in range(3):
-        key = wp.vec4i(scope, part, cell.x[corner], cell.y[corner])
-        at = _hash(key) & (shot.keys.shape[0] - 1)
-        first = at * (1 + shot.num_casting)
-        if not _is_same(shot.keys[at], key):
-            place, normal = _corner(triangles, faces[which].face, cell.side, key[2], key[3])
-            _light_place(faces[which], place, normal, shot, has_shadows, shot.known, first)
-            shot.keys[at] = key
-        total += cell.weights[corner] * shot.known[first]
-        of = int(1)
-        while of < groups:
-            shot.lit[of] = shot.lit[of] + cell.weights[corner] * shot.known[first + of]
-            of += 1
-    return total
+    return wp.vec3(shot.lit[0])
 
 
 @wp.func
-def _mesh_cell(triangles: Triangles, triangle: int, pixel: float, weights: wp.vec3) -> Cell:
-    cell = Cell()
-    cell.count = 1
-    first = triangle_corner(triangles, triangle, 0)
-    if not is_tiny(first, triangle_corner(triangles, triangle, 1), pixel):
-        cell.count = 3
-        cell.x = wp.vec3i(0, 1, 2)
-        cell.weights = weights
-    return cell
+def reach_patch(
+    triangles: Triangles,
+    faces: wp.array[Surface],
+    which: int,
+    point: Point,
+    shot: Shot,
+    has_shadows: bool,
+) -> bool:
+    """Make the patch of a face that of a point, and light it; False if it is too small for that."""
+    x, y = _coordinates(faces, which, point.local)
+    is_new = faces[which].patch.state == NEW or _is_out(x) or _is_out(y)
+    if is_new and faces[which].face.kind != MESH:
+        faces[which].patch = place_rectangle(faces[which].face, point.local)
+    if faces[which].patch.edge < SMALL * point.depth * shot.pixel:
+        return False
+    if faces[which].patch.state != LIT:
+        first = 6 * which * (1 + shot.num_casting)
+        _light_patch(triangles, faces, which, shot, has_shadows, first)
+        faces[which].patch.state = LIT
+    return True
+
+
+@wp.func
+def _coordinates(faces: wp.array[Surface], which: int, local: wp.vec3) -> tuple[float, float]:
+    """Return the coordinates of a place on the patch of a face; see `Patch`."""
+    x = wp.dot(faces[which].patch.across, local) + faces[which].patch.shift[0]
+    y = wp.dot(faces[which].patch.up, local) + faces[which].patch.shift[1]
+    return x, y
+
+
+@wp.func
+def _is_out(coordinate: float) -> bool:
+    return coordinate < 0.0 or coordinate > 1.0
+
+
+@wp.func
+def _groups(shot: Shot, has_shadows: bool) -> int:
+    """Return the number of groups of lights; see `Shot.lit`."""
+    if has_shadows:
+        return 1 + shot.num_casting
+    return 1
+
+
+@wp.func
+def _light_patch(
+    triangles: Triangles,
+    faces: wp.array[Surface],
+    which: int,
+    shot: Shot,
+    has_shadows: bool,
+    first: int,
+) -> None:
+    """Light the corners of a patch and write its `Shot.slopes` from `first` on."""
+    groups = _groups(shot, has_shadows)
+    corners = int(4)
+    if faces[which].face.kind == MESH:
+        corners = 3
+    corner = int(0)
+    while corner < corners:
+        x, y = int(corner), int(0)
+        if corners == 4:
+            x = faces[which].patch.column + corner % 2
+            y = faces[which].patch.row + corner // 2
+        known = _light_corner(triangles, faces, which, 0, x, y, shot, has_shadows)
+        group = int(0)
+        while group < groups:
+            shot.slopes[first + 6 * group + corner] = shot.known[known + group]
+            group += 1
+        corner += 1
+    group = int(0)
+    while group < groups:
+        at = first + 6 * group
+        base, right = wp.vec3(shot.slopes[at]), wp.vec3(shot.slopes[at + 1])
+        above, last = wp.vec3(shot.slopes[at + 2]), wp.vec3(shot.slopes[at + 3])
+        shot.slopes[at + 1] = right - base
+        if faces[which].face.is_main:  # from the first to the last corner
+            shot.slopes[at + 2] = last - right
+            shot.slopes[at + 3] = base
+            shot.slopes[at + 4] = last - above
+            shot.slopes[at + 5] = above - base
+        else:
+            shot.slopes[at + 2] = above - base
+            shot.slopes[at + 3] = right + above - last
+            shot.slopes[at + 4] = last - above
+            shot.slopes[at + 5] = last - right
+        group += 1
+
+
+@wp.func
+def _light_cell(
+    triangles: Triangles,
+    faces: wp.array[Surface],
+    which: int,
+    point: Point,
+    shot: Shot,
+    has_shadows: bool,
+) -> wp.vec3:
+    """Return the light on a round solid; see `find_light`."""
+    cell = find_cell(faces[which].face, point.local, point.depth * shot.pixel)
+    if cell.count == 1:
+        _light_place(faces[which], point.local, point.normal, shot, has_shadows, shot.lit, 0)
+        return wp.vec3(shot.lit[0])
+    group = int(0)
+    while group < _groups(shot, has_shadows):
+        shot.lit[group] = wp.vec3()
+        group += 1
+    for corner in range(3):
+        x, y = cell.x[corner], cell.y[corner]
+        known = _light_corner(triangles, faces, which, cell.side, x, y, shot, has_shadows)
+        of = int(0)
+        while of < _groups(shot, has_shadows):
+            shot.lit[of] = shot.lit[of] + cell.weights[corner] * shot.known[known + of]
+            of += 1
+    return wp.vec3(shot.lit[0])
+
+
+@wp.func
+def _light_corner(
+    triangles: Triangles,
+    faces: wp.array[Surface],
+    which: int,
+    side: int,
+    x: int,
+    y: int,
+    shot: Shot,
+    has_shadows: bool,
+) -> int:
+    """Return where `Shot.known` has the light on a corner of a face's grid."""
+    scope = faces[which].number
+    if not has_shadows:
+        scope = -2 - scope
+    key = wp.vec4i(scope, 8 * faces[which].face.part + side, x, y)
+    at = _hash(key) & (shot.keys.shape[0] - 1)
+    first = at * (1 + shot.num_casting)
+    if not _is_same(shot.keys[at], key):
+        place, normal = _corner(triangles, faces[which].face, side, x, y)
+        _light_place(faces[which], place, normal, shot, has_shadows, shot.known, first)
+        shot.keys[at] = key
+    return first
 
 
 @wp.func
@@ -363,54 +530,34 @@ def _is_same(a: wp.vec4i, b: wp.vec4i) -> bool:
 @wp.func
 def sample_surface(
     texels: wp.array[wp.uint32],
-    triangles: Triangles,
     faces: wp.array[Surface],
     which: int,
     point: Point,
-    shot: Shot,
 ) -> wp.vec3:
     """Return the color of a surface's texture, 0 to 1, where a pixel shows it; white for none."""
     if faces[which].mapping.texture < 0:
         return wp.vec3(1.0, 1.0, 1.0)
-    surface = faces[which]
-    normal, back = point.normal, point.depth * wp.transpose(surface.axes)
+    normal, image = point.normal, faces[which].image
     along_normal = normal / wp.dot(normal, point.ray)
-    across, down = back @ shot.right, back @ shot.down
+    across, down = point.depth * faces[which].right, point.depth * faces[which].down
     across = across - wp.dot(along_normal, across) * point.ray
     down = down - wp.dot(along_normal, down) * point.ray
-    here, right, below = wp.vec3(), wp.vec3(), wp.vec3()
-    mapping, face = surface.mapping, surface.face
-    if face.kind == MESH and mapping.kind == WRAPPED:
-        here = _mesh_place(triangles, face.part, mapping, point.local)
-        right = _mesh_place(triangles, face.part, mapping, point.local + across) - here
-        below = _mesh_place(triangles, face.part, mapping, point.local + down) - here
-    else:
-        kind, part, size = face.kind, face.part, face.size
-        here = texture_place(mapping, kind, part, size, normal, point.local)
-        right = texture_place(mapping, kind, part, size, normal, point.local + across) - here
-        below = texture_place(mapping, kind, part, size, normal, point.local + down) - here
+    if faces[which].mapping.is_even:
+        u, v = faces[which].mapping.across, faces[which].mapping.down
+        start = faces[which].mapping.start
+        place = wp.vec3(wp.dot(u, point.local) + start[0], wp.dot(v, point.local) + start[1], 0.0)
+        one = wp.vec3(wp.dot(u, across), wp.dot(v, across), 0.0)
+        two = wp.vec3(wp.dot(u, down), wp.dot(v, down), 0.0)
+        return sample_flat(texels, image, place, one, two)
+    mapping, kind = faces[which].mapping, faces[which].face.kind
+    part, size = faces[which].face.part, faces[which].face.size
+    here = texture_place(mapping, kind, part, size, normal, point.local)
+    right = texture_place(mapping, kind, part, size, normal, point.local + across) - here
+    below = texture_place(mapping, kind, part, size, normal, point.local + down) - here
     if mapping.kind == CUBE:
-        return sample_cube(texels, surface.image, here, right, below)
-    if is_around(mapping, face.kind, face.part):  # across the seam
+        return sample_cube(texels, image, here, right, below)
+    if is_around(mapping, kind, part):  # across the seam
         turn = mapping.scale[0]
         right[0] = right[0] - wp.round(right[0] / turn) * turn
         below[0] = below[0] - wp.round(below[0] / turn) * turn
-    return sample_flat(texels, surface.image, here, right, below)
-
-
-@wp.func
-def _mesh_place(triangles: Triangles, triangle: int, mapping: Mapping, place: wp.vec3) -> wp.vec3:
-    """Return the texture coordinates of a mesh at a place on a triangle's plane."""
-    a = triangle_corner(triangles, triangle, 0)
-    one = triangle_corner(triangles, triangle, 1) - a
-    two = triangle_corner(triangles, triangle, 2) - a
-    at = place - a
-    xx, xy, yy = wp.dot(one, one), wp.dot(one, two), wp.dot(two, two)
-    x, y = wp.dot(at, one), wp.dot(at, two)
-    area = wp.max(xx * yy - xy * xy, 1e-30)
-    second, third = (yy * x - xy * y) / area, (xx * y - xy * x) / area
-    here = (1.0 - second - third) * triangles.texcoords[3 * triangle]
-    here += second * triangles.texcoords[3 * triangle + 1]
-    here += third * triangles.texcoords[3 * triangle + 2]
-    scale, shift = mapping.scale, mapping.shift
-    return wp.vec3(here[0] * scale[0] + shift[0], here[1] * scale[1] + shift[1], 0.0)
+    return sample_flat(texels, image, here, right, below)

@@ -7,7 +7,8 @@ from drone_rl.sim.rendering.raytrace import structs_kernel as structs
 from drone_rl.sim.rendering.raytrace.intersection_kernel import ROUND, surface_normal
 from drone_rl.sim.rendering.view import WEIGHTS
 
-_RED, _GREEN, _BLUE = (wp.constant(weight) for weight in WEIGHTS)
+RED, GREEN, BLUE = (wp.constant(weight) for weight in WEIGHTS)
+"""Of gray, for bytes."""
 
 
 @wp.func
@@ -56,7 +57,7 @@ def shade_span_with_effects(
     if (what & structs.RGB) != 0:
         spans.copy(images.rgb[job.row], first, last, job.colors)
     if (what & structs.GRAY) != 0:
-        spans.mix_gray(images.gray[job.row], first, last, job.colors, _RED, _GREEN, _BLUE)
+        spans.mix_gray(images.gray[job.row], first, last, job.colors, RED, GREEN, BLUE)
 
 
 @wp.func
@@ -131,8 +132,8 @@ def to_bytes(color: wp.vec3) -> wp.vec3ub:
 def gray_of(color: wp.vec3ub) -> float:
     """Return fma(green, G, red * R) + blue * B in float32, as torch does on x86 by `WEIGHTS`."""
     red, green, blue = float(color[0]), float(color[1]), float(color[2])
-    two = float(wp.float64(red * _RED) + wp.float64(green) * wp.float64(_GREEN))
-    return float(wp.float64(two) + wp.float64(blue * _BLUE))
+    two = float(wp.float64(red * RED) + wp.float64(green) * wp.float64(GREEN))
+    return float(wp.float64(two) + wp.float64(blue * BLUE))
 
 
 @wp.func

@@ -73,6 +73,11 @@ class Mapping:
     kind: int
     scale: wp.vec3
     shift: wp.vec2
+    is_even: bool
+    """Whether coordinates change evenly: those of a place p are start + (across @ p, down @ p)."""
+    start: wp.vec2
+    across: wp.vec3
+    down: wp.vec3
 
 
 @wp.func

@@ -90,11 +90,13 @@ def _on_face(face: int, axis: int, ray: wp.vec3) -> wp.vec2:
         down = -ray[2]
     if face == 5:
         across = -ray[0]
-    most = wp.max(wp.abs(ray[axis]), 1e-9)
-    return wp.vec2(0.5 + 0.5 * across / most, 0.5 + 0.5 * down / most)
+    half = 0.5 / wp.max(wp.abs(ray[axis]), 1e-9)
+    return wp.vec2(0.5 + half * across, 0.5 + half * down)
 
 
-@wp.func_native("""
+SAMPLE = """
+typedef float floats __attribute__((ext_vector_type(4)));
+typedef unsigned char bytes __attribute__((ext_vector_type(4)));
 int width = image.width, height = image.height, start = image.start;
 const bool is_cube = image.faces > 1;
 while (covered >= 2.0f && (width > 1 || height > 1)) {
@@ -103,7 +105,8 @@ while (covered >= 2.0f && (width > 1 || height > 1)) {
     height = height > 1 ? height / 2 : 1;
     covered *= 0.5f;
 }
-float total[3] = {0.0f, 0.0f, 0.0f}, share = 1.0f;
+floats total = 0.0f;
+float share = 1.0f;
 const bool has_next = covered > 1.0f && (width > 1 || height > 1);
 for (int level = 0; level < 1 + has_next; ++level) {
     const float x = across * width - 0.5f, y = down * height - 0.5f;
@@ -122,20 +125,26 @@ for (int level = 0; level < 1 + has_next; ++level) {
         lower = lower < height ? lower : 0;
     }
     const unsigned *const data = texels.data + start + face * width * height;
-    const unsigned a = data[upper * width + left], b = data[upper * width + next];
-    const unsigned c = data[lower * width + left], d = data[lower * width + next];
+    const auto color = [&](int row, int column) {
+        return __builtin_convertvector(*(const bytes *)(data + row * width + column), floats);
+    };
     if (has_next) share = level ? covered - 1.0f : 2.0f - covered;
     const float of_c = share * (1.0f - right) * below, of_d = share * right * below;
     const float of_a = share * (1.0f - right) - of_c, of_b = share * right - of_d;
-    for (int k = 0; k < 3; ++k)
-        total[k] += of_a * (int)(a >> 8 * k & 255u) + of_b * (int)(b >> 8 * k & 255u)
-            + of_c * (int)(c >> 8 * k & 255u) + of_d * (int)(d >> 8 * k & 255u);
+    total += of_a * color(upper, left) + of_b * color(upper, next)
+        + of_c * color(lower, left) + of_d * color(lower, next);
     start += width * height * image.faces;
     width = width > 1 ? width / 2 : 1;
     height = height > 1 ? height / 2 : 1;
 }
-const float unit = 1.0f / 255.0f;
-return wp::vec_t<3, float>(unit * total[0], unit * total[1], unit * total[2]);
+total *= 1.0f / 255.0f;
+"""
+"""Sets `total` to the color of a texture, see `sample_levels`; it changes `covered`."""
+
+
+@wp.func_native(f"""
+{SAMPLE}
+return wp::vec_t<3, float>(total[0], total[1], total[2]);
 """)
 def sample_levels(
     texels: wp.array[wp.uint32], image: Image, face: int, across: float, down: float, covered: float

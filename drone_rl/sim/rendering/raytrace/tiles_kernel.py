@@ -7,6 +7,7 @@ from drone_rl.sim.rendering.raytrace import structs_kernel as structs
 from drone_rl.sim.rendering.raytrace.cast_kernel import MESH, Hit, World, complete_hit
 from drone_rl.sim.rendering.raytrace.intersection_kernel import PLANE, ROUND, surface_normal
 from drone_rl.sim.rendering.raytrace.light_kernel import Look, Shot, finish, sky, start_image
+from drone_rl.sim.rendering.raytrace.patches_kernel import Block, shade_patch
 from drone_rl.sim.rendering.raytrace.projection_kernel import frame_attitude, product, rotation
 from drone_rl.sim.rendering.raytrace.shade_kernel import (
     OPAQUE,
@@ -15,10 +16,12 @@ from drone_rl.sim.rendering.raytrace.shade_kernel import (
     add_casting,
     find_light,
     make_surface,
+    reach_patch,
     sample_surface,
     shade,
+    start_face,
 )
-from drone_rl.sim.rendering.raytrace.shading_kernel import gray_of, to_bytes
+from drone_rl.sim.rendering.raytrace.shading_kernel import BLUE, GREEN, RED
 from drone_rl.sim.rendering.raytrace.shadows_kernel import (
     PIXELS,
     Shadows,
@@ -26,12 +29,11 @@ from drone_rl.sim.rendering.raytrace.shadows_kernel import (
     start_block,
     start_shadows,
 )
+from drone_rl.sim.rendering.raytrace.spans_kernel import fill, mix_gray
 from drone_rl.sim.rendering.raytrace.structs_kernel import struct
 from drone_rl.sim.rendering.raytrace.triangles_kernel import (
     Triangles,
-    smooth_normal,
     triangle_normal,
-    triangle_weights,
 )
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -61,6 +63,10 @@ class TileScratch:
     points: wp.array2d[float]
     blocked: wp.array2d[int]
     is_known: wp.array2d[int]
+    colors: wp.array2d[wp.vec3]
+    """See `Block`, as the rest."""
+    is_shown: wp.array2d[int]
+    pixels: wp.array2d[wp.vec3ub]
 
 
 @wp.kernel
@@ -96,7 +102,13 @@ def render_tiles(
         shadows.is_known = scratch.is_known[buffer]
         shadows.meshes = scratch.order[buffer]
         faces = scratch.faces[buffer]
-        write(canvas, view, world, look, shot, to_world, shadows, faces, images, row)
+        block = Block()
+        block.colors = scratch.colors[buffer]
+        block.is_shown = scratch.is_shown[buffer]
+        block.pixels = scratch.pixels[buffer]
+        if (view.what & structs.RGB) != 0:
+            block.pixels = images.rgb[row]
+        write(canvas, view, world, look, shot, to_world, shadows, faces, block, images, row)
         row += 1
 
 
@@ -201,13 +213,14 @@ def write(
     to_world: wp.mat33,
     shadows: Shadows,
     faces: wp.array[Surface],
+    block: Block,
     images: structs.Images,
     row: int,
 ) -> None:
     """Write all modalities of the image `row` from a canvas."""
     what = view.what
     if (what & (structs.RGB | structs.GRAY)) != 0:
-        write_colors(canvas, what, world, look, shot, to_world, shadows, faces, images, row)
+        write_colors(canvas, what, world, look, shot, to_world, shadows, faces, block, images, row)
     if (what & structs.DEPTH) != 0:
         canvases.copy_depths(canvas, images.depth[row], False)
     if (what & structs.DISTANCE) != 0:
@@ -275,49 +288,74 @@ def write_colors(
     to_world: wp.mat33,
     shadows: Shadows,
     faces: wp.array[Surface],
+    block: Block,
     images: structs.Images,
     row: int,
 ) -> None:
     """Write colors. What consecutive pixels of a face share is computed once, in `faces[0]`."""
-    geoms = shadows.geoms
+    geoms, texels = shadows.geoms, look.textures.texels
     last_owner = int(structs.NO_GEOM)
     last_part = int(0)
     tile = int(0)
     while tile < canvas.across * canvas.down:
         left, top = 8 * (tile % canvas.across), 8 * (tile // canvas.across)
         _start_tile(canvas, world.triangles, shadows, shot, to_world, tile)
+        fill(block.is_shown, 0, 64, 0)
         k = int(0)
         while k < 64:
             x, y = left + (k & 7), top + (k >> 3)
-            if x < canvas.width and y < canvas.height:
+            if block.is_shown[k] == 0 and x < canvas.width and y < canvas.height:
                 owner, part = int(canvas.owner[64 * tile + k]), int(canvas.part[64 * tile + k])
                 ray = pixel_ray(canvas, x, y)
-                shown = wp.vec3()
                 if owner == structs.NO_GEOM:
-                    shown = sky(look.textures.texels, wp.normalize(to_world @ ray), shot)
+                    block.colors[k] = sky(texels, to_world @ ray, shot)
                 else:
-                    depth = canvas.depth[64 * tile + k]
-                    is_new = owner != last_owner or part != last_part
-                    if is_new and (owner != last_owner or geoms[owner].kind != MESH):
-                        faces[0] = face_of(look, shot, geoms[owner], part)
-                    point = point_of(world.triangles, geoms, owner, part, ray, depth, faces)
-                    if faces[0].opacity < OPAQUE:
-                        hit = hit_of(world, shot, geoms[owner], part, point, to_world @ ray)
-                        direction = wp.normalize(to_world @ ray)
-                        shown = shade(look, world, hit, direction, shot, shadows, faces)
-                    else:
-                        shown = find_light(world.triangles, faces, 0, point, shot, True)
-                        if shot.num_casting > 0:
-                            shown = add_casting(world, shadows, 0, k, shot, shown)
-                        texels = look.textures.texels
-                        texel = sample_surface(texels, world.triangles, faces, 0, point, shot)
-                        shown = wp.cw_mul(shown, texel)
-                        shown = finish(shown, depth * wp.length(ray), shot)
+                    if owner != last_owner or part != last_part:
+                        is_same = owner == last_owner
+                        turn_to(world.triangles, look, shot, geoms[owner], part, is_same, faces)
                     last_owner = owner
                     last_part = part
-                write_color(images, what, row, y * canvas.width + x, shown)
+                    depth = canvas.depth[64 * tile + k]
+                    point = point_of(geoms, owner, part, ray, depth, faces)
+                    is_simple = faces[0].is_simple and shot.num_casting == 0
+                    if is_simple and reach_patch(world.triangles, faces, 0, point, shot, True):
+                        shade_patch(canvas, tile, k, geoms[owner], faces, shot, texels, block)
+                    else:
+                        seen = geoms[owner]
+                        direction = to_world @ ray
+                        block.colors[k] = shade_pixel(
+                            look, world, shot, seen, part, point, direction, shadows, k, faces
+                        )
             k += 1
+        canvases.copy_colors(canvas, tile, block.colors, block.pixels)
         tile += 1
+    if (what & structs.GRAY) != 0:
+        count = canvas.width * canvas.height
+        mix_gray(images.gray[row], 0, count, block.pixels, RED, GREEN, BLUE)
+
+
+@wp.func
+def shade_pixel(
+    look: Look,
+    world: World,
+    shot: Shot,
+    seen: structs.GeomView,
+    part: int,
+    point: Point,
+    ray: wp.vec3,
+    shadows: Shadows,
+    k: int,
+    faces: wp.array[Surface],
+) -> wp.vec3:
+    """Return the color of a pixel, `k` of its tile, which shows `faces[0]`."""
+    if faces[0].opacity < OPAQUE:
+        hit = hit_of(world, shot, seen, part, point, ray)
+        return shade(look, world, hit, wp.normalize(ray), shot, shadows, faces)
+    shown = find_light(world.triangles, faces, 0, point, shot, True)
+    if shot.num_casting > 0:
+        shown = add_casting(world, shadows, 0, k, shot, shown)
+    shown = wp.cw_mul(shown, sample_surface(look.textures.texels, faces, 0, point))
+    return finish(shown, point.depth * wp.length(ray), shot)
 
 
 @wp.func
@@ -356,38 +394,37 @@ def _start_tile(
 
 
 @wp.func
-def write_color(images: structs.Images, what: int, row: int, pixel: int, shown: wp.vec3) -> None:
-    """Write one color, 0 to 1, as bytes and as gray."""
-    color = to_bytes(255.0 * shown)
-    if (what & structs.RGB) != 0:
-        images.rgb[row, pixel] = color
-    if (what & structs.GRAY) != 0:
-        images.gray[row, pixel] = gray_of(color)
-
-
-@wp.func
-def face_of(look: Look, shot: Shot, seen: structs.GeomView, part: int) -> Surface:
-    """Return a face of a geom, flat ones with their normal."""
-    normal = wp.vec3()
-    if seen.kind != MESH and part != ROUND:
-        normal[part // 2] = 2.0 * float(part % 2) - 1.0
-    return make_surface(
-        look.surfaces,
-        look.textures,
-        shot,
-        seen.number,
-        seen.kind,
-        part,
-        seen.size,
-        seen.axes,
-        seen.eye,
-        normal,
-    )
+def turn_to(
+    triangles: Triangles,
+    look: Look,
+    shot: Shot,
+    seen: structs.GeomView,
+    part: int,
+    is_same: bool,
+    faces: wp.array[Surface],
+) -> None:
+    """Make `faces[0]` a face of a geom; `is_same`: it is another one of the same geom already."""
+    if not is_same or seen.kind != MESH:
+        normal = wp.vec3()
+        if seen.kind != MESH and part != ROUND:
+            normal[part // 2] = 2.0 * float(part % 2) - 1.0
+        faces[0] = make_surface(
+            look.surfaces,
+            look.textures,
+            shot,
+            seen.number,
+            seen.kind,
+            part,
+            seen.size,
+            seen.axes,
+            seen.eye,
+            normal,
+        )
+    start_face(triangles, faces, 0, part)
 
 
 @wp.func
 def point_of(
-    triangles: Triangles,
     geoms: wp.array[structs.GeomView],
     owner: int,
     part: int,
@@ -395,22 +432,15 @@ def point_of(
     depth: float,
     faces: wp.array[Surface],
 ) -> Point:
-    """Return what a pixel shows of `faces[0]`, of which it sets the triangle of a mesh."""
+    """Return what a pixel shows of `faces[0]`."""
     point = Point()
     point.depth = depth
     point.ray = geoms[owner].into @ ray
     point.local = geoms[owner].eye + depth * point.ray
-    if geoms[owner].kind == MESH:
-        faces[0].face.part = part
-        point.normal = triangle_normal(triangles, part)
-        point.weights = triangle_weights(triangles, part, geoms[owner].eye, point.ray)
-        point.smooth = smooth_normal(triangles, part, point.weights)
-    elif part == ROUND:
-        point.normal = _normal(triangles, geoms[owner], part, ray, depth)
-        point.smooth = point.normal
-    else:
-        point.normal = faces[0].face.normal
-        point.smooth = point.normal
+    point.normal = faces[0].face.normal
+    if faces[0].face.is_round:
+        kind, size, eye = geoms[owner].kind, geoms[owner].size, geoms[owner].eye
+        point.normal = surface_normal(kind, size, part, eye, point.ray, depth)
     return point
 
 

@@ -137,6 +137,9 @@ def _make_scratch(view: View, workers: int, geoms: int) -> Any:
         "points": (2 * 6 * TILE**2, float),
         "blocked": (2 * int(MOST_LIGHTS) * TILE**2, int),
         "is_known": (2 * int(MOST_LIGHTS), int),
+        "colors": (TILE**2, wp.vec3),
+        "is_shown": (TILE**2, int),
+        "pixels": (view.width * view.height, wp.vec3ub),
     }
     scratch: Any = tiles_kernel.TileScratch()
     for name, (length, dtype) in arrays.items():
