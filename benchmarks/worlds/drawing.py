@@ -19,7 +19,7 @@ from benchmarks.benchmark import Setup
 from benchmarks.pipeline import paired
 from benchmarks.worlds.house import put_at_random, reach
 from drone_rl.config import CameraSettings
-from drone_rl.config.learning import Episodes
+from drone_rl.config.learning import Gae, Ppo, Rollouts
 from drone_rl.config.training import TrainSettings
 from drone_rl.config.transforms import Gray, Standardize
 from drone_rl.sim.tasks import State
@@ -89,11 +89,14 @@ def _draw(worlds: Worlds, state: State) -> int:
 
 
 def _collecting() -> Callable[[], int]:
+    """Return a function that collects a batch as trainings of `experiment=reach` do."""
     settings = TrainSettings(
         task=reach(),
         camera=CAMERA,
         transforms=(Gray(), Standardize()),
-        collector=Episodes(num_envs=PLACES),
+        returns=Gae(),
+        objective=Ppo(num_steps=64),
+        collector=Rollouts(num_envs=PLACES),
     )
     collector = make_collector(settings).collector
     return lambda: next(iter(collector)).numel()

@@ -147,18 +147,24 @@ class ThreadedCollector:
         self,
         collectors: Sequence[BatchedCollector],
         *,
+        num_threads: int = 1,
         postproc: Callable[[TensorDictBase], TensorDictBase] | None = None,
     ) -> None:
-        """Take over collectors of disjoint environments, each rendered by a single shard.
+        """Take over collectors of disjoint environments.
 
-        `postproc` is applied to each joined batch, such as a return estimator.
+        Args:
+            collectors: Each has its own thread.
+            num_threads: PyTorch's threads that collectors without a fused kernel share.
+            postproc: Applied to each joined batch, such as a return estimator.
         """
         self.collectors, self.postproc = list(collectors), postproc
         self.actor = self.collectors[0].actor
         """The policy that learns."""
-        # one torch thread each: the collectors are what runs in parallel
+        count = len(self.collectors)
+        is_fused = not isinstance(self.collectors[0].fused, Reasons)
+        own = 1 if is_fused else max(1, num_threads // count)
         self._pool = ThreadPoolExecutor(
-            len(self.collectors), "collect", initializer=set_torch_threads, initargs=(1,)
+            count, "collect", initializer=set_torch_threads, initargs=(own,)
         )
 
     def __iter__(self) -> Iterator[TensorDictBase]:

@@ -72,7 +72,8 @@ class TrainerSettings(Settings):
     """Compute gradients in a fused kernel if it supports the network, which is faster on a CPU.
     It sums in a different order, so results for a seed depend on it."""
     num_threads: Annotated[int, Whole(1, unit="threads")] = 2
-    """Threads of the learner; results depend on their number through rounding."""
+    """Threads of PyTorch, for the learner and for policies outside of the fused kernel; results
+    depend on their number through rounding."""
     checkpoint_interval_s: Annotated[float, Real(0.0, unit="s")] = 15.0
     """Seconds between two checkpoints."""
 

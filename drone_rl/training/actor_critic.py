@@ -51,15 +51,17 @@ def rollout_collector(
     objective = settings.objective
     chosen = settings.collector
     assert isinstance(objective, WithCritic) and isinstance(chosen, Rollouts)
-    groups = make_groups(settings, group_sizes(settings), replay)
-    cores = max(1, num_cores() // len(groups))
+    sizes = group_sizes(settings)
+    cores = max(1, num_cores() // len(sizes))
+    groups = make_groups(settings, sizes, cores, replay)
     steps, compiled = objective.num_steps, chosen.compiled
     collectors = [
         RolloutCollector(env, actor, steps, compiled=compiled, num_threads=cores)
         for env, actor in groups
     ]
     _log.info("%s", collectors[0].name)
-    return Components.of(ThreadedCollector(collectors), groups)
+    threads = settings.trainer.num_threads
+    return Components.of(ThreadedCollector(collectors, num_threads=threads), groups)
 
 
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)

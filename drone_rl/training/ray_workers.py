@@ -20,7 +20,7 @@ def ray_collector(settings: TrainSettings, replay: FailureReplayTask | None = No
     chosen = settings.collector
     assert isinstance(chosen, Ray)
     sizes = group_sizes(settings)
-    ((env, actor),) = make_groups(settings, [1])  # only the actor is needed
+    ((env, actor),) = make_groups(settings, [1], 1)  # only the actor is needed
     env.close()
     sent = (settings.config(), [*IMPORTED, *sorted(modules_of(settings))], sizes)
     makers = [functools.partial(_remote_collector, *sent, i, replay) for i in range(len(sizes))]
@@ -49,6 +49,6 @@ def _remote_collector(
     settings = TrainSettings.read(config)
     chosen = settings.collector
     assert isinstance(chosen, Ray)
-    ((env, actor),) = make_groups(settings, sizes, replay, [number])
     cores = max(1, int(chosen.num_cpus))
+    ((env, actor),) = make_groups(settings, sizes, cores, replay, [number])
     return EpisodeCollector(env, actor, compiled=chosen.compiled, num_threads=cores)

@@ -223,15 +223,19 @@ def threaded_collector(
     """Make `collector=episodes`: complete episodes, with returns, from threads of this process."""
     chosen = settings.collector
     assert isinstance(chosen, Episodes)
-    groups = make_groups(settings, group_sizes(settings), replay)
-    cores = max(1, num_cores() // len(groups))
+    sizes = group_sizes(settings)
+    cores = max(1, num_cores() // len(sizes))
+    groups = make_groups(settings, sizes, cores, replay)
     collectors = [
         EpisodeCollector(env, actor, compiled=chosen.compiled, num_threads=cores)
         for env, actor in groups
     ]
     _log.info("%s", collectors[0].name)
     returns = settings.returns.make().to(settings.device)
-    made = Components.of(ThreadedCollector(collectors, postproc=returns), groups)
+    collector = ThreadedCollector(
+        collectors, num_threads=settings.trainer.num_threads, postproc=returns
+    )
+    made = Components.of(collector, groups)
     if len(collectors) > 1:  # whose batches are copied
         return made
     return made._replace(activations=getattr(collectors[0].fused, "activations", None))
@@ -248,12 +252,14 @@ def group_sizes(settings: TrainSettings) -> list[int]:
 def make_groups(
     settings: TrainSettings,
     sizes: list[int],
+    num_shards: int,
     replay: FailureReplayTask | None = None,
     numbers: Iterable[int] | None = None,
 ) -> list[tuple[EnvBase, Any]]:
     """Make the environments of threads or workers, and the policy that acts in them.
 
-    `sizes` are the numbers of environments of the groups, `numbers` the indices of those to make.
+    `sizes` are the numbers of environments of the groups, `numbers` the indices of those to make,
+    and `num_shards` the threads that render each group.
     The actors share a network and have a random stream each.
     """
     description, seed, device = describe(settings), settings.seed, settings.device
@@ -266,7 +272,7 @@ def make_groups(
             device=device,
             task=replay or as_task(settings.task),  # the description lacks its rewards
             first_world=sum(sizes[:number]),
-            num_shards=1,
+            num_shards=num_shards,
             renderer=settings.renderer,
         )
         generator = torch_generator(seed, Stream.ACTIONS, number=number, device=device)
