@@ -91,3 +91,31 @@ def test_camera_is_mounted_and_zoomed_for_each_environment():
     wide = view(height=60, width=60, modalities=("depth",), horizontal_fov=80.0)
     rows = (renderer.render(wide, poses)["depth"][0, 0] > 0).sum(0)[30].item()
     assert rows == 4  # 1 m of 16.8 m, 3.6 pixels
+
+
+def test_light_without_color_changes_nothing_though_it_casts_shadows():
+    """Without shadows tiles are shaded at once, with them each pixel alone."""
+    textures = "".join(
+        f'<texture name="{name}" type="2d" builtin="{kind}" rgb1=".9 .8 .2" rgb2=".1 .3 .7" '
+        f'width="64" height="64"/><material name="{name}" texture="{name}" texrepeat="3 2" '
+        f'texuniform="{uniform}" specular=".8" shininess=".4"/>'
+        for name, kind, uniform in (("tiles", "checker", "true"), ("paint", "gradient", "false"))
+    )
+    mesh = '<mesh name="m" builtin="supersphere" params="8 .6 1.4" scale="1 1.2 .9"/>'
+    geoms = """<geom type="plane" size="0 0 1" pos="0 0 -1" material="tiles"/>
+    <geom type="box" size=".8 1 .7" pos="4 1.5 -.2" euler="10 20 30" material="paint"/>
+    <geom type="mesh" mesh="m" pos="4 -1.2 0" material="tiles"/>
+    <geom type="cylinder" size=".5 .8" pos="7 0 0" euler="60 0 0" material="paint"/>
+    <light type="point" pos="1 0 3" diffuse=".9 .9 .8" specular=".6 .6 .6" castshadow="false"/>"""
+    black = '<light dir="0 0 -1" ambient="0 0 0" diffuse="0 0 0" specular="0 0 0"/>'
+    look = Appearance(fog_visibility=20.0)
+    images = []
+    for lights in ("", black):
+        renderer = SceneRaytracer(make_scene(geoms + lights, textures + mesh), num_envs=1)
+        seen = view(height=100, width=141, modalities=("rgb",))
+        images.append(renderer.render(seen, poses_of([[0, 0, 0]], [[1, 0, 0, 0]]), look)["rgb"])
+        renderer.close()
+    assert images[0].float().std() > 20
+    difference = (images[0].int() - images[1].int()).abs()
+    assert difference.max() <= 1
+    assert difference.float().mean() < 0.02
