@@ -490,6 +490,7 @@ _LEAF = """
                     float *const __restrict depths = canvas.depth.data + 64 * tile + 8 * y;
                     int *const __restrict owners = canvas.owner.data + 64 * tile + 8 * y;
                     int *const __restrict parts = canvas.part.data + 64 * tile + 8 * y;
+                    float shown[8];
 #pragma clang loop vectorize(enable) interleave(disable)
                     for (int c = 0; c < 8; ++c) {
                         const float i = i0 + c;
@@ -500,10 +501,16 @@ _LEAF = """
                         const float limit = number >= owners[c] ? before + same : before - same;
                         const bool is_in = (u >= 0.0f) & (v >= 0.0f) & (w >= 0.0f);
                         const bool is_near = (along > 0.0f) & (along <= limit) & (along <= far);
-                        const bool is_shown = is_in & is_near;
-                        depths[c] = is_shown ? along : before;
-                        owners[c] = is_shown ? number : owners[c];
-                        parts[c] = is_shown ? triangle : parts[c];
+                        shown[c] = (is_in & is_near) ? along : -1.0f;
+                    }
+                    bool is_shown = false;
+                    for (int c = 0; c < 8; ++c) is_shown |= shown[c] > 0.0f;
+                    if (!is_shown) continue;
+                    for (int c = 0; c < 8; ++c) {
+                        const bool is_here = shown[c] > 0.0f;
+                        depths[c] = is_here ? shown[c] : depths[c];
+                        owners[c] = is_here ? number : owners[c];
+                        parts[c] = is_here ? triangle : parts[c];
                     }
                 }
             }
