@@ -29,7 +29,7 @@ from drone_rl.sim.scenes import load_scene
 from drone_rl.utils.errors import InputError
 try:
     scene = load_scene(sys.argv[1])
-    field = Field(scene)
+    field = Field([scene])
     field.attach(SceneEntity(scene))
     mjcf.Physics.from_mjcf_model(field.mjcf_model)
 except InputError as error:
