@@ -195,7 +195,16 @@ class Worlds:
         return reward
 
     def advance(self, state: State, action: Tensor) -> tuple[State, Tensor]:
-        """Return states a step later, and rewards; the environments stay as they are."""
+        """Return states a step later, and rewards; the environments stay as they are.
+
+        Raises:
+            InputError: There is not one action for each state, or a reward is unusable.
+        """
+        if action.shape[:1] != (len(state),):
+            raise InputError(
+                f"actions of shape {tuple(action.shape)} for {len(state)} environments; give one "
+                "action for each, along the first dimension"
+            )
         around = [self.task.obstacles(state)] if self._needs_obstacles else []
         body = self.dynamics.step(state.body, action, *around)
         more: Any = (action, self.dynamics) if follows_rules(self.task) else ()

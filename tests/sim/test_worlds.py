@@ -23,6 +23,13 @@ def test_indexed_and_whole_batches_step_alike():
     assert torch.equal(worlds.state.places, turned.state.places)
 
 
+@pytest.mark.parametrize("task", ["collect_cubes", "reach"])
+def test_each_environment_needs_an_action(task):
+    worlds = Worlds(3, task)
+    with pytest.raises(InputError, match=r"actions of shape \(2,\) for 3 environments"):
+        worlds.step(torch.arange(3), torch.zeros(2, dtype=torch.int64))
+
+
 def test_a_task_whose_step_returns_no_pair_is_named(monkeypatch):
     worlds = Worlds(2, TaskSettings(num_cubes=1))
     worlds.reset(torch.arange(2), [world_random_state(0, i) for i in range(2)])

@@ -355,24 +355,44 @@ class TermTask(ObjectTask):
                 for _ in range(_TRIES):
                     place, ranges = given.get((name, i)), [of.range_of(axis) for axis in "xyz"]
                     is_drawn = place is None and any(low < high for low, high in ranges)
+                    is_drawn &= bool(self.scenes)
                     if place is None:
                         place = np.array([random_state.uniform(low, high) for low, high in ranges])
                     if _has_room(s, of, place, placed, start) and not (
-                        is_drawn and self.scenes and self._is_solid(scene, of, place)
+                        is_drawn and self._are_solid(scene, of, place[None]).item()
                     ):
                         placed.append((of, place))
                         break
                 else:
+                    if is_drawn:
+                        self._require_room(scene, name, of)
                     return [], name
         return [place for _, place in placed], ""
 
-    def _is_solid(self, scene: int, of: ObjectSettings, place: Any) -> bool:
-        """Return whether something solid is in the box around an object; a floor touches it."""
+    def _are_solid(self, scene: int, of: ObjectSettings, places: Any) -> Tensor:
+        """Return whether something solid is in the box around an object; a floor touches it.
+
+        `places` are its centres, (n, 3). Shape: (n,).
+        """
         solids = solids_of((self.surroundings[scene],), "cpu")
-        middle = torch.from_numpy(place)
-        ends = middle + (torch.tensor(of.reach, dtype=torch.float64) - _SLACK) * _AROUND
-        ways = solids.sweep(middle.expand_as(ends), ends).fraction
-        return bool((ways <= 1.0).any() | (solids.distances(middle[None]) <= 0.0).any())
+        middles = torch.from_numpy(places)
+        rays = (torch.tensor(of.reach, dtype=torch.float64) - _SLACK) * _AROUND
+        begins = middles[:, None].expand(-1, len(rays), -1)
+        ways = solids.sweep(begins.flatten(0, 1), (begins + rays).flatten(0, 1)).fraction
+        return (ways <= 1.0).unflatten(0, (-1, len(rays))).any(1) | (
+            solids.distances(middles) <= 0.0
+        )
+
+    def _require_room(self, scene: int, name: str, of: ObjectSettings) -> None:
+        """Raise an `InputError` if nothing is free in the range of an object, by a sample."""
+        low, high = zip(*map(of.range_of, "xyz"), strict=True)
+        places = np.random.RandomState(0).uniform(low, high, (_MOST_TRIES, 3))
+        if self._are_solid(scene, of, places).all():
+            ranges = ", ".join(f"{x} from {a:g} to {b:g}" for x, a, b in zip("xyz", low, high))
+            raise InputError(
+                f"task.objects.{name}: something is solid wherever it is placed in {ranges} m; "
+                "give ranges in which the scene has room for it"
+            )
 
     def start(self, sampled: Tensor, body: BodyState) -> ObjectState:
         """Return initial states; see `sample`."""

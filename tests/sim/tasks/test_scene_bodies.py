@@ -131,6 +131,13 @@ def test_a_body_is_placed_outside_of_what_is_solid(tmp_path):
     assert 0.3 < (x < 17.71).double().mean() < 0.7
 
 
+def test_a_body_whose_whole_range_is_solid_is_named_at_once(tmp_path):
+    """Its far side, half a metre from its middle, is in the wall at x = 19.9."""
+    of = settings(tmp_path, crate={"body": "crate", "x": [19.5, 19.8], "y": 0.0})
+    with pytest.raises(InputError, match=r"crate: something is solid wherever .* 19.5 to 19.8, y"):
+        begun(of)
+
+
 def test_a_body_that_is_touched_is_removed_until_the_next_episode(tmp_path):
     """Behind the coin, 5.7 m ahead, is the wall, 19.9 m ahead."""
     worlds = begun(settings(tmp_path))
