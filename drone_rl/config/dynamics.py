@@ -58,7 +58,8 @@ class DynamicsSettings(Settings):
     arm_length: Annotated[float, Real(0.0, 10.0, is_above=True, unit="m")] = 0.2275
     """Distance from the centre to each rotor, in metres; arms are at 45 degrees to x."""
     radius: Annotated[float, Real(0.0, 10.0, is_above=True, unit="m")] = 0.3
-    """Radius of the sphere that collides with ground and obstacles, in metres."""
+    """Radius of the sphere that collides with ground and obstacles, in metres; in scene files it is
+    half of `task.drone_size`."""
     rotor_thrust: Annotated[float, Real(0.0, 10_000.0, is_above=True, unit="N")] = 4.179446268
     """Maximum thrust of one rotor, in newtons."""
     rotor_torque: Annotated[float, Real(0.0, 1000.0, is_above=True, unit="N m")] = 0.055562

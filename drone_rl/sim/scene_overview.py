@@ -104,13 +104,18 @@ def render_above(scene: SceneFile, width: int = 900) -> Image.Image:
     draw = ImageDraw.Draw(picture)
     focal = width / 2 / slope
     for site in scene.sites:
-        x, y, z = site.position
-        scale = focal / (top - z)
-        at = width / 2 + (x - camera[0]) * scale, height / 2 - (y - camera[1]) * scale
+        scale = focal / (top - site.position[2])
+
+        def pixel(x: float, y: float, scale: float = scale) -> tuple[float, float]:
+            return width / 2 + (x - camera[0]) * scale, height / 2 - (y - camera[1]) * scale
+
+        at = pixel(*site.position[:2])
         color = _GOAL_COLOR if site.name.startswith("goal") else _START_COLOR
-        reach = [max(5.0, half * scale) for half in site.half_size[:2]]
-        box = [at[0] - reach[0], at[1] - reach[1], at[0] + reach[0], at[1] + reach[1]]
-        (draw.rectangle if any(site.half_size) else draw.ellipse)(box, outline=color, width=3)
+        if any(site.half_size[:2]):
+            ends = [pixel(*corner) for corner in site.corners.tolist()]
+            draw.line([*ends, *ends[:2]], fill=color, width=3, joint="curve")
+        else:
+            draw.circle(at, 5.0, outline=color, width=3)
         outline = {"stroke_width": 3, "stroke_fill": "white", "font": ImageFont.load_default(18)}
         draw.text((at[0] + 8, at[1] - 10), site.name, fill=color, **outline)
     return picture
@@ -220,7 +225,8 @@ def _names(names: Sequence[str]) -> str:
 def _describe_site(site: Site) -> str:
     size = " x ".join(f"{2 * half:.2f}" for half in site.half_size)
     region = f", region of {size} m" if any(site.half_size) else ""
-    return f"{site.name or '(no name)'} at {_point(site.position)}{region}"
+    turned = f", turned by {site.heading:.0f} degrees" if region and round(site.heading) else ""
+    return f"{site.name or '(no name)'} at {_point(site.position)}{region}{turned}"
 
 
 def _point(place: Sequence[float] | NDArray[np.float64]) -> str:

@@ -1,7 +1,6 @@
 """Maps of scenes: the floor plan with the paths of episodes, and the success rate by start."""
 
 import dataclasses
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -150,10 +149,7 @@ def _draw_plan(axis: Axes, scene: SceneFile, height: float) -> None:
 def _draw_starts(axis: Axes, sites: Sequence[Site]) -> None:
     """Outline the regions of starts, with the names that the success rates have."""
     for site in sites:
-        x, y = site.half_size[:2]
-        angle, corners = math.radians(site.heading), np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
-        turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
-        corners = corners @ turn + site.position[:2]
+        corners = site.corners
         axis.fill(*corners.T, fill=False, ec=css(FAINT), ls="--", lw=1, zorder=4)
         white = [withStroke(linewidth=3, foreground="white")]
         low = corners[corners.sum(1).argmin()]

@@ -52,6 +52,8 @@ CHASE_HEIGHT, STRIP_HEIGHT, GAP = 532, 144, 5
 INSET_WIDTH = 320
 """Pixels of the image of the policy's camera, enlarged."""
 FRAMES_PER_SECOND = 10
+_CHASE_RADIUS = 0.1
+"""Metres that the chase camera keeps away from solids."""
 _STRIP = CHASE_HEIGHT + GAP
 _BOTTOM = _STRIP + STRIP_HEIGHT + 9
 CAMERAS = tuple(c.name for c in (FRONT_LEFT, FRONT_CENTER, FRONT_RIGHT, BACK_CENTER, BOTTOM_CENTER))
@@ -298,27 +300,41 @@ def _draw_bars(draw: ImageDraw.ImageDraw, font: Font, act: Act, actions: Actions
 def render_chase(worlds: Worlds, look: Appearance | None, height: int, width: int) -> Tensor:
     """Render the drones from behind, in an appearance that all environments share.
 
-    With flight dynamics the chase camera follows the heading only, so that tilt is visible.
+    With flight dynamics the chase camera follows the heading only, so that tilt is visible. What is
+    solid in a scene file is behind the camera, which comes nearer; next to the drone it hides it.
 
     Returns:
         Colors. Shape: (num_envs, height, width, 3), uint8.
     """
     view = worlds.view(CHASE.name, height=height, width=width, show_drone=True)
     state = worlds.state
-    if not isinstance(state.body, FlightState):
+    attitude, around = state.body.attitude, worlds.task.obstacles(state)
+    scene = None if around is None else around.scene
+    if not isinstance(state.body, FlightState) and scene is None:
         return worlds.render(state, view, look)
-    attitude = state.body.attitude
+    (camera,) = view.cameras
+    place = attitude.new_tensor(worlds.scene.model.camera(camera).pos)
+    near = place.expand(len(attitude), 3)
+    if scene is not None:
+        here, away = state.body.position, rotate(twist_about_z(attitude), place)
+        sweep = scene.solids.sweep_at(here, here + away, _CHASE_RADIUS, scene.places)
+        near = sweep.fraction.clamp(max=1.0)[:, None] * place
+        is_apart = bool((near.norm(dim=1) > worlds.task.drone_size).all())
+        view = dataclasses.replace(view, show_drone=is_apart)
     whole = (look or Appearance()).over(worlds.appearance)
     tilted = dataclasses.replace(worlds.poses(state, whole), attitude=attitude)
-    held = dataclasses.replace(whole, camera=level(attitude, view.cameras[0]))
+    held = dataclasses.replace(whole, camera=level(attitude, camera, place, near))
     return worlds.renderer.render(view, tilted, held)["rgb"][:, 0]
 
 
-def level(attitude: Tensor, camera: str) -> Mounting:
-    """Return the mounting that keeps the chase camera level on tilted bodies.
+def level(attitude: Tensor, camera: str, place: Tensor, near: Tensor) -> Mounting:
+    """Return the mounting that moves a camera and keeps it level on tilted bodies.
 
-    Attitudes are quaternions (w, x, y, z), (num_envs, 4); the camera is its name in the model.
+    Args:
+        attitude: Quaternions (w, x, y, z). Shape: (num_envs, 4).
+        camera: Its name in the model.
+        place: Where the model has it, metres, in the drone's frame. Shape: (3,).
+        near: Where it is instead, in the frame of the heading. Shape: (num_envs, 3).
     """
     back = product(inverse(attitude), twist_about_z(attitude))
-    place = torch.tensor(CHASE.pos, dtype=attitude.dtype, device=attitude.device)
-    return Mounting(camera=camera, offset=rotate(back, place) - place, turn=back)
+    return Mounting(camera=camera, offset=rotate(back, near) - place, turn=back)

@@ -11,9 +11,11 @@ from drone_rl.config import (
     AppearanceSettings,
     DynamicsSettings,
     PillarsSettings,
+    ReachSettings,
     TaskSettings,
 )
 from drone_rl.config.networks import Lstm
+from drone_rl.config.reach import ReachStartSettings
 from drone_rl.envs import GrayPixels
 from drone_rl.envs.rollout import Act
 from drone_rl.sim.actions import MOVE_SETS, MOVES
@@ -170,13 +172,29 @@ def test_chase_view_stays_level_while_the_drone_rolls(mount):
     assert not (differs & ~near).any()
 
 
+@pytest.mark.parametrize("mode", ["computer_vision", "simple_flight"])
+def test_chase_camera_is_in_front_of_a_wall_behind_the_drone(tmp_path, mode):
+    """The red wall is half a metre behind the drone, the camera usually 2.6 m."""
+    wall = '<geom type="box" size="0.1 9 9" pos="-0.6 0 0" rgba="1 0 0 1"/>'
+    sites = '<site name="start"/><site name="goal" pos="3 0 0"/>'
+    (tmp_path / "wall.xml").write_text(f"<mujoco><worldbody>{wall}{sites}</worldbody></mujoco>")
+    walled = Worlds(
+        1,
+        ReachSettings(scene=(str(tmp_path / "wall.xml"),), start=ReachStartSettings(heading=0.0)),
+        dynamics=DynamicsSettings(mode=mode),
+    )
+    walled.reset(torch.arange(1), [np.random.RandomState(0)])
+    shown = render_chase(walled, None, **SIZE)[0]
+    assert not ((shown[..., 0] > 30) & (shown[..., 1] == 0)).any()
+
+
 def test_mounting_of_a_level_chase_camera():
     tilt, heading = turned("pitch", 20.0), turned("yaw", 40.0)
     body = product(heading, tilt)
-    mounted = level(body[None], "drone/chase")
     place = torch.tensor(CHASE.pos, dtype=torch.float64)
+    mounted = level(body[None], "drone/chase", place, 0.5 * place[None])
     found = rotate(body, place + mounted.offset[0])
-    assert found.tolist() == pytest.approx(rotate(heading, place).tolist())
+    assert found.tolist() == pytest.approx(rotate(heading, 0.5 * place).tolist())
     assert product(body, mounted.turn[0]).tolist() == pytest.approx(heading.tolist())
     assert math.isclose(float(mounted.turn.norm()), 1.0)
 

@@ -98,7 +98,7 @@ class _InFile(_Fixed):
 
     def obstacles(self, state: Any) -> Obstacles | None:
         """Return the solids of the file."""
-        placed = PlacedSolids(self.solids, state.sampled, 0.5 * self.drone_size)
+        placed = PlacedSolids(self.solids, state.sampled, DynamicsSettings().radius)
         return Obstacles(state.sampled[:, :0], (0.0, 0.0, 0.0), placed)
 
 

@@ -71,7 +71,7 @@ class Quadrotor:
         device, count = body.numbers.device, len(body)
         after = torch.empty_like(body.numbers)
         kernel, around = kernel_among(obstacles, str(device))
-        command = flight_kernel.make_command(self.frame, goals, ticks, obstacles)
+        command = flight_kernel.make_command(self.frame_among(obstacles), goals, ticks, obstacles)
         arrays = [wp.from_torch(numbers.contiguous()) for numbers in (body.numbers, after)]
 
         def work(member: int, first: int, last: int) -> None:
@@ -85,9 +85,20 @@ class Quadrotor:
                 work(0, 0, count)
         return FlightState(after)
 
+    def frame_among(self, obstacles: Obstacles | None) -> Any:
+        """Return the airframe's numbers; among a scene's solids, the radius is that of these."""
+        if obstacles is None or obstacles.scene is None:
+            return self.frame
+        return _airframe(self.settings, obstacles.scene.radius)
+
     @functools.cached_property
     def _workers(self) -> WorkerPool:
         return WorkerPool(2**30)
+
+
+@functools.lru_cache(8)
+def _airframe(settings: DynamicsSettings, radius: float) -> Any:
+    return make_airframe(settings.replace(radius=radius))
 
 
 def kernel_among(obstacles: Obstacles | None, device: str) -> tuple[Any, list[Any]]:

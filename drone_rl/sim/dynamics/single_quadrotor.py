@@ -40,8 +40,8 @@ class SingleQuadrotor(Quadrotor):
             return super().fly(body, goals, ticks, obstacles)
         around = None
         if obstacles is not None:
-            solids = obstacles.scene and obstacles.scene.solids
-            around = (obstacles.centers.shape, obstacles.half_sizes, solids)
+            scene = obstacles.scene and (obstacles.scene.solids, obstacles.scene.radius)
+            around = (obstacles.centers.shape, obstacles.half_sizes, scene)
         wanted = (goals.modes, ticks, around)
         if wanted != self._prepared:
             self._prepare(goals, ticks, obstacles)
@@ -67,7 +67,7 @@ class SingleQuadrotor(Quadrotor):
             around = dataclasses.replace(obstacles, centers=self._centers, scene=scene)
         kernel, solids = kernel_among(around, "cpu")  # starts Warp
         held = FlightGoals(goals.modes, self._values, self._drifts)
-        command = flight_kernel.make_command(self.frame, held, ticks, around)
+        command = flight_kernel.make_command(self.frame_among(around), held, ticks, around)
         arrays = [wp.from_torch(numbers) for numbers in (self._before, self._after)]
         inputs = [0, command, *solids, *arrays]
         self._launch = wp.launch(kernel, 1, inputs=inputs, device="cpu", record_cmd=True)

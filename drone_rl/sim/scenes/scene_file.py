@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 import logging
+import math
 import warnings
 from collections.abc import Collection, Mapping
 from pathlib import Path
@@ -50,6 +51,19 @@ class Site:
     """Of the region around it; zero for a point (a site that is not a box)."""
     heading: float
     """Of its x axis, degrees to the left of the world's x."""
+
+    @property
+    def axes(self) -> NDArray[np.float64]:
+        """Its x, y and z axis as rows, in the world frame. Shape: (3, 3)."""
+        angle = math.radians(self.heading)
+        cos, sin = math.cos(angle), math.sin(angle)
+        return np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+
+    @property
+    def corners(self) -> NDArray[np.float64]:
+        """Places (x, y) of the region's corners, counterclockwise. Metres. Shape: (4, 2)."""
+        signs = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+        return (self.position + signs * self.half_size @ self.axes)[:, :2]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -302,7 +302,7 @@ class PlacedSolids:
     places: Tensor  # (N, G, 3) float64
     """See `Solids.at`."""
     radius: float
-    """Of the ball around a drone that moves without inertia, metres."""
+    """Of the ball around a drone, metres."""
 
     def reached(self, before: Tensor, now: Tensor) -> Tensor:
         """Return where balls get to that go straight, the first solid at most. Shapes: (N, 3)."""

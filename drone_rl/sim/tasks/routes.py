@@ -44,8 +44,7 @@ class Place(NamedTuple):
             return point
         half = np.array(self.site.half_size)
         inside = _seen_from(self.site, point).clip(-half, half)
-        turn = _turn(self.site)
-        return np.append((np.array(self.site.position) + inside @ turn)[:2], point[2])
+        return np.append((self.site.position + inside @ self.site.axes)[:2], point[2])
 
 
 class Goal(NamedTuple):
@@ -329,16 +328,9 @@ def _sites(scene: SceneFile, prefix: str, setting: str, where: str) -> list[Site
     return found
 
 
-def _turn(site: Site) -> NDArray[Any]:
-    """Return the site's axes as rows. Shape: (3, 3)."""
-    angle = math.radians(site.heading)
-    cos, sin = math.cos(angle), math.sin(angle)
-    return np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
-
-
 def _seen_from(site: Site, points: NDArray[Any]) -> NDArray[Any]:
     """Return points in the frame of a site. Shape kept: (*, 3)."""
-    return (points - np.array(site.position)) @ _turn(site).T
+    return (points - np.array(site.position)) @ site.axes.T
 
 
 def _region(site: Site) -> Place:
@@ -346,4 +338,4 @@ def _region(site: Site) -> Place:
     across = [np.linspace(-half, half, _ACROSS if half else 1) for half in site.half_size[:2]]
     lattice = np.stack(np.meshgrid(*across, [0.0]), -1).reshape(-1, 3)
     spread = max(site.half_size[:2]) / (_ACROSS - 1)
-    return Place(lattice @ _turn(site) + np.array(site.position), spread, site)
+    return Place(lattice @ site.axes + np.array(site.position), spread, site)

@@ -352,10 +352,11 @@ class TermTask(ObjectTask):
         placed: list[Any] = []
         for name, of in s.objects.items():
             for i in range(of.count):
+                at_site, ranges = given.get((name, i)), [of.range_of(axis) for axis in "xyz"]
+                is_drawn = at_site is None and any(low < high for low, high in ranges)
+                is_drawn &= bool(self.scenes)
                 for _ in range(_TRIES):
-                    place, ranges = given.get((name, i)), [of.range_of(axis) for axis in "xyz"]
-                    is_drawn = place is None and any(low < high for low, high in ranges)
-                    is_drawn &= bool(self.scenes)
+                    place = at_site
                     if place is None:
                         place = np.array([random_state.uniform(low, high) for low, high in ranges])
                     if _has_room(s, of, place, placed, start) and not (
@@ -385,10 +386,12 @@ class TermTask(ObjectTask):
 
     def _require_room(self, scene: int, name: str, of: ObjectSettings) -> None:
         """Raise an `InputError` if nothing is free in the range of an object, by a sample."""
-        low, high = zip(*map(of.range_of, "xyz"), strict=True)
+        reach = [of.range_of(axis) for axis in "xyz"]
+        low, high = zip(*reach, strict=True)
         places = np.random.RandomState(0).uniform(low, high, (_MOST_TRIES, 3))
         if self._are_solid(scene, of, places).all():
-            ranges = ", ".join(f"{x} from {a:g} to {b:g}" for x, a, b in zip("xyz", low, high))
+            named = zip("xyz", reach, strict=True)
+            ranges = ", ".join(f"{x} from {a:g} to {b:g}" for x, (a, b) in named)
             raise InputError(
                 f"task.objects.{name}: something is solid wherever it is placed in {ranges} m; "
                 "give ranges in which the scene has room for it"

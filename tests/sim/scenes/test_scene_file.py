@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from drone_rl.sim.scenes import load_scene
+from drone_rl.sim.scenes import Site, load_scene
 from drone_rl.utils.errors import InputError
 
 CUBE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
@@ -127,3 +127,9 @@ def test_refuses_mistakes_in_one_line(write, world, words):
         load_scene(write(world))
     message = str(error.value)
     assert "\n" not in message and all(word in message for word in words), message
+
+
+def test_corners_of_a_turned_region():
+    """A turn of 90 degrees to the left takes (-2, -1) to (1, -2), around (1, 2)."""
+    site = Site("start", (1.0, 2.0, 0.5), (2.0, 1.0, 0.1), 90.0)
+    assert site.corners == pytest.approx(np.array([[2, 0], [2, 4], [0, 4], [0, 0]]))

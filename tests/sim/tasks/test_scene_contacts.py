@@ -95,12 +95,15 @@ def test_speeds_without_inertia_end_at_the_wall(tmp_path: Path) -> None:
 
 
 def test_a_quadrotor_bounces_and_slides_as_at_an_obstacle(tmp_path: Path) -> None:
-    """The same flight at a wall from a file and at the same box; contact counts in its step."""
+    """The same flight at a wall from a file and at the same box; contact counts in its step.
+
+    Half of the task's drone_size, 0.8 m, is the radius in the file.
+    """
     dynamics = DynamicsSettings(mode="simple_flight")
     actions = ActionSettings(kind="velocity")
     wall = '<geom name="wall" type="box" size="0.5 5 8" pos="3 0 0"/>'
     worlds = reset(Worlds(1, settings(tmp_path, wall), dynamics=dynamics, actions=actions))
-    quadrotor = Quadrotor(dynamics, actions)
+    quadrotor = Quadrotor(dynamics.replace(radius=0.4), actions)
     box = torch.tensor([[[3.0, 0.0, 100.0]]], dtype=torch.float64)
     body, touches = quadrotor.start(torch.tensor([[0.0, 0.0, 98.0]], dtype=torch.float64)), 0
     action = torch.tensor([[1.0, 0.4, 0.0]])
