@@ -1,8 +1,8 @@
 """Run complete episodes with a policy."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from typing import Any, cast
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar, cast
 
 import torch
 from tensordict import TensorDictBase
@@ -11,6 +11,7 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.acceleration import Reasons
+from drone_rl.acceleration.fused_episodes import END_REASON
 from drone_rl.collectors.episodes import EpisodeCollector
 from drone_rl.envs import worlds_of
 from drone_rl.envs.rollout import Agent
@@ -18,6 +19,8 @@ from drone_rl.policies.actor import exploring
 from drone_rl.sim.tasks import Goals, Task
 from drone_rl.utils.available_memory import EPISODE_BYTES, require_memory
 from drone_rl.utils.provenance import num_cores
+
+T = TypeVar("T")
 
 
 @dataclasses.dataclass
@@ -136,9 +139,13 @@ def rollout(
         keep: Entries of steps to keep, of those that the agent reads and writes; None for all,
             with those after each step.
     """
-    setting = f"episodes={num_episodes}"
-    require_memory(num_episodes * EPISODE_BYTES, setting, "give fewer episodes")
     task = worlds_of(env).task
+
+    def read(batch: TensorDictBase) -> CompleteEpisodes:
+        part = CompleteEpisodes.of(task, batch)
+        part.steps = (batch if keep is None else batch.select(*keep)).cpu()
+        return part
+
     collector = EpisodeCollector(
         env,
         agent,
@@ -148,13 +155,44 @@ def rollout(
         compiled=compiled,
         num_threads=num_cores(),
     )
-    parts = []
-    with exploring(greedy=greedy):
-        while (missing := num_episodes - collector.episodes) > 0 or collector.frames < frames:
-            batch = collector.collect(missing if exact and missing > 0 else None)
-            part = CompleteEpisodes.of(task, batch)
-            part.steps = (batch if keep is None else batch.select(*keep)).cpu()
-            parts.append(part)
+    parts = _read_batches(collector, read, num_episodes, frames, greedy, exact)
     episodes = CompleteEpisodes.joined(parts)
     episodes.implementation = "PyTorch" if isinstance(collector.fused, Reasons) else "fused kernel"
     return episodes if frames else episodes.first(num_episodes)
+
+
+def end_reasons(actor: TensorDictModuleBase, env: EnvBase, num_episodes: int) -> Tensor:
+    """Return why greedy episodes end, those of `rollout`. Shape: (num_episodes,).
+
+    `rollout` would step the fused kernel's actions a second time, for the goals reached.
+    """
+
+    def read(batch: Any) -> Tensor:
+        return batch[END_REASON][batch["next", "done"]]
+
+    collector = EpisodeCollector(
+        env, actor, keep_actor_entries=False, compiled=True, num_threads=num_cores()
+    )
+    return torch.cat(_read_batches(collector, read, num_episodes))[:num_episodes]
+
+
+def _read_batches(
+    collector: EpisodeCollector,
+    read: Callable[[TensorDictBase], T],
+    num_episodes: int,
+    frames: int = 0,
+    greedy: bool = True,
+    exact: bool = False,
+) -> list[T]:
+    """Read each batch of so many episodes and steps; see `rollout`. Close the collector."""
+    setting = f"episodes={num_episodes}"
+    require_memory(num_episodes * EPISODE_BYTES, setting, "give fewer episodes")
+    read_batches = []
+    try:
+        with exploring(greedy=greedy):
+            while (missing := num_episodes - collector.episodes) > 0 or collector.frames < frames:
+                batch = collector.collect(missing if exact and missing > 0 else None)
+                read_batches.append(read(batch))
+    finally:
+        collector.shutdown(close_env=False)
+    return read_batches

@@ -4,18 +4,14 @@ import functools
 from collections.abc import Mapping
 from typing import Any
 
-import torch
-from torch import Tensor, nn
+from torch import nn
 from torchrl.envs import EnvBase
 
-from drone_rl.acceleration.fused_episodes import END_REASON
-from drone_rl.collectors import EpisodeCollector
+from drone_rl.collectors.complete_episodes import end_reasons
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import base_env
 from drone_rl.policies import make_actor
-from drone_rl.policies.actor import exploring
 from drone_rl.policies.zoo import describe
-from drone_rl.utils.provenance import num_cores
 from drone_rl.utils.seeding import Stream
 
 _NUM_ENVS = 250
@@ -45,27 +41,12 @@ class Confirmation:
         actor = make_actor(self._network, env.action_spec)
         self._network.eval()  # as the policy acts once it is loaded
         try:
-            ends = self._end_reasons(actor, episodes)
+            ends = end_reasons(actor, env, episodes)
         finally:
             self._network.train()
         self.attempts += 1
         self.succeeded = int((ends == base_env(env).worlds.task.success_end).sum())
         return self.succeeded >= settings.trainer.confirm_share * episodes - 1e-9
-
-    def _end_reasons(self, actor: Any, count: int) -> Tensor:
-        """Return why greedy episodes end. Shape: (count,).
-
-        `rollout` would step the fused kernel's actions a second time, for the goals reached.
-        """
-        collector = EpisodeCollector(
-            self._env, actor, keep_actor_entries=False, compiled=True, num_threads=num_cores()
-        )
-        ends: list[Tensor] = []
-        with exploring(greedy=True):
-            while collector.episodes < count:
-                batch: Any = collector.collect()
-                ends.append(batch[END_REASON][batch["next", "done"]])
-        return torch.cat(ends)[:count]
 
     @functools.cached_property
     def _env(self) -> EnvBase:

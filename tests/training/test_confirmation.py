@@ -40,9 +40,9 @@ def test_confirmation_uses_the_most_probable_action():
 
 
 def test_each_update_confirms_in_new_environments(monkeypatch):
-    calls, make_collector = [], confirming.EpisodeCollector
+    calls, run = [], confirming.end_reasons
 
-    def note(env, actor, **how):
+    def note(actor, env, episodes):
         base = env.base_env
         base.reset()
         calls.append(
@@ -54,9 +54,9 @@ def test_each_update_confirms_in_new_environments(monkeypatch):
             )
         )
         base.set_seed(SETTINGS.seed)
-        return make_collector(env, actor, **how)
+        return run(actor, env, episodes)
 
-    monkeypatch.setattr(confirming, "EpisodeCollector", note)
+    monkeypatch.setattr(confirming, "end_reasons", note)
     confirmation = Confirmation(SETTINGS, always(1.0, 0.0, 0.0))
     shares = [(confirmation(update), confirmation.succeeded)[1] for update in (1, 1, 2)]
     assert shares[0] == shares[1]
