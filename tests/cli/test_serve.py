@@ -3,7 +3,7 @@
 import re
 import signal
 
-from tests.cli.running import error_line, server
+from tests.cli.running import server
 from tests.flight.airsim.conftest import Client
 
 
@@ -24,8 +24,3 @@ def test_it_says_when_clients_can_connect_and_ends_by_ctrl_c(tmp_path):
     assert "Traceback" not in errors
     assert "3 calls: ping 1, enableApiControl 1, takeoff 1" in " ".join((printed + errors).split())
     client.close()
-
-
-def test_wrong_settings_are_one_line(in_process):
-    line = error_line(in_process("serve", "port=0", "scene=moon"))
-    assert "scene=moon is unknown" in line

@@ -69,16 +69,3 @@ def test_a_setting_of_torchrls_loss_that_is_not_ours_is_passed_on():
     mine = TrainSettings.read({**told.config(), "objective": config}).objective
     assert mine.arguments() == {"clip_value": 0.3} and type(mine).factory is Ppo.factory
     assert mine.passes == {"epochs": 5, "minibatch_size": Ppo().minibatch_size}
-
-
-@pytest.mark.parametrize(
-    ("value", "message"),
-    [
-        ({"num_steps": 1}, "num_steps=1: it must be a whole number from 2 to 4096"),
-        ({"minibatch_size": 0}, "minibatch_size=0: it must be"),
-        ({"critic_coeff": 0.0}, "critic_coeff=0.0: it must be a number above 0"),
-    ],
-)
-def test_values_out_of_bounds(value, message):
-    with pytest.raises(InputError, match=message):
-        Ppo(**value)

@@ -44,9 +44,6 @@ def test_boundaries_adjust_to_the_cubes():
 @pytest.mark.parametrize(
     ("change", "name"),
     [
-        ({"num_cubes": 0}, "num_cubes=0"),
-        ({"spacing": -9.0}, "spacing=-9.0"),
-        ({"first_distance": math.nan}, "first_distance=nan"),
         ({"step_limit": 5}, "step_limit=5"),
         ({"vertical_bound": 5.0, "altitude": 6.6}, "altitude=6.6"),
         ({"altitude": 1.0}, "altitude=1.0"),

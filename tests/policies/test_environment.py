@@ -39,12 +39,8 @@ def test_task_is_selected_by_name():
     ("given", "message"),
     [
         ({"task": "pillar"}, "task='pillar': it must be one of"),
-        ({"task": 3}, "task=3 is no task"),
         ({"taks": 3}, "taks is unknown; valid names: .* mean task"),
-        ({"camera": "tiny"}, "camera='tiny'"),
-        ({"camera": {"heigth": 9}}, "camera.heigth is unknown; valid names: .* mean height"),
         ({"dynamics": "simple_flight"}, "dynamics='simple_flight'"),
-        ({"actions": "velocity"}, "actions='velocity'"),
         ({"appearance": "smog"}, "appearance='smog': it must be one of"),
         ({"transforms": "gray"}, r"transforms\[0\]='gray' is no transform"),
         ({"transforms": [Gray(), 3]}, r"transforms\[1\]=3 is no transform"),

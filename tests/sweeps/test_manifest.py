@@ -67,14 +67,12 @@ def test_no_sweep_and_a_damaged_one(tmp_path):
     ("change", "message"),
     [
         ({"command": "drone-rl train; rm -rf ~"}, "must be a training command"),
-        ({"settings": [1]}, r"settings=\[1\]"),
         ({"plugins": []}, "plugins is unknown"),
         ({"runs": [{"number": 0, "overrides": [], "folder": "../0"}]}, "not inside the sweep's"),
         (
             {"runs": [{"number": 0, "overrides": ["a._target_=b"], "folder": "0"}]},
             "not a plain setting",
         ),
-        ({"runs": [{"number": 0, "overrides": "a", "folder": "0"}]}, "overrides='a'"),
     ],
 )
 def test_a_damaged_or_malicious_manifest(tmp_path, make_runs, change, message):
@@ -115,9 +113,7 @@ def test_the_name_of_a_sweep_depends_on_its_settings_alone():
     assert sweep_name(["sweep=learning_rate"]).startswith("learning_rate-")
 
 
-@pytest.mark.parametrize(
-    "content", ["[1]", '{"largest_reward": 3}', '{"reason": 5, "largest_reward": 3}', "[" * 10**5]
-)
+@pytest.mark.parametrize("content", ['{"largest_reward": 3}', "[" * 10**5])
 def test_a_damaged_result_is_none(tmp_path, content):
     (tmp_path / "result.json").write_text(content)
     assert read_result(tmp_path) is None

@@ -15,7 +15,6 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import side_stream, world_random_state
 from tests.continuous import make_env
 from tests.second_dynamics import Turning
-from tests.second_task import Posts
 
 TASK = TaskSettings(num_cubes=1)
 
@@ -43,14 +42,6 @@ def test_baselines_run_from_the_same_initial_states(policies, monkeypatch):
             found = getattr(episodes.goals, field)
             assert torch.equal(found.nan_to_num(), values.nan_to_num()), (name, field)
     assert len(flown["oracle"]) == 6 and flown["oracle"].success.all()
-
-
-def test_baselines_of_another_task():
-    env = DroneEnv(4, Posts(), pixels=False, seed=5)
-    flown = run_baselines(4, Posts(), env.state_dict(), 8)
-    assert tuple(flown) == ("random", "forward", "oracle")
-    assert flown["oracle"].success.all() and flown["forward"].success.all()
-    assert flown["random"].success.mean() < 0.5
 
 
 def test_baselines_with_continuous_actions():

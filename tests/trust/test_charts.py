@@ -1,6 +1,6 @@
 import numpy as np
 
-from drone_rl.trust.charts import chart, curves, strips
+from drone_rl.trust.charts import chart, strips
 from drone_rl.trust.shifts_results import Robustness, packed
 from tests.evidence import SHIFTS
 
@@ -36,13 +36,3 @@ def test_strips_show_the_tested_strengths():
     counts = {color: count for count, color in one.convert("L").getcolors()}
     shown = {color for color in range(0, 240, 40) if counts.get(color, 0) >= 25 * 64 * 9}
     assert shown == {0, 40, 200}  # strengths 1 and 5 alone were flown
-
-
-def test_chart_of_each_axis_and_the_legend():
-    charts = curves(MEASURED)
-    assert next(iter(charts)) == "elevation of the sun"
-    assert [*charts][-1] == "legend" and len(charts) == 4
-    sun = charts["elevation of the sun"].axes[0]
-    assert [text.get_text() for text in sun.get_xticklabels()] == ["0", "55", "60"]
-    labels = [text.get_text() for text in charts["legend"].axes[0].get_legend().get_texts()]
-    assert "success rate of the policy" in labels and "certainly good in this range" in labels

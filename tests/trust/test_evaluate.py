@@ -1,16 +1,12 @@
 """Evaluations in Python, and how they show themselves."""
 
-import re
-
 import pytest
 
 import drone_rl
 from drone_rl.config import AppearanceSettings
 from drone_rl.sim.vocabulary import shipped_vocabulary
 from drone_rl.trust.evaluate import Evaluation
-from drone_rl.trust.results import Figures
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.utils.progress import silent
 from tests.fake_flight import floating
 
@@ -44,37 +40,6 @@ def test_evaluation_in_python(good):
     assert said[:2] == [("repeated episodes", 0, 0), ("most probable actions", 0, 3)]
     assert said[-1] == ("evaluated", 3, 3)
     assert "<td>success rate</td>" in done._repr_html_()
-
-
-def test_table_of_an_evaluation(good):
-    def flown(success, left):
-        return Figures(
-            success=proportion(*success),
-            shares={s: dict(mean_bounds(left)) for s in ("all", "left", "ahead", "right")},
-            ends={"step_limit": proportion(1, 4)},
-            never_reached=mean_bounds([0.25]),
-            mean_goals=1.5,
-            mean_length=40.0,
-            episodes=4,
-        )
-
-    ours, best = flown((1, 4), [0.5] * 100), flown((4, 4), [])
-    figures = {"greedy": ours, "sampled": ours, "oracle": best}
-    seed = {"seed": 8, "seed_is_fixed": False}
-    told = str(Evaluation(policy="good", terms=CUBES, **seed, **figures)).splitlines()
-    assert told[-1] == "environments: seed 8 (fresh)"
-    rows = told[:-1]
-    assert rows[0].split() == ["greedy", "sampled", "oracle"]
-    assert rows[1].split() == ["success", "rate", "25.0%", "25.0%", "100%"]
-    assert re.split(" {2,}", rows[2].strip()) == [
-        "95% CI",
-        *["0.6% to 80.6%"] * 2,
-    ]  # of the policy only
-    assert rows[5].split() == ["on", "its", "left", "50.0%", "50.0%", "-"]
-    assert rows[13].split() == ["end:", "step", "limit", "1", "1", "1"]
-    whole = [row for row in rows if "95% CI" not in row]
-    assert len({len(row) for row in whole}) == 1
-    assert all(len(re.split(" {2,}", row)) == 4 for row in whole)  # no two columns touch
 
 
 def test_a_missing_oracle_is_named(good):

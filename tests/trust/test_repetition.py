@@ -118,9 +118,7 @@ def test_a_policy_that_is_spoiled_in_the_first_places_of_a_large_batch_is_found(
     assert found.worst.successes == 0, "it is always in the first places when run again"
 
 
-@pytest.mark.parametrize(
-    ("num_envs", "sizes"), [(1, ["one"]), (3, ["one", "3"]), (60, ["one", "8"])]
-)
+@pytest.mark.parametrize(("num_envs", "sizes"), [(1, ["one"]), (60, ["one", "8"])])
 def test_episodes_of_any_batch_are_repeated_with_the_stated_sizes(make_run, num_envs, sizes):
     found = repeat(*make_run(Steering(), num_envs=num_envs))
     assert [run.how.split()[0] for run in found.runs] == sizes

@@ -1,7 +1,6 @@
 import json
 
 import pytest
-from hypothesis import HealthCheck
 
 import drone_rl
 from drone_rl.config import DynamicsSettings, TaskSettings
@@ -22,7 +21,6 @@ from tests.second_task import Posts
 from tests.training.test_train import TINY
 
 LEFT, AHEAD, RIGHT = Side
-SHARED = HealthCheck.function_scoped_fixture
 LAYOUTS = [[LEFT, RIGHT], [RIGHT, LEFT], [AHEAD, LEFT], [RIGHT, AHEAD]]
 
 
@@ -42,10 +40,7 @@ def judged(make_episodes, make_baselines):
     ("hits", "kind", "status"),
     [
         (lambda i, side: True, VerdictKind.GOOD, 0),
-        (lambda i, side: False, VerdictKind.POOR, 10),
         (lambda i, side: side != LEFT, VerdictKind.ONE_SIDED_RIGHT, 11),
-        (lambda i, side: side != RIGHT, VerdictKind.ONE_SIDED_LEFT, 11),
-        (lambda i, side: side != AHEAD, VerdictKind.NONE, 12),
         (lambda i, side: side == AHEAD, VerdictKind.POOR, 10),  # as flying straight on
         (lambda i, side: i % 8 < 4, VerdictKind.NONE, 12),
     ],
@@ -70,10 +65,7 @@ def test_few_episodes_are_not_certain(judged):
     ("number", "missed", "enough"),
     [
         (40, None, 2 * 40),
-        (28, None, 3 * 28),
-        (16, None, 5 * 16),
         (8, None, 10 * 8),
-        (4, None, 20 * 4),
         (100, 13, 50 * 100),  # one episode in thirteen
         (40, 14, 100 * 40),
     ],
@@ -204,13 +196,11 @@ def test_verdict_on_another_task():
     ("policy", "oracle", "forward", "kind", "certain"),
     [
         (400, None, 12, VerdictKind.GOOD, True),
-        (400, 8, 12, VerdictKind.GOOD, True),  # not trivial, though the oracle is no better
         (300, 8, 12, VerdictKind.NONE, True),  # absolute: 75% are not 90%
         (340, 340, 12, VerdictKind.GOOD, True),  # relative: the oracle succeeds in no more
         (400, 260, 240, VerdictKind.GOOD, True),  # not trivial: the policy solves all episodes
         (340, 340, 340, VerdictKind.TRIVIAL, True),
         (400, 210, 12, VerdictKind.GOOD, False),  # 50% lie within the interval of the oracle
-        (400, None, 400, VerdictKind.TRIVIAL, True),
     ],
 )
 def test_only_an_oracle_that_succeeds_sets_the_thresholds(

@@ -64,11 +64,6 @@ def test_an_own_task_has_a_name_of_its_own():
             assert env.spec.max_episode_steps is None  # the task's own limit counts, once
 
 
-def test_gymnasium_suggests_a_name():
-    with pytest.raises(gymnasium.error.NameNotFound, match=r"CollectCube.*CollectCubes"):
-        gymnasium.make("drone_rl/CollectCube-v0")
-
-
 def test_without_gymnasium_an_error_names_the_extra(tmp_path):
     code = (
         "import sys\n"

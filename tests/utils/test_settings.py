@@ -77,12 +77,8 @@ def test_values_take_their_types_and_are_plain_data():
     ("change", "message"),
     [
         ({"count": 0}, "count=0: it must be a whole number from 1 to 3"),
-        ({"count": "2"}, "count='2': it must be a whole number"),
         ({"size": "x"}, "size='x': it must be a number from 0"),
-        ({"widths": [1, 2, 3]}, r"widths=\[1,2,3\]: it must have at most 2 items"),
-        ({"inner": 3}, "inner=3: it must be "),
         ({"inner": {"x": 10}}, r"inner\.x=10: it must be a whole"),
-        ({"inner": {"xx": 10}}, r"inner\.xx is unknown; valid names: x"),
         ({"is_on": True}, "size=None needs a value"),
         ({"cout": 1}, r"cout is unknown; valid names: count, size.*; did you mean count\?"),
     ],

@@ -27,16 +27,13 @@ def message(line):
         ("train --seed 1", "without dashes; did you mean seed?"),
         ("train --cuda", "did you mean device=cuda?"),
         ("train nothing", "nothing: settings are typed name=value"),
-        ("train seed", "seed: settings are typed name=value"),
         ("train sed=1", "has no setting sed; did you mean seed?"),
         ("train task.max_steps=9", "did you mean task.step_limit?"),
         (
             "train -m hydra.sweeper.metric=success seed=1,2",
             "add hydra/sweeper=optuna, which has it",
         ),
-        ("train hydra.run.dri=x", "did you mean hydra.run.dir?"),
         ("train policy=mlp", "did you mean network?"),
-        ("train task.num_cube=1", "did you mean task.num_cubes?"),
         ("verdict camera=large", "drone-rl verdict --help all lists the settings"),
         ("train objective.epochs=3", "objective=ppo has it"),
         (
@@ -48,7 +45,6 @@ def message(line):
         ("train hydra/launcher=slurm", "no effect on a single run; add -m"),
         ("train inputs=[gray,foo]", "inputs is one of altitude, attitude, depth, goal, gray"),
         ("train inputs=[gray,gray]", "it has gray twice; give the other one a name of its own"),
-        ("train inputs.gray.stack=2", "has no setting inputs.gray.stack; inputs=[gray] has it"),
         ("train inputs=[gray,goal] inputs.gray.stak=2", "did you mean inputs.gray.stack?"),
         (
             "train +inputs@inputs.down=depth inputs.down.camera=down inputs.dwn.stack=2",
@@ -62,17 +58,10 @@ def test_a_mistake_has_a_remedy(line, remedy):
     assert remedy in message(line)
 
 
-def test_a_value_of_a_wrong_type_is_named(in_process):
-    line = error_line(in_process("train", "optimizer.lr=abc"))
-    assert line.startswith("error: optimizer.lr='abc': it must be a number above 0")
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         (["inputs=[]"], "inputs: the policy would see nothing; give inputs"),
-        (["inputs=[gray]", "inputs.gray.stack=0"], "inputs.gray.stack=0: it must be a whole"),
-        (["inputs=[gray]", "inputs.gray.size=48"], "inputs.gray.size=48: it must be a list"),
         (["inputs=[gray,velocity]"], "drones that move at once have no velocity"),
         (["inputs=[gray,goal]", "network=lstm"], "network=lstm takes pixels alone"),
     ],

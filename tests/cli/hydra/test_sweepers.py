@@ -23,11 +23,8 @@ from tests.cli.running import error_line  # noqa: E402
         ("a=tag(log,interval(1e-4,1e-1))", FloatDistribution(1e-4, 1e-1, log=True)),
         ("a=int(interval(1,5))", IntDistribution(1, 5)),
         ("a=tag(log,int(interval(1,100)))", IntDistribution(1, 100, log=True)),
-        ("a=interval(1,5)", FloatDistribution(1.0, 5.0)),
-        ("a=range(1,6)", IntDistribution(1, 5)),
         ("a=range(0,10,4)", IntDistribution(0, 8, step=4)),
         ("a=choice(x,y)", CategoricalDistribution(["x", "y"])),
-        ("a=1,2", CategoricalDistribution(["1", "2"])),
     ],
 )
 def test_distributions(text, expected):
@@ -39,8 +36,6 @@ def test_distributions(text, expected):
     "text",
     [
         "optimizer.lr=range(0.001,0.01,0.001)",
-        "seed=range(1.5,4)",
-        "seed=range(5,1,-1)",
         "seed=range(3,3)",
         "optimizer.lr=tag(log,interval(0,1))",
     ],
@@ -71,8 +66,6 @@ def test_a_journal_sets_only_what_is_searched():
     [
         (["task.reward.contact.weight=interval(-1,0)"], "add hydra.sweeper.metric=success"),
         (["experiment=smoke,pillars", "optimizer.lr=1,2"], "it changes the task"),
-        (["hydra.sweeper.metric=success", "task=collect_cubes,pillars"], "it changes the task"),
-        (["hydra.sweeper.metric=loss", "seed=0,1"], "metric='loss': it must be"),
         (
             ["hydra.sweeper.metric=success", "seed=0,1", "trainer.confirm_episodes=0"],
             "give 1 or more",
