@@ -1,11 +1,10 @@
 """`drone-rl plot`: its settings."""
 
 import logging
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
-from drone_rl.cli.settings import CommandSettings, with_name
+from drone_rl.cli.settings import CommandSettings
 from drone_rl.utils.files import write_atomically
 from drone_rl.utils.schema import Listed, OneOf
 
@@ -19,15 +18,11 @@ class PlotCommand(CommandSettings):
     the highest. The y axis is the success rate, or the running reward where it was not logged.
     """
 
+    unnamed = "runs"
     runs: Annotated[tuple[str, ...], Listed("folder")] = ("outputs/train",)
     """Folders of runs, of sweeps, or others that contain some."""
     x: Annotated[str, OneOf(("frames", "seconds"))] = "frames"
     """The x axis: frames, or seconds of training."""
-
-    @classmethod
-    def prepare(cls, overrides: Sequence[str]) -> list[str]:
-        """Translate `drone-rl plot A B` to `runs=[A,B]`."""
-        return with_name(overrides, "runs")
 
     def run(self, folder: Path) -> tuple[int, None]:
         """Draw the curves; return the exit status."""

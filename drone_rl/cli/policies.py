@@ -1,4 +1,4 @@
-"""`drone-rl policies` and `convert`: list policies and their verdicts; convert older files."""
+"""`drone-rl policies` and `convert`: list policies and their verdicts; convert older ones."""
 
 import time
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import drone_rl
-from drone_rl.cli.settings import CommandSettings, with_name
+from drone_rl.cli.settings import CommandSettings
 from drone_rl.utils.display import aligned
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import trained_policies
@@ -15,11 +15,6 @@ from drone_rl.utils.text import plural
 
 _LONGEST_NAME = 18
 """Characters of a path above which its figures are on a line of their own."""
-NO_RUN_FOLDER = (
-    *("hydra.run.dir=.", "hydra.output_subdir=null", "hydra.job_logging.root.handlers=[console]"),
-    "++hydra.job_logging.handlers.file.delay=true",
-)
-"""Keep Hydra from creating a folder, settings and a log."""
 
 
 class PoliciesCommand(CommandSettings):
@@ -28,13 +23,9 @@ class PoliciesCommand(CommandSettings):
     The first column is what policy= takes. Verdicts are those that the policies' files record.
     """
 
+    has_folder = False
     most: Annotated[int, Whole(0, 10_000, "policies")] = 20
     """Trained policies to list, the newest first."""
-
-    @classmethod
-    def prepare(cls, overrides: Sequence[str]) -> list[str]:
-        """Return the command line of a command that writes no files."""
-        return [*super().prepare(overrides), *NO_RUN_FOLDER]
 
     def run(self, folder: Path) -> tuple[int, None]:
         """List the shipped and the trained policies; return the exit status."""
@@ -61,25 +52,20 @@ class PoliciesCommand(CommandSettings):
 
 
 class ConvertCommand(CommandSettings):
-    """Write files of older versions in the present layout: drone-rl convert FILE or FOLDER."""
+    """Write a policy of version 0.1 in the present layout: drone-rl convert FILE."""
 
+    unnamed, has_folder = "file", False
     file: str = ""
-    """Policy (.pt or .safetensors), certificate.json or shifts.json, or the folder of a run or
-    sweep, whose files are converted in their places and kept as NAME_former."""
+    """Policy of version 0.1: a .pt or .safetensors file."""
     output: str | None = None
-    """The new file; null for NAME_converted next to the old one."""
-
-    @classmethod
-    def prepare(cls, overrides: Sequence[str]) -> list[str]:
-        """Translate `drone-rl convert FILE` to `file=FILE`; the command has no folder."""
-        return [*with_name(overrides, "file"), *NO_RUN_FOLDER]
+    """The new file; null for NAME_converted.safetensors next to the old one."""
 
     def run(self, folder: Path) -> tuple[int, None]:
-        """Convert; print the new files and return the exit status."""
+        """Convert; print the new file and return the exit status."""
         from drone_rl.policies.convert import convert  # imports torch
 
-        for path in convert(Path(self.file), None if self.output is None else Path(self.output)):
-            print(f"written: {path}")
+        output = None if self.output is None else Path(self.output)
+        print(f"written: {convert(Path(self.file), output)}")
         return 0, None
 
 

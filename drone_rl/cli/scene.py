@@ -2,11 +2,10 @@
 
 import io
 import logging
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
-from drone_rl.cli.settings import CommandSettings, with_name
+from drone_rl.cli.settings import CommandSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import write_all_atomically
 from drone_rl.utils.schema import OneOf, Real
@@ -21,6 +20,7 @@ class SceneCommand(CommandSettings):
     above and from the first start.
     """
 
+    unnamed = "file"
     file: str = ""
     """An MJCF file, a mesh (OBJ, STL, PLY or GLB), or indoor or outdoor."""
     up: Annotated[str, OneOf(("z", "y"))] = "z"
@@ -29,11 +29,6 @@ class SceneCommand(CommandSettings):
     """Metres of one unit of a mesh; task.scene_scale of a training."""
     drone_size: Annotated[float, Real(0.01, 10.0, unit="m")] = 0.3
     """Diameter of the drone for which free space is measured."""
-
-    @classmethod
-    def prepare(cls, overrides: Sequence[str]) -> list[str]:
-        """Translate `drone-rl scene FILE` to `file=FILE`."""
-        return with_name(overrides, "file")
 
     def run(self, folder: Path) -> tuple[int, None]:
         """Describe the scene; return the exit status."""

@@ -4,7 +4,7 @@ import inspect
 import logging
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import pydantic
 
@@ -15,6 +15,11 @@ from drone_rl.utils.files import trained_policies
 from drone_rl.utils.settings import Settings
 
 _log = logging.getLogger(__name__)
+_NO_FOLDER = (
+    *("hydra.run.dir=.", "hydra.output_subdir=null", "hydra.job_logging.root.handlers=[console]"),
+    "++hydra.job_logging.handlers.file.delay=true",
+)
+"""Keep Hydra from creating a folder, settings and a log."""
 
 
 class CommandSettings(Settings):
@@ -23,10 +28,16 @@ class CommandSettings(Settings):
     paths: PathsSettings = PathsSettings()
     """Folders."""
 
+    unnamed: ClassVar[str] = ""
+    """Setting whose value may be typed without its name, as in `drone-rl scene FILE`."""
+    has_folder: ClassVar[bool] = True
+    """Whether the command writes files into a folder, with its settings and a log."""
+
     @classmethod
     def prepare(cls, overrides: Sequence[str]) -> list[str]:
         """Return the command line that Hydra composes."""
-        return [*overrides]
+        words = with_name(overrides, cls.unnamed) if cls.unnamed else [*overrides]
+        return words if cls.has_folder else [*words, *_NO_FOLDER]
 
     @classmethod
     def description(cls) -> str:

@@ -1,10 +1,9 @@
 """`drone-rl sweep-report`: its settings."""
 
 import logging
-from collections.abc import Sequence
 from pathlib import Path
 
-from drone_rl.cli.settings import CommandSettings, with_name
+from drone_rl.cli.settings import CommandSettings
 from drone_rl.config.values import NumEpisodes
 
 _log = logging.getLogger(__name__)
@@ -16,6 +15,7 @@ class SweepReportCommand(CommandSettings):
     Every sweep also ends with it.
     """
 
+    unnamed = "folder"
     folder: str = "latest"
     """Folder of the sweep, or latest for the newest one."""
     picture: str | None = None
@@ -26,11 +26,6 @@ class SweepReportCommand(CommandSettings):
     """Episodes of each of these verdicts, in environments reserved for model selection."""
     device: str = "cpu"
     """Device of these episodes: cpu, cuda or cuda:N."""
-
-    @classmethod
-    def prepare(cls, overrides: Sequence[str]) -> list[str]:
-        """Translate `drone-rl sweep-report FOLDER` to `folder=FOLDER`."""
-        return with_name(overrides, "folder")
 
     def run(self, folder: Path) -> tuple[int, None]:
         """Report on a sweep, finished or not; return the exit status."""

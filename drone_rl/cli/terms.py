@@ -1,9 +1,7 @@
 """`drone-rl terms`: list the terms that tasks can name."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
-from drone_rl.cli.policies import NO_RUN_FOLDER
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.config.terms import ALL_TERMS, Terms
 from drone_rl.utils.display import aligned
@@ -16,10 +14,7 @@ class TermsCommand(CommandSettings):
     task.reward.NAME.weight=-0.3, and likewise below the other settings.
     """
 
-    @classmethod
-    def prepare(cls, overrides: Sequence[str]) -> list[str]:
-        """Return the command line of a command that writes no files."""
-        return [*super().prepare(overrides), *NO_RUN_FOLDER]
+    has_folder = False
 
     def run(self, folder: Path) -> tuple[int, None]:
         """List the terms; return the exit status."""
