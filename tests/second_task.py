@@ -180,11 +180,6 @@ class Posts(Task[PostsState]):
         state.passed[:, :-1] = True
         return state
 
-    def without_targets(self, state):
-        """Place all posts far behind the drone."""
-        gone = torch.ones_like(state.passed)
-        return dataclasses.replace(state, posts=state.posts - 100.0, passed=gone)
-
     def without_next(self, state):
         """Place the next post far behind the drone."""
         following = is_next(self, state)

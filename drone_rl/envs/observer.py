@@ -191,13 +191,6 @@ class Pipeline:
         for stage in self.stages:
             stage.memory = None
 
-    def of_frames(self, frames: Sequence[Tensor]) -> Tensor:
-        """Return what is seen with the last of consecutive images, as if the first were a start."""
-        *earlier, last = frames
-        for i, images in enumerate(earlier):
-            self(images, starts=not i)
-        return self(last, starts=not earlier)
-
     @property
     def earlier(self) -> int:
         """Number of earlier frames in what a policy sees."""

@@ -8,11 +8,19 @@ from typing import Any, TypeVar
 
 import numpy as np
 from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.envs import base_env
 from drone_rl.explanations.heat_maps import Explainer
-from drone_rl.explanations.hooks import feature_layer, find_layer, of_input, spatial_layers
+from drone_rl.explanations.hooks import (
+    feature_layer,
+    find_layer,
+    of_input,
+    probabilities,
+    rest_in,
+    spatial_layers,
+)
 from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frames, select_frames
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.explanations.settings import ExplainSettings
@@ -83,6 +91,11 @@ class Context:
         base_env(self.env).load_state_dict(self._start)
         generator = torch_generator(self.seed.value, Stream.REPORT, device=str(self.env.device))
         return make_actor(self.network, self.env.action_spec, generator)
+
+    def evaluate(self, inputs: Mapping[str, Tensor]) -> Tensor:
+        """Return action probabilities for inputs by name. (T, *) to (T, parts), see `Actions`."""
+        others = rest_in({name: inputs[name] for name in self.scenes.others})
+        return probabilities(self.network, inputs[self.scenes.name], others)
 
     def copied_for_thread(self) -> "Context":
         """Return a copy for another thread, which must not step the environments.

@@ -12,11 +12,9 @@ from torch import Tensor
 
 from drone_rl.envs import Observer
 from drone_rl.explanations.context import Context
-from drone_rl.explanations.hooks import probabilities, rest_in
 from drone_rl.explanations.results import Importance, InputEffect, Median
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.sim.tasks import State
-from drone_rl.utils.intervals import episode_means, median_bounds
 
 DRAWS = 4
 """Other frames, and pairs of measurements, for each frame."""
@@ -33,16 +31,16 @@ def section(context: Context) -> Importance | None:
         return None
     inputs = {scenes.name: data.tensor("observations"), **data.others}
     state, seed, episode = data.state(scenes.worlds), context.seed.value, data.episode
-    base = _evaluate(context, inputs)
+    base = context.evaluate(inputs)
     effects = {name: np.zeros(len(data)) for name in inputs}
     placebos = {name: np.zeros(len(data)) for name in inputs}
     for draw in range(DRAWS):
         other = torch.from_numpy(other_frames(episode, np.random.default_rng([seed, draw])))
         again = [measured(scenes, state, (seed, draw, number)) for number in range(2)]
         for name, values in inputs.items():
-            changed = _evaluate(context, {**inputs, name: values[other]})
+            changed = context.evaluate({**inputs, name: values[other]})
             effects[name] += _distance(context, changed, base) / DRAWS
-            one, two = (_evaluate(context, {**inputs, name: of[name]}) for of in again)
+            one, two = (context.evaluate({**inputs, name: of[name]}) for of in again)
             placebos[name] += _distance(context, one, two) / DRAWS
     found = {name: compare(effects[name], placebos[name], episode) for name in scenes.inputs}
     return Importance(inputs=found, least=LEAST, level=LEVEL)
@@ -50,16 +48,10 @@ def section(context: Context) -> Importance | None:
 
 def compare(effect: NDArray, placebo: NDArray, episode: NDArray) -> InputEffect:
     """Compare the effect of an input in frames with that of its placebo. Shapes: (T,)."""
-
-    def median(values: NDArray) -> Median:
-        means = episode_means(values, episode)
-        lower, upper = median_bounds(means, 1.0 - 2 * LEVEL) or (None, None)
-        return Median(median=float(np.median(means)), lower=lower, upper=upper)
-
-    excess = median(effect - placebo)
+    excess = Median.of(effect - placebo, episode, LEVEL)
     return InputEffect(
-        effect=median(effect),
-        placebo=median(placebo),
+        effect=Median.of(effect, episode, LEVEL),
+        placebo=Median.of(placebo, episode, LEVEL),
         excess=excess,
         matters=(excess.lower or 0.0) > LEAST,
     )
@@ -83,12 +75,6 @@ def measured(scenes: Scenes, state: State, seed: tuple[int, ...]) -> dict[str, T
         observer = Observer(scenes.worlds, scenes.inputs, streams=streams)
         parts.append(observer.observe(state[some], some - start, True, None))
     return {name: torch.cat([part[name] for part in parts]) for name in scenes.inputs}
-
-
-def _evaluate(context: Context, inputs: dict[str, Tensor]) -> Tensor:
-    """Return the action probabilities for inputs by name."""
-    others = rest_in({name: inputs[name] for name in context.scenes.others})
-    return probabilities(context.network, inputs[context.scenes.name], others)
 
 
 def _distance(context: Context, one: Tensor, two: Tensor) -> NDArray:

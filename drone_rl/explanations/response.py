@@ -1,6 +1,6 @@
 """Sections "response" (maps over the place of one target) and "asymmetry"."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import numpy as np
 import torch
@@ -9,7 +9,7 @@ from torch import Tensor
 
 from drone_rl.config.inputs import ImageInput
 from drone_rl.explanations.context import Context, needs, objects
-from drone_rl.explanations.hooks import probabilities, rest_in
+from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.results import (
     Asymmetry,
     Mirrored,
@@ -61,15 +61,11 @@ def mirror_images(context: Context) -> str | None:
 @needs(mirror_images)
 def asymmetry_section(context: Context) -> Asymmetry:
     """Compare the policy with its mirror image on the analysed frames."""
-    data, network, scenes = context.dataset, context.network, context.scenes
+    data, scenes = context.dataset, context.scenes
     inputs = {scenes.name: data.tensor("observations"), **data.others}
-
-    def evaluate(inputs: Mapping[str, Tensor]) -> Tensor:
-        others = {name: inputs[name] for name in scenes.others}
-        return probabilities(network, inputs[scenes.name], rest_in(others))
-
     mirrored = {name: scenes.mirror(name, values) for name, values in inputs.items()}
-    return asymmetry(evaluate(inputs), evaluate(mirrored), data.episode, scenes.actions)
+    here, there = context.evaluate(inputs), context.evaluate(mirrored)
+    return asymmetry(here, there, data.episode, scenes.actions)
 
 
 def response_map(

@@ -19,7 +19,7 @@ from drone_rl.trust.shifts_results import Robustness, SavedShifts, find
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
-from drone_rl.utils.intervals import Mean, Share
+from drone_rl.utils.intervals import Mean, Share, episode_means, median_bounds
 from drone_rl.utils.limits import EXPLANATION_BYTES
 from drone_rl.utils.models import Model, Seeded
 from drone_rl.utils.text import render
@@ -181,6 +181,16 @@ class Median(Model):
     median: float
     lower: float | None
     upper: float | None
+
+    @classmethod
+    def of(cls, values: Array, episode: Array, level: float, **more: Any) -> Self:
+        """Return the median of the episodes' means; each bound holds with probability 1 - level.
+
+        Shapes: (T,), the values of frames and their episodes.
+        """
+        means = episode_means(values, episode)
+        lower, upper = median_bounds(means, 1.0 - 2 * level) or (None, None)
+        return cls(median=float(np.median(means)), lower=lower, upper=upper, **more)
 
 
 class InputEffect(Model):

@@ -1,6 +1,6 @@
 """Settings of an explanation."""
 
-from typing import Annotated, Literal, TypedDict
+from typing import Annotated, Literal
 
 from drone_rl.config import RendererName
 from drone_rl.config.values import NumEpisodes, OpenFraction, Seed, Steps
@@ -108,17 +108,3 @@ def check_perplexity(perplexity: float, count: int) -> None:
             f"perplexity={perplexity:g} does not fit {count} points; give 1 to {largest} or "
             "record more frames"
         )
-
-
-class ExplainOptions(TypedDict, total=False):
-    """Fields of `ExplainSettings`."""
-
-    frames: int
-    data_episodes: int
-    episodes: int
-    good_share: float
-    layer: str | None
-    grad_cam_layer: str | None
-    perplexity: float
-    seed: int | None
-    renderer: str

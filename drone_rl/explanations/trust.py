@@ -43,7 +43,7 @@ from drone_rl.explanations.results import (
 from drone_rl.explanations.rollouts import spread_frames
 from drone_rl.explanations.scenes import alternatives
 from drone_rl.policies import ImageNetwork
-from drone_rl.utils.intervals import Mean, episode_means, mean_interval, median_bounds
+from drone_rl.utils.intervals import Mean, episode_means, mean_interval
 
 MapOf = Callable[..., Tensor]
 """A method: network, observations (T, C, h, w), actions (T,), and the rest of the inputs, see
@@ -201,14 +201,11 @@ def check_method(trial: Trial, method: MapOf, level: float) -> MethodTest:
     scores = trial.scores(maps)
     hit, chance = patches.pointing(trial.grid.means(maps), trial.effects)
     placebos = {
-        name: _median(scores - placebo, episode, level)
+        name: Median.of(scores - placebo, episode, level)
         for name, placebo in trial.placebo_scores.items()
     }
-    pointing = Pointing(
-        **_median(hit - chance, episode, level).model_dump(),
-        hit=float(hit.mean()),
-        chance=float(chance.mean()),
-    )
+    shares = {"hit": float(hit.mean()), "chance": float(chance.mean())}
+    pointing = Pointing.of(hit - chance, episode, level, **shares)
     resembling = _likeness(trial, method, level)
     is_passed = {  # a bound of None fails
         "placebos": all((b.lower or 0.0) > 0.0 for b in placebos.values()),
@@ -247,14 +244,7 @@ def _likeness(trial: Trial, method: MapOf, level: float) -> Likeness:
     networks = trial.shuffled(WEIGHT_SEEDS)
     seeds = np.stack([likeness(maps, few.maps(method, network)) for network in networks])
     medians = tuple(np.median(seeds, axis=1).tolist())
-    return Likeness(**_median(seeds.mean(0), few.episode, level).model_dump(), seeds=medians)
-
-
-def _median(values: NDArray, episode: NDArray, level: float) -> Median:
-    """Return the median of the episodes' means; each bound holds with probability 1 - level."""
-    means = episode_means(values, episode)
-    lower, upper = median_bounds(means, 1.0 - 2 * level) or (None, None)
-    return Median(median=float(np.median(means)), lower=lower, upper=upper)
+    return Likeness.of(seeds.mean(0), few.episode, level, seeds=medians)
 
 
 def _mean(scores: NDArray, episode: NDArray) -> Mean:

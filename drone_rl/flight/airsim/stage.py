@@ -154,11 +154,6 @@ class Stage:
         solids = getattr(self.task, "solids", ()) if self._is_file else ()
         return [solids.name(i) for i in range(len(solids))] if solids else self.names[1:]
 
-    @property
-    def movable(self) -> list[str]:
-        """Names of the scene's and spawned objects, parts of a file excepted."""
-        return [*self._names, *self._spawned]
-
     def _read_file(self) -> dict[str, Pose]:
         """Return the poses of a file's geoms and bodies, by their names; geoms precede bodies."""
         if not self._is_file:

@@ -145,10 +145,6 @@ class SceneEdits:
         present[:, first] = True
         return self._changed(state, present=present)
 
-    def without_targets(self, state: ObjectState) -> ObjectState:
-        """Remove all targets."""
-        return self._changed(state, present=state.present & ~self._targets.to(state.present.device))
-
     def without_next(self, state: ObjectState) -> ObjectState:
         """Remove the next target, if there is one."""
         return self._changed(state, present=state.present & ~self._is_next(state))
