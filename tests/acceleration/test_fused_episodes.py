@@ -418,12 +418,10 @@ COLORS = (RgbPixels, partial(Shift, 6, 9), ChromaticityPixels, StandardizePixels
 @pytest.mark.parametrize(
     ("look", "transforms"),
     [
-        (FOG, (GrayPixels,)),
         (None, CROPPED),
         (RANDOM, CROPPED),
         (None, (RgbPixels, StandardizePixels)),
         (FOG, COLORS),
-        (RANDOM, COLORS),
     ],
 )
 def test_colors_shifts_and_visual_randomization_are_fused(look, transforms):

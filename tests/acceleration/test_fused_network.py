@@ -32,11 +32,9 @@ def assert_equal_torch(network, fused, count, shape):
 @pytest.mark.parametrize(
     ("shape", "options"),
     [
-        ((1, 25, 64), {"hidden": (128,)}),
         ((1, 25, 64), {"channels": (8,), "hidden": ()}),
         ((1, 26, 41), {"patch": 5, "channels": (3, 17, 40), "hidden": (33, 20)}),
         ((1, 4, 4), {"channels": (5,), "hidden": (7,)}),  # output of 1x1
-        ((1, 12, 40), {"channels": (6, 9), "hidden": (16,)}),  # output with one row
         ((3, 13, 22), {"channels": (5, 6)}),  # frames of three channels
         ((2, 8, 8), {"patch": 8, "channels": (4,)}),  # a patch is a whole frame
     ],

@@ -3,9 +3,6 @@
 import re
 from pathlib import Path
 
-import pytest
-
-from benchmarks import chapter
 from drone_rl.cli.commands import COMMANDS
 
 ROOT = Path(__file__).parents[2]
@@ -22,8 +19,3 @@ def test_every_element_of_the_chapter_is_shown_by_a_command_or_test():
         tests = re.findall(r"`(tests/\S+\.py)`", row)
         assert commands or tests, row
         assert {*commands} <= {*COMMANDS} and all((ROOT / path).is_file() for path in tests), row
-
-
-def test_minutes_are_scaled_to_all_episodes(tmp_path, monkeypatch):
-    monkeypatch.setattr(chapter, "train", lambda run, *settings: (6.0, {}))
-    assert chapter.minutes(tmp_path, 3000) == pytest.approx(1.0)

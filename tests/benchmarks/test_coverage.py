@@ -36,12 +36,6 @@ def test_an_interval_that_assumes_independent_cubes_is_detected():
     assert coverage.coverage(coverage.OUTCOMES["all or nothing, 9 of 10"], 100, holds) < 0.8
 
 
-def test_coverage_of_proportions_is_the_minimum_over_true_rates():
-    """With one episode the interval of no success ends at 0.975, where coverage is lowest."""
-    rows = list(coverage._proportions(quick=True))
-    assert rows[0]["coverage"] == pytest.approx(0.975, abs=1e-6)
-
-
 def test_quantities_of_an_episode_type():
     policy = SimulatedPolicy({((L, A), (1, 0), False): 1.0}, forward_share=0.3)
     values = (float(value[0]) for value in policy.observed)

@@ -1,16 +1,10 @@
 """Statistics of times, rates and memory by hand, and trainings of a few frames."""
 
-import dataclasses
-
 import pytest
-import yaml
 
-from benchmarks import pipeline, revisions, scaling, speed, startup, training
+from benchmarks import pipeline, revisions, scaling, startup
 from benchmarks.memory import growth
-from benchmarks.pipeline import paired, rate
-from drone_rl.config import AppearanceSettings
-from drone_rl.utils.run_result import RunResult
-from drone_rl.utils.settings import conf_dir
+from benchmarks.pipeline import paired
 
 
 @pytest.fixture
@@ -29,10 +23,6 @@ def clock(monkeypatch):
         return run
 
     return work
-
-
-def test_rate_repeats_work_until_the_time_is_up(clock):
-    assert rate(clock(6, 2.0), seconds=5.0) == 18 / 6.0
 
 
 def test_a_drift_of_the_machine_does_not_change_the_ratio(clock):
@@ -70,31 +60,3 @@ def test_a_training_that_ends_without_an_update_is_an_error(tmp_path, monkeypatc
     monkeypatch.setattr(startup, "PROGRAM", ("python", "-c", "raise SystemExit(3)"))
     with pytest.raises(RuntimeError, match="status 3"):
         startup.first_update_seconds(tmp_path / "run", "cpu")
-
-
-def test_the_measured_blocks_are_those_of_the_configuration():
-    settings = yaml.safe_load((conf_dir() / "appearance" / "blocks.yaml").read_text())
-    del settings["defaults"]
-    assert AppearanceSettings.read(settings) == speed.BLOCKS
-
-
-def test_a_training_is_evaluated_for_each_seed(setup, monkeypatch):
-    setup = dataclasses.replace(setup, seeds=(3, 4), quick=False)
-    runs = []
-
-    def train(run, *settings):
-        runs.append(settings)
-        result = RunResult(reason="solved", frames=10 * len(runs), seconds=0.5, largest_reward=3)
-        return 2.0 * len(runs), result
-
-    monkeypatch.setattr(training, "train", train)
-    monkeypatch.setattr(training, "evaluate", lambda setup, run: {"share": 0.95, "lower95": 0.9})
-    figures = training.bench_solve(setup)
-    assert [settings[0] for settings in runs] == ["seed=3", "seed=4"]
-    assert (figures["time_to_solve_s"], figures["median_time_to_solve_s"]) == ([2.0, 4.0], 3.0)
-    assert figures["learning_fps"] == 30.0  # of 20 and 40
-    assert (figures["seeds_solved"], figures["success_lower95"]) == (2, [0.9, 0.9])
-    monkeypatch.setattr(training, "PRESETS", {"flight": 1})
-    figures = training.bench_presets(setup)
-    assert figures["flight_frames"] == [30] and "experiment=flight" in runs[-1]
-    assert figures["inputs_solve_s"] == {"flight": 6.0}

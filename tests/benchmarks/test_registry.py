@@ -6,7 +6,6 @@ import re
 import pytest
 
 from benchmarks.benchmark import Benchmark
-from benchmarks.commands import train
 from benchmarks.ledger import Ledger, describe_machine, digest_code, make_origin
 from benchmarks.registry import BENCHMARKS, GROUPS, find_benchmarks
 from benchmarks.run import run_benchmarks
@@ -68,15 +67,6 @@ def test_a_second_command_continues_after_an_interrupt(bench):
     assert bench(["one"], again=True)[0] == ["one"]
 
 
-def test_runs_of_an_earlier_command_are_deleted_but_not_its_log(bench, setup):
-    log = setup.folder / "runs" / "bench.log"
-    for path in (log, setup.runs / "train_0" / "result.json"):
-        path.parent.mkdir(parents=True)
-        path.touch()
-    bench([])
-    assert log.exists() and not setup.runs.exists()
-
-
 def store(path, name="tides", **figures):
     ledger = Ledger(path)
     ledger.add(name, figures, make_origin("abc", {"quick": True}))
@@ -119,8 +109,3 @@ def test_the_digest_depends_on_the_measured_code_only(tmp_path, path, counts):
     before = digest_code(["sim", "conf"], tmp_path)
     (tmp_path / path).write_text("2")
     assert (digest_code(["sim", "conf"], tmp_path) != before) is counts
-
-
-def test_a_command_fails_with_the_end_of_its_errors(tmp_path):
-    with pytest.raises(RuntimeError, match=r"drone-rl train task.* failed: .*num_cubs"):
-        train(tmp_path, "task.num_cubs=3")

@@ -28,8 +28,6 @@ from drone_rl.utils.run_result import RunResult
 from drone_rl.utils.seeding import RootSeed
 from tests.training.test_train import TINY
 
-INF = float("inf")
-
 
 def test_report_escapes_what_it_shows(sweep):
     page = write_sweep_report(sweep)[0].read_text()
@@ -124,13 +122,10 @@ def six(begin_sweep, make_verdict):
     ("part", "text", "change"),
     [
         ("runs", "count as not solved", {"failed": 1}),
-        ("runs", "are left out of every", {"unfinished": 1}),
         ("runs", "1 of 1 settings have fewer than 6", {"groups": {"solved": proportion(1, 5)}}),
-        ("runs", "at least half", {"groups": {"frames_to_solve": median_of_runs([INF], [9.0])}}),
         ("verdicts", "2 of 6 verdicts are not certain", {"certain": 4}),
         ("verdicts", "without a verdict by the present rule", {"judged": 5}),
         ("best", "No run has been judged", {"best": None}),
-        ("curves", "Thin lines", {"groups": {"solved": proportion(1, 3)}}),
     ],
 )
 def test_what_makes_a_sentence(six, part, text, change):
@@ -141,11 +136,8 @@ def test_what_makes_a_sentence(six, part, text, change):
     ("part", "text", "change"),
     [
         ("verdicts", "Verdicts are on the last policies", {"judged": 0}),
-        ("verdicts", "All are certain", {"certain": 5}),
         ("best", "reaches 100% of its goals", {"best": None}),
         ("best", "optimistic", {"judged": 1}),
-        ("curves", "Thick line", {"groups": {"solved": proportion(1, 5)}}),
-        ("outcome", "Each dot", {"judged": 0}),
         ("settings", "exact 95% intervals", {"finished": 0}),
     ],
 )

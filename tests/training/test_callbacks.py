@@ -125,13 +125,11 @@ STUCK = [(0.001, 1.5)]
     [
         (LEARNING + STUCK * 49, None),
         (LEARNING + STUCK * 50, 5200),
-        (LEARNING + STUCK * 300, 5200),  # warns once
         (LEARNING + STUCK * 30 + [(0.1, 1.5)] + STUCK * 49, None),  # explores in between
         (LEARNING + STUCK * 40 + [(0.001, 1.6)] * 40, None),  # improves in between
         ([(0.0, 0.78 - 0.5**n) for n in range(99)], 6100),  # settles: rises by 0.03 until n = 10
         ([(0.0, 2.8)] * 300, None),  # deterministic and good
         ([(1.0, 0.5)] * 300, None),  # explores
-        ([(-0.5, 0.5)] * 300, None),  # the density of continuous actions
         ([(None, 0.5)] * 300, None),  # a learner that logs no entropy
     ],
 )

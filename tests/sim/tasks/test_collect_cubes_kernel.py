@@ -136,14 +136,11 @@ FLIGHT, VELOCITIES = DynamicsSettings(mode="simple_flight"), ActionSettings(kind
 @pytest.mark.parametrize(
     ("task", "dynamics", "is_supported"),
     [
-        (CollectCubes, ComputerVision(), True),
-        (CollectCubes, Quadrotor(FLIGHT), True),
         (CollectCubes, Windy(), False),
         (CollectCubes, Quadrotor(FLIGHT, VELOCITIES), True),
         (Strict, ComputerVision(), False),
         (Raised, ComputerVision(), False),
         (Solid, Quadrotor(FLIGHT), False),
-        (Pillars, ComputerVision(), True),
         (Pillars, Quadrotor(FLIGHT), True),
     ],
 )
