@@ -1,17 +1,15 @@
 """Claims about the inputs of a policy: that one is ignored, matters, or is exported alike."""
 
 import dataclasses
-import shutil
-import tempfile
-from pathlib import Path
 from typing import Any
 
 import torch
 
 from benchmarks.benchmark import Setup
 from benchmarks.inputs.export import measure_export
-from benchmarks.inputs.goal import SEEING, TASK, WALKING, train
+from benchmarks.inputs.goal import PLUGIN, SEEING, TASK, TASK_NAME, WALKING, own_folder
 from benchmarks.inputs.placebos import measure_placebos
+from benchmarks.seeing import train
 from drone_rl.collectors.complete_episodes import rollout
 from drone_rl.envs import base_env
 from drone_rl.policies.policy import Policy, load_policy
@@ -32,10 +30,9 @@ def bench_inputs(setup: Setup) -> dict[str, Any]:
     """
     seeds = range(2 if setup.quick else 20)
     run = setup.runs / "inputs" / "train"
-    with tempfile.TemporaryDirectory() as folder:
-        own = Path(folder)
-        shutil.copy(TASK, own)
-        train(own, run, 0, 20_000 if setup.quick else 600_000, *SEEING, *WALKING)
+    most, settings = 20_000 if setup.quick else 600_000, (PLUGIN, TASK_NAME, *SEEING, *WALKING)
+    with own_folder() as folder:
+        train(run, 0, most, *settings, where=folder)
     import_plugin(str(TASK))
     return measure_claims(load_policy(run), seeds, setup.quick)
 

@@ -1,19 +1,17 @@
 """A user's task that needs an image and a goal: what policies reach with and without the image."""
 
+import contextlib
 import shutil
 import tempfile
-import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from benchmarks.benchmark import Setup
-from benchmarks.commands import call
-from drone_rl.trust.rule import VerdictKind
-from drone_rl.utils.exit_codes import NOT_CERTAIN
-from drone_rl.utils.files import read_json
-from drone_rl.utils.run_result import RunResult
+from benchmarks.seeing import train_both
 
 TASK = Path(__file__).parents[1] / "own_task" / "goal_behind_boxes.py"
+PLUGIN, TASK_NAME = f"plugins={TASK.name}", f"task={TASK.stem}"
 PPO = (
     *("objective=ppo", "objective.num_steps=64", "objective.epochs=3"),
     *("objective.minibatch_size=1024", "returns.gamma=0.98", "optimizer.lr=1e-3"),
@@ -35,7 +33,6 @@ SEEING_DEPTH = (
     *("inputs.depth.horizontal_fov=110", "inputs.depth.maximum=8"),
 )
 BLIND_FLIGHT = ("inputs=[goal,velocity]",)
-_STATUSES = (NOT_CERTAIN, *(kind.exit_code for kind in VerdictKind))
 
 
 def bench_goal(setup: Setup) -> dict[str, Any]:
@@ -63,45 +60,20 @@ def _compare(
     blind: tuple[str, ...],
     most: int,
 ) -> dict[str, Any]:
-    most = 20_000 if setup.quick else most
-    lower, seconds, frames, without = [], [], [], []
-    with tempfile.TemporaryDirectory() as folder:
-        own = Path(folder)
-        shutil.copy(TASK, own)
-        for seed in setup.seeds[:3]:
-            run = setup.runs / name / f"seeing_{seed}"
-            begin = time.perf_counter()
-            train(own, run, seed, most, *seeing, *settings)
-            seconds.append(time.perf_counter() - begin)
-            frames.append(RunResult.read_json(run / "result.json").frames)
-            lower.append(_success(own, run, setup.quick)["lower95"])
-            run = setup.runs / name / f"blind_{seed}"
-            train(own, run, seed, frames[-1], *blind, *settings, "trainer.target_share=null")
-            without.append(_success(own, run, setup.quick)["share"])
+    both = (*seeing, *settings, TASK_NAME), (*blind, *settings, TASK_NAME)
+    with own_folder() as folder:
+        made = train_both(setup, setup.runs / name, most, *both, (PLUGIN,), folder)
     return {
-        f"{name}_lower95": min(lower),
-        f"{name}_s": max(seconds),
-        f"{name}_frames": frames,
-        f"{name}_blind": max(without),
+        f"{name}_lower95": min(one["lower95"] for one in made.seeing),
+        f"{name}_s": max(made.seconds),
+        f"{name}_frames": made.frames,
+        f"{name}_blind": max(one["share"] for one in made.blind),
     }
 
 
-def train(own: Path, run: Path, seed: int, most: int, *settings: str) -> None:
-    """Train the task in a folder that holds its file, for at most so many frames."""
-    task = (f"plugins={TASK.name}", f"task={TASK.stem}", "logger=csv", f"seed={seed}")
-    call(
-        "train",
-        *task,
-        *settings,
-        f"trainer.total_frames={most}",
-        f"hydra.run.dir={run}",
-        folder=own,
-    )
-
-
-def _success(own: Path, run: Path, quick: bool) -> dict[str, Any]:
-    """Return the success rate of a verdict, with its interval."""
-    made, few = run / "verdict", ["episodes=100"] if quick else []
-    where = (f"plugins={TASK.name}", f"hydra.run.dir={made}")
-    call("verdict", f"policy={run}", *where, *few, statuses=_STATUSES, folder=own)
-    return read_json(made / "verdict.json")["greedy"]["success"]
+@contextlib.contextmanager
+def own_folder() -> Iterator[Path]:
+    """Make a folder that holds the task's file, and delete it at the end."""
+    with tempfile.TemporaryDirectory() as folder:
+        shutil.copy(TASK, folder)
+        yield Path(folder)

@@ -21,7 +21,8 @@ import msgpack
 
 from benchmarks.benchmark import Setup
 from benchmarks.commands import PROGRAM, call
-from benchmarks.worlds.training import STATUSES, WALKING, task_in
+from benchmarks.seeing import STATUSES
+from benchmarks.worlds.training import WALKING, task_in
 from drone_rl.utils.files import read_json
 
 _HERE = Path(__file__).parent

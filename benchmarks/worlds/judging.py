@@ -7,7 +7,8 @@ from typing import Any
 from benchmarks.benchmark import Setup
 from benchmarks.commands import call
 from benchmarks.maps import count_maps_in_flights
-from benchmarks.worlds.training import STATUSES, WALKING, train
+from benchmarks.seeing import STATUSES, train
+from benchmarks.worlds.training import SCENE, WALKING, task_in
 from drone_rl.policies.policy import load_policy
 
 _GRAY = "experiment=reach", "inputs=[gray]"
@@ -24,8 +25,8 @@ def bench_world_judging(setup: Setup) -> dict[str, Any]:
     """
     folder, frames = setup.runs / "worlds" / "judging", 20_000 if setup.quick else 600_000
     run, plain = folder / "train", folder / "gray"
-    train(run, 0, frames, *WALKING)
-    train(plain, 0, frames // 4, *_GRAY, "trainer.target_share=null")
+    train(run, 0, frames, *task_in(SCENE), *WALKING)
+    train(plain, 0, frames // 4, *task_in(SCENE), *_GRAY, "trainer.target_share=null")
     return {
         "world_verdict_s": _seconds("verdict", run, folder),
         "world_explain_s": _seconds("explain", run, folder),
