@@ -42,7 +42,7 @@ def truth_charts(truth: Truth) -> dict[str, Figure]:
     methods = truth.methods.items()
     scores = [_score_row(METHOD_NAMES[n], colors[n], of.score) for n, of in methods]
     scores += [_score_row(f"placebo: {name}", css(MUTED), score) for name, score in ordered]
-    title = "agreement with the patches that affect\nthe policy (score; chance: 0; line: 95%)"
+    title = "agreement with the patches\nthat affect the policy\n(score; chance: 0; line: 95%)"
     charts = [interval_chart(scores, 0.0, title)]
     for title, (limit, result_of) in _TESTS.items():
         rows = []

@@ -24,6 +24,8 @@ ROW = 18
 """Height of an action's row, pixels."""
 SCALE = 5
 """Enlargement of a single frame."""
+_NARROW = 64
+"""Pixels of a frame's width below which it is enlarged more, so that captions have room."""
 _CHANNELS = {"gray": 1, "rgb": 3, "chromaticity": 2, "classes": 5}
 """Number of channels of a frame, by kind."""
 _CLASSES = np.array([NEXT_CUBE, DOWN, GROUND, MUTED, SKY]) / 255
@@ -88,8 +90,9 @@ def frame_with_probabilities(
 
 
 def enlarge(frame: NDArray, scale: int = SCALE) -> Image.Image:
-    """Enlarge a frame without interpolation."""
+    """Enlarge a frame without interpolation, narrow ones more, so that captions have room."""
     picture = Image.fromarray(frame)
+    scale = max(scale, -(-_NARROW * scale // picture.width))
     return picture.resize((picture.width * scale, picture.height * scale), Image.Resampling.NEAREST)
 
 

@@ -112,3 +112,9 @@ def test_actions_have_a_row_each():
     assert np.ptp(columns) == pytest.approx(0.6 * 144, abs=1)
     others, _ = bars(picture, MUTED).nonzero()
     assert others.min() > ROW
+
+
+def test_narrow_frames_are_as_wide_as_captions_need():
+    """Frames of 24 pixels are enlarged to at least 64 x 5 pixels, 14 times; wider ones 5 times."""
+    sizes = [pictures.enlarge(np.zeros((12, width, 3), np.uint8)).size for width in (24, 64, 128)]
+    assert sizes == [(336, 168), (320, 60), (640, 60)]
