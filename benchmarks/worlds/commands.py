@@ -60,7 +60,7 @@ def bench_world_commands(setup: Setup) -> dict[str, Any]:
 def write_house(path: Path) -> None:
     """Write a house of two rooms and a doorway between them, 6 x 4 m, around (3, 0)."""
     boxes = {
-        "floor": ("3 0 -0.05", "3.1 2.1 0.05", "0.6 0.5 0.4"),
+        "floor": ("2.25 0 -0.05", "3.85 2.1 0.05", "0.6 0.5 0.4"),
         "west": ("-1.55 0 1.2", "0.05 2.1 1.2", "0.8 0.7 0.5"),
         "east": ("6.05 0 1.2", "0.05 2.1 1.2", "0.5 0.6 0.8"),
         "south": ("2.25 -2.05 1.2", "3.85 0.05 1.2", "0.7 0.7 0.7"),
