@@ -276,12 +276,15 @@ class Outcomes(Model):
     """Rollouts that reach the target: "as it was", "moved left", "moved right"."""
     follows: Mean
     """Metres that the drone moves sideways with the target per metre."""
-    ground_changed: Mean
-    """Rollouts whose outcome differs with another ground."""
+    ground_changed: Mean | None
+    """Rollouts whose outcome differs with another ground; None if no frame shows any, as in scene
+    files, whose floors are geoms like others."""
 
     @property
-    def finding(self) -> Finding:
+    def finding(self) -> Finding | None:
         """The effect of another ground, which should have none."""
+        if self.ground_changed is None:
+            return None
         text = render("drone_rl.explanations.report", "ground.j2", outcomes=self)
         effect, tested = self.ground_changed.mean or 0.0, frozenset({"color"})
         return Finding(text=text, effect=effect, tested=tested, section="truth")
@@ -505,7 +508,7 @@ class Explanation(Seeded):
     def findings(self) -> tuple[Finding, ...]:
         """What the policy's success depends on, the largest effect first."""
         outcomes = self.truth.outcomes if self.truth else None
-        others = [outcomes.finding] if outcomes else []
+        others = [outcomes.finding] if outcomes and outcomes.finding else []
         return find(self.verdict, self.shifts, others) if self.verdict else tuple(others)
 
     @property

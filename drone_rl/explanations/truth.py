@@ -174,13 +174,16 @@ def measure_outcomes(
     }
     run = functools.partial(run_to_target, scenes, network, target=target, memory=memory)
     runs = {name: run(changed) for name, changed in variants.items()}
-    repainted = run(start, appearance=DARK_GROUND)
-
+    has_ground = bool((scenes.frames(start) != scenes.frames(start, DARK_GROUND)).any())
+    ground_changed = None
+    if has_ground:
+        is_other = runs["as it was"].collected != run(start, appearance=DARK_GROUND).collected
+        ground_changed = mean_interval(is_other, group)
     return Outcomes(
         flights=len(rows),
         collected={name: mean_interval(run.collected, group) for name, run in runs.items()},
         follows=mean_interval(followed(runs["moved left"], runs["moved right"]), group, -1.0),
-        ground_changed=mean_interval(runs["as it was"].collected != repainted.collected, group),
+        ground_changed=ground_changed,
     )
 
 

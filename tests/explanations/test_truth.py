@@ -5,8 +5,10 @@ import pytest
 import torch
 from torch import nn
 
+from drone_rl.config import BaseTaskSettings, CameraSettings
+from drone_rl.envs import DroneEnv
 from drone_rl.explanations.hooks import probabilities
-from drone_rl.explanations.scenes import Region, place_target
+from drone_rl.explanations.scenes import Region, Scenes, place_target
 from drone_rl.explanations.truth import (
     PATIENCE,
     Intervention,
@@ -123,6 +125,16 @@ def test_a_constant_policy_follows_nothing(scenes, starts, action):
         assert found.collected["as it was"].mean == pytest.approx(float(ahead.mean()))
     else:
         assert found.collected["as it was"].mean < 0.5
+
+
+def test_no_outcome_is_said_to_depend_on_ground_that_is_not_there():
+    """A scene file has geoms alone."""
+    task = BaseTaskSettings.read({"name": "reach", "scene": ["indoor"]}, "task")
+    env = DroneEnv(3, task, camera=CameraSettings(width=24, height=12))
+    env.reset()
+    found = measure_outcomes(Scenes(env), Always(Move.FORWARD), env.worlds.state, np.arange(3))
+    assert found.flights == 3
+    assert found.ground_changed is None and found.finding is None
 
 
 @pytest.mark.parametrize("fears_dark", [True, False])
