@@ -209,18 +209,19 @@ class AppliedRules:
         return world
 
     def _constants(self, state: Any, timestep: float | None, *, is_kept: bool) -> Any:
-        """Return the rules' constants, with no more of states than events need."""
-        key = device, timestep = str(state.places.device), timestep
-        if self._routes or self._events or self.compiled.in_torch or not is_kept:
-            world = self._make_constants(device, timestep)
-            self._prepare_events(world, state)
-            self._prepare_paths(world, state)
-            if self.compiled.in_torch:
-                world.seen = wp.zeros(len(state), dtype=Step, device=device)
-            return world
+        """Return the rules' constants, with no more of states than events and routes need."""
+        key = device, _ = str(state.places.device), timestep
         if key not in self._kept:
-            self._kept[key] = self._make_constants(device, timestep)
-        return self._kept[key]
+            self._kept[key] = self._make_constants(*key)
+        if not (self._routes or self._events or self.compiled.in_torch) and is_kept:
+            return self._kept[key]
+        world: Any = World()
+        world.assign(self._kept[key])
+        self._prepare_events(world, state)
+        self._prepare_paths(world, state)
+        if self.compiled.in_torch:
+            world.seen = wp.zeros(len(state), dtype=Step, device=device)
+        return world
 
     def _prepare_events(self, world: Any, state: Any) -> None:
         """Give the phases of states, whose memory they share, and the room for displacements."""
