@@ -146,7 +146,7 @@ def test_walls_of_a_scene_file_stop_keys_and_velocities(make_world):
         fly(pilot, controls, 10.0)
         solids = world.task.solids(world.worlds.state).solids
         away = float(solids.distances(world.body.position))
-        radius = world.task.drone_size / 2 if mode == "computer_vision" else 0.3
+        radius = world.task.drone_size / 2
         assert away == pytest.approx(radius, abs=0.2) and away >= radius - 1e-4
 
 
