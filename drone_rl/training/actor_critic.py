@@ -31,8 +31,7 @@ from drone_rl.training.learners import (
     check_batch,
     descend,
 )
-from drone_rl.training.train import Components, group_sizes, make_groups
-from drone_rl.utils.provenance import num_cores
+from drone_rl.training.train import Components, local_groups
 from drone_rl.utils.seeding import Stream, torch_generator
 
 ADVANTAGE, TARGET, ENTROPY = "advantage", "value_target", "entropy"
@@ -51,9 +50,7 @@ def rollout_collector(
     objective = settings.objective
     chosen = settings.collector
     assert isinstance(objective, WithCritic) and isinstance(chosen, Rollouts)
-    sizes = group_sizes(settings)
-    cores = max(1, num_cores() // len(sizes))
-    groups = make_groups(settings, sizes, cores, replay)
+    groups, cores = local_groups(settings, replay)
     steps, compiled = objective.num_steps, chosen.compiled
     collectors = [
         RolloutCollector(env, actor, steps, compiled=compiled, num_threads=cores)

@@ -223,9 +223,7 @@ def threaded_collector(
     """Make `collector=episodes`: complete episodes, with returns, from threads of this process."""
     chosen = settings.collector
     assert isinstance(chosen, Episodes)
-    sizes = group_sizes(settings)
-    cores = max(1, num_cores() // len(sizes))
-    groups = make_groups(settings, sizes, cores, replay)
+    groups, cores = local_groups(settings, replay)
     collectors = [
         EpisodeCollector(env, actor, compiled=chosen.compiled, num_threads=cores)
         for env, actor in groups
@@ -239,6 +237,15 @@ def threaded_collector(
     if len(collectors) > 1:  # whose batches are copied
         return made
     return made._replace(activations=getattr(collectors[0].fused, "activations", None))
+
+
+def local_groups(
+    settings: TrainSettings, replay: FailureReplayTask | None = None
+) -> tuple[list[tuple[EnvBase, Any]], int]:
+    """Make the groups of threads of this process; return them and the cores that each has."""
+    sizes = group_sizes(settings)
+    cores = max(1, num_cores() // len(sizes))
+    return make_groups(settings, sizes, cores, replay), cores
 
 
 def group_sizes(settings: TrainSettings) -> list[int]:
