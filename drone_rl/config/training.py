@@ -52,15 +52,15 @@ class TrainerSettings(Settings):
     """Stop after the batch that reaches this many episodes; null for no limit."""
     target_share: Annotated[float, Real(0.0, 1.0, is_above=True)] | None = 0.99
     """Stop once the running reward reaches this fraction of the task's `largest_reward`; null
-    disables this rule. In a task without one, confirmations decide, each after ten times as many
-    episodes."""
+    disables this rule. In a task without one, confirmations decide."""
     confirm_episodes: Annotated[int, Whole(0, unit="episodes")] = 200
     """Greedy episodes in other environments that must confirm the policy before `target_share`
     stops the training; 0 skips the confirmation."""
     confirm_share: Fraction = 1.0
     """Fraction of these episodes that must reach every goal."""
-    confirm_interval: Annotated[int, Whole(1, unit="updates")] = 1
-    """Updates from one confirmation to the next while `target_share` is reached."""
+    confirm_interval: Annotated[int, Whole(1, unit="updates")] | None = None
+    """Updates from one confirmation to the next; null for each that reaches `target_share`, or in a
+    task without `largest_reward` after ten times as many episodes."""
     running_decay: Annotated[float, Real(0.0, 1.0, is_below=True)] = 0.99
     """Weight of the old value in the running reward, per episode: 0.99 averages about 100."""
     max_grad_norm: Annotated[float, Real(0.0, is_above=True)] | None = None

@@ -266,13 +266,15 @@ def target_of(settings: TrainSettings) -> float | None:
 def confirm_interval_of(settings: TrainSettings) -> int | None:
     """Return the updates between confirmations; None for no confirmations.
 
-    In a task whose largest reward is unknown they are a tenth of all episodes.
+    By default they are a tenth of all episodes in a task whose largest reward is unknown.
     """
     trainer = settings.trainer
     if trainer.target_share is None or not trainer.confirm_episodes:
         return None
-    if as_task(settings.task).largest_reward is not None:
+    if trainer.confirm_interval is not None:
         return trainer.confirm_interval
+    if as_task(settings.task).largest_reward is not None:
+        return 1
     episodes = _EPISODES_PER_CONFIRMED * trainer.confirm_episodes
     return math.ceil(episodes / settings.collector.num_envs)
 

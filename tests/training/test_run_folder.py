@@ -60,6 +60,8 @@ def test_a_task_whose_largest_reward_is_unknown_is_confirmed_regularly():
         settings = TrainSettings(task=as_settings(Open()))
         assert target_of(settings) is None
         assert confirm_interval_of(settings) == 125  # 2,000 episodes, 16 at a time: 200 confirm
+        often = settings.trainer.replace(confirm_interval=3)
+        assert confirm_interval_of(settings.replace(trainer=often)) == 3
         never = settings.trainer.replace(target_share=None)
         assert confirm_interval_of(settings.replace(trainer=never)) is None
     assert confirm_interval_of(TrainSettings()) == 1
