@@ -5,7 +5,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import mujoco as _mujoco
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -21,8 +20,6 @@ from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.text import plural
 
-mujoco: Any = _mujoco
-"""MuJoCo's bindings, which are untyped."""
 _FOV_ABOVE, _FOV = 50.0, 90.0
 _MOST_NAMES = 12
 _CELLS = 48
@@ -156,17 +153,11 @@ def _without_roof(scene: SceneFile) -> SceneFile:
     places = [site.position for site in (*_sites(scene, "start"), *_sites(scene, "goal"))]
     places = places or [(*((low + high) / 2)[:2].tolist(), flight_height(scene))]
     hidden = set[str]()
-    model, data = scene.model, mujoco.MjData(scene.model)
-    mujoco.mj_kinematics(model, data)
-    for geom in range(model.ngeom):
-        is_plane = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
-        turn = data.geom_xmat[geom].reshape(3, 3)
-        middle = data.geom_xpos[geom] + turn @ model.geom_aabb[geom, :3]
-        half = np.abs(turn) @ model.geom_aabb[geom, 3:] if not is_plane else np.array([1e9, 1e9, 0])
+    for geom, (least, most) in enumerate(scene.boxes):
         for place in places:
-            away = np.abs(middle - place) - half
-            if max(away[0], away[1]) <= 0.0 and middle[2] - half[2] > place[2]:
-                hidden.add(model.geom(geom).name)
+            is_over = (least[:2] <= place[:2]).all() and (place[:2] <= most[:2]).all()
+            if is_over and least[2] > place[2]:
+                hidden.add(scene.model.geom(geom).name)
     return scene.without(hidden) if hidden else scene
 
 

@@ -23,6 +23,7 @@ from drone_rl.utils.files import as_path
 
 mujoco: Any = _mujoco
 """MuJoCo's bindings, which are untyped."""
+_GEOM = mujoco.mjtGeom
 _log = logging.getLogger(__name__)
 _SMALLEST, _LARGEST = 0.1, 1000.0
 """Longest edges of worlds, metres; outside of this range the units are wrong."""
@@ -112,20 +113,51 @@ class SceneFile:
             return mujoco.MjModel.from_xml_string(self.mjcf, dict(self.assets))
 
     @functools.cached_property
-    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Least and largest coordinates of all geoms but planes, metres. Shapes: (3,)."""
+    def boxes(self) -> NDArray[np.float64]:
+        """Least and largest coordinates of each geom, metres; a plane's are infinite, but for z.
+
+        Shape: (geoms, 2, 3).
+        """
         model, data = self.model, mujoco.MjData(self.model)
         mujoco.mj_kinematics(model, data)
-        lows, highs = [], []
-        for geom in np.flatnonzero(model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE):
-            center, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
+        boxes = np.empty((model.ngeom, 2, 3))
+        for geom, box in enumerate(boxes):
             turn = data.geom_xmat[geom].reshape(3, 3)
-            middle, reach = data.geom_xpos[geom] + turn @ center, np.abs(turn) @ half
-            lows.append(middle - reach)
-            highs.append(middle + reach)
-        if not lows:
+            box[:] = data.geom_xpos[geom] + _reach(model, geom, turn)
+        return boxes
+
+    @functools.cached_property
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Least and largest coordinates of all geoms but planes, metres. Shapes: (3,)."""
+        boxes = self.boxes[self.model.geom_type != _GEOM.mjGEOM_PLANE]
+        if not len(boxes):
             return np.full(3, -10.0), np.full(3, 10.0)
-        return np.min(lows, 0), np.max(highs, 0)
+        return boxes[:, 0].min(0), boxes[:, 1].max(0)
+
+
+def _reach(model: Any, geom: int, turn: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the box around a turned geom, parallel to the world's axes, from the geom's place."""
+    size, upright = model.geom_size[geom], np.abs(turn[:, 2])
+    match model.geom_type[geom]:
+        case _GEOM.mjGEOM_MESH:  # its frame is that of its inertia, in which it is askew
+            mesh = model.geom_dataid[geom]
+            first = model.mesh_vertadr[mesh]
+            corners = model.mesh_vert[first : first + model.mesh_vertnum[mesh]] @ turn.T
+            return np.stack([corners.min(0), corners.max(0)])
+        case _GEOM.mjGEOM_PLANE:
+            half = np.array([np.inf, np.inf, 0.0])
+        case _GEOM.mjGEOM_SPHERE:
+            half = size[[0, 0, 0]]
+        case _GEOM.mjGEOM_CAPSULE:
+            half = size[0] + size[1] * upright
+        case _GEOM.mjGEOM_CYLINDER:
+            half = size[0] * np.sqrt(1.0 - upright**2) + size[1] * upright
+        case _GEOM.mjGEOM_ELLIPSOID:
+            half = np.linalg.norm(turn * size, axis=1)
+        case _:
+            half = np.abs(turn) @ model.geom_aabb[geom, 3:]
+            return turn @ model.geom_aabb[geom, :3] + np.stack([-half, half])
+    return np.stack([-half, half])
 
 
 FILES = Path(__file__).parent / "files"

@@ -86,6 +86,18 @@ def test_marks_places(write):
     assert region.half_size == (1, 2, 3) and region.heading == pytest.approx(90)
 
 
+def test_bounds_are_those_of_turned_shapes(write):
+    wedge = '<asset><mesh name="wedge" vertex="0 0 0 4 0 0 4 1 0 0 1 0 0 0 2 0 1 2"/></asset>'
+    world = """<geom type="mesh" mesh="wedge"/>
+    <geom type="cylinder" size="3 4" euler="0 30 45" pos="0 20 0"/>
+    <body pos="-5 0 0" euler="0 0 45"><geom size="1"/></body>"""
+    wedge_box, tilted, turned = load_scene(write(world, wedge)).boxes
+    np.testing.assert_allclose(wedge_box, [(0, 0, 0), (4, 1, 2)], atol=1e-5)
+    height = 4 * math.cos(math.pi / 6) + 3 * math.sin(math.pi / 6)
+    np.testing.assert_allclose(tilted[:, 2], (-height, height), atol=1e-6)
+    np.testing.assert_allclose(turned, [(-6, -1, -1), (-4, 1, 1)], atol=1e-6)
+
+
 def test_reads_again_what_has_changed(write):
     first = load_scene(write('<geom size="1"/>', name="one.xml"))
     assert load_scene(write('<geom size="1"/>', name="one.xml")).sha256 == first.sha256
