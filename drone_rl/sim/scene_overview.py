@@ -13,6 +13,7 @@ from torch import Tensor
 
 from drone_rl.config import BaseTaskSettings, CameraSettings
 from drone_rl.sim.entities import BOTTOM_CENTER, FRONT_CENTER, SceneEntity
+from drone_rl.sim.rendering.scene import Scene
 from drone_rl.sim.scenes import SceneFile, Site
 from drone_rl.sim.scenes.solids import solids_of
 from drone_rl.sim.tasks import Task, as_task
@@ -198,7 +199,8 @@ def _drawn(model: Any) -> str:
     meshes = f"{plural(model.nmesh, 'mesh', 'meshes')} of {plural(triangles, 'triangle')}"
     fields = plural(model.nhfield, "height field")
     textures, lights = plural(model.ntex, "texture"), plural(model.nlight, "light")
-    return f"{plural(model.ngeom, 'geom')}, {meshes}, {fields}, {textures}, {lights}"
+    shown = len(Scene(model, (), (), (0.0, 0.0, 0.0)).shown(show_drone=True))
+    return f"{shown} of {plural(model.ngeom, 'geom')}, {meshes}, {fields}, {textures}, {lights}"
 
 
 def _objects(model: Any) -> list[str]:

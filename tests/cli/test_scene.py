@@ -5,6 +5,7 @@ from PIL import Image
 HOUSE = """<mujoco><worldbody>
 <geom name="floor" type="box" size="2 3 .1"/><geom name="roof" type="box" size="2 3 .1" pos="0 0 3"
 rgba="0 0 1 1"/><body name="table"><geom name="top" type="box" size=".3 .3 .1" pos="1 1 1"/></body>
+<geom size=".1" pos="1 1 .5" group="3"/>
 {}</worldbody></mujoco>"""
 SITES = '<site name="start" pos="-1 -1 1"/><site name="goal" pos="1 -2 1"/>'
 
@@ -14,7 +15,8 @@ def test_describes_and_renders_a_scene_and_says_what_reach_lacks(in_process, tmp
     (tmp_path / "empty.xml").write_text(HOUSE.format(""))
     done = in_process("scene", "house.xml")
     assert done.returncode == 0, done.stderr
-    for words in ("4.00 x 6.00 x 3.20 m", "table, floor, roof", "3 of 3 geoms", "reach    ready"):
+    counts = "drawn    3 of 4 geoms", "solid    4 of 4 geoms"
+    for words in ("4.00 x 6.00 x 3.20 m", "table, floor, roof", *counts, "reach    ready"):
         assert words in done.stdout, done.stdout
     (above,) = tmp_path.rglob("above.png")
     with Image.open(above) as image:

@@ -241,10 +241,11 @@ class TermTask(ObjectTask):
             step=self.settings.step_length,
         )
         if not routes.is_level:
+            height = routes.routes[0].center[2]
             self.needed_actions = {
                 "up": "starts and goals are at different heights, where drones that keep theirs do "
                 "not arrive; give actions=moves_full, actions.climb_speed=1 (of actions=velocity), "
-                "or a height for all, such as task.start.z=1.2"
+                f"or a height for all, such as task.start.z={height:.4g}"
             }
 
     def check_dynamics(self, dynamics: Dynamics) -> None:

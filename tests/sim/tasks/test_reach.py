@@ -135,7 +135,7 @@ def test_goals_in_a_region_are_all_over_it(tmp_path):
     [
         ('<site name="start" pos="1 1 1"/>', {}, "no site whose name begins with goal"),
         (SITES, {"start": {"site": "door"}}, "no site whose name begins with door"),
-        (SITES.replace("1.5 2 1", "1.5 2 3.5"), {}, "different heights"),
+        (SITES.replace("1.5 2 1", "1.5 2 3.5"), {}, r"different heights.*task\.start\.z=1$"),
         ('<site name="start" pos="3 1 1"/><site name="goal" pos="5 3 1"/>', {}, "inside"),
         ('<site name="goal" pos="3 0.7 1"/>', {"drone_size": 1.0}, "does not fit at goal"),
         (SITES, {"drone_size": 1.2}, "no path of a drone of 1.2 m leads from start to goal"),
