@@ -5,6 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import mujoco as _mujoco
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -21,11 +22,15 @@ from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.text import plural
 
+mujoco: Any = _mujoco
+"""MuJoCo's bindings, which are untyped."""
 _FOV_ABOVE, _FOV = 50.0, 90.0
 _MOST_NAMES = 12
 _CELLS = 48
 """Points along the longest edge of the world at which free space is measured."""
 _OVERSAMPLED = 2
+_TOUCHING = 1e-3
+"""Metres from a solid within which a light is inside of it."""
 _START_COLOR, _GOAL_COLOR = (40, 160, 60), (220, 30, 130)
 
 
@@ -76,7 +81,7 @@ def describe(scene: SceneFile, task: Mapping[str, Any], drone_size: float = 0.3)
             f"for a drone of {drone_size:g} m",
         ),
         ("reach", _reach(task)),
-        *[("warning", warning) for warning in scene.warnings],
+        *[("warning", warning) for warning in (*scene.warnings, *_enclosed_lights(scene))],
     ]
     return "\n".join(f"{name:<9}{text}" for name, text in rows)
 
@@ -199,8 +204,33 @@ def _drawn(model: Any) -> str:
     meshes = f"{plural(model.nmesh, 'mesh', 'meshes')} of {plural(triangles, 'triangle')}"
     fields = plural(model.nhfield, "height field")
     textures, lights = plural(model.ntex, "texture"), plural(model.nlight, "light")
-    shown = len(Scene(model, (), (), (0.0, 0.0, 0.0)).shown(show_drone=True))
-    return f"{shown} of {plural(model.ngeom, 'geom')}, {meshes}, {fields}, {textures}, {lights}"
+    geoms = f"{len(_shown(model))} of {plural(model.ngeom, 'geom')}"
+    return f"{geoms}, {meshes}, {fields}, {textures}, {lights}"
+
+
+def _enclosed_lights(scene: SceneFile) -> list[str]:
+    """Return a line for each light whose light a solid around it shadows everywhere."""
+    model, data = scene.model, mujoco.MjData(scene.model)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)  # some lights follow it
+    mujoco.mj_camlight(model, data)
+    has_place = model.light_type != mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+    lights = np.flatnonzero(has_place & model.light_active & model.light_castshadow)
+    solids, shown, lines = solids_of((scene,), "cpu"), _shown(model), []
+    for light in lights.tolist():
+        near = solids.nearest(torch.from_numpy(data.light_xpos[light][None]))
+        distance, solid = float(near.distance), int(near.solid)
+        if distance <= _TOUCHING and solids.geoms[solid, 1] in shown:
+            lines.append(
+                f"light {model.light(light).name or light} is inside of {solids.name(solid)}, "
+                'whose shadow is everywhere; give the light castshadow="false", or move it'
+            )
+    return lines
+
+
+def _shown(model: Any) -> list[int]:
+    """Return the geoms that are drawn."""
+    return Scene(model, (), (), (0.0, 0.0, 0.0)).shown(show_drone=True)
 
 
 def _objects(model: Any) -> list[str]:

@@ -27,6 +27,16 @@ def test_describes_and_renders_a_scene_and_says_what_reach_lacks(in_process, tmp
     assert "goal" in done.stdout.partition("not yet")[2]
 
 
+def test_says_which_lights_a_solid_shadows(in_process, tmp_path):
+    lamp = '<light name="{}" pos="0 0 2" type="spot" {}/>'
+    lights = lamp.format("lamp", "") + lamp.format("bulb", 'castshadow="false"')
+    sun = '<light name="sun" pos="0 0 2" type="directional"/><geom size=".1" pos="0 0 2"/>'
+    (tmp_path / "house.xml").write_text(HOUSE.format(lights + sun))
+    lines = in_process("scene", "house.xml").stdout.splitlines()
+    (warning,) = [line for line in lines if line.startswith("warning")]
+    assert "light lamp is inside of" in warning and "castshadow" in warning
+
+
 def test_refuses_what_is_no_scene(in_process):
     done = in_process("scene", "nowhere.xml")
     assert done.returncode == 2 and "nowhere.xml" in done.stderr
