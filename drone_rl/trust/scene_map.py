@@ -121,7 +121,7 @@ def draw_map(scene: SceneFile, paths: list[Path3D]) -> Figure:
     goals = np.unique(np.concatenate([path.goals for path in paths]).round(3), axis=0)
     plan.plot(*goals[:, :2].T, "*", color=css(NEXT_CUBE), mec="white", ms=16, ls="", zorder=5)
     counts = {name: sum(p.outcome == name for p in paths) for name in _COLORS}
-    plan.set_title(
+    figure.suptitle(
         f"{scene.name}: {counts['success']} of {len(paths)} episodes reach the goal", fontsize=12
     )
     _add_legend(figure, counts, height)

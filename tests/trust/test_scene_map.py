@@ -44,8 +44,8 @@ def test_the_map_counts_contacts_and_shows_walls(tmp_path):
     hit = [path for path in paths if path.outcome == "contact"]
     assert len(hit) > 10
     figure = draw_map(env.worlds.task.scenes[0], paths)
-    plan, bars = figure.axes
-    assert f"{20 - len(hit)} of 20" in plan.get_title()
+    bars = figure.axes[1]
+    assert f"{20 - len(hit)} of 20" in figure.get_suptitle()
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
     assert f"touches something (X): {len(hit)}" in texts
     assert [label.get_text().split("\n")[0] for label in bars.get_yticklabels()] == [
