@@ -30,6 +30,7 @@ def verdict_section(context: Context) -> Verdict:
         rule=Rule(good_share=context.settings.good_share),
         claim=context.claim,
         unlike=context.unlike,
+        known_scenes=context.known_scenes,
         seed=context.seed,
     )
 

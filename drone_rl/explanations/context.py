@@ -59,13 +59,14 @@ class Context:
         unlike: Mapping[str, Any] | None = None,
         seed: RootSeed | None = None,
         observations: str | None = None,
+        known_scenes: tuple[str, ...] = (),
     ) -> None:
         """Prepare the analysis of a policy; raise InputError if a setting does not fit it.
 
         The environments are held out, have not been stepped, and have the policy's transforms; the
-        network is on the CPU. The verdict quotes `claim`, `measured` and `unlike`. The seed is the
-        settings' by default. `observations` names the input that is explained, by default the first
-        image, if any; the others keep each frame's own values.
+        network is on the CPU. The verdict quotes `claim`, `measured`, `unlike` and `known_scenes`.
+        The seed is the settings' by default. `observations` names the input that is explained, by
+        default the first image, if any; the others keep each frame's own values.
         """
         self.scenes = Scenes(env, observations)
         self.env, self.claim = env, claim
@@ -74,7 +75,7 @@ class Context:
         self.remembers = network.is_recurrent
         """Whether the policy remembers earlier frames."""
         self.settings, self.seed = with_seed(settings, seed)
-        self.measured, self.unlike = measured, unlike
+        self.measured, self.unlike, self.known_scenes = measured, unlike, known_scenes
         self.layer = settings.layer or feature_layer(self.network)
         """Layer whose features are embedded; None if the policy's layers are unknown."""
         layer = settings.grad_cam_layer

@@ -152,7 +152,17 @@ def explain(
                     folder / f"{len(folders)}_{to_file_name(policy.name + added)}"
                 )
                 explained[title + added] = explain_policy(
-                    Context(env, network, settings, claim, measured, unlike, seed, image),
+                    Context(
+                        env,
+                        network,
+                        settings,
+                        claim,
+                        measured,
+                        unlike,
+                        seed,
+                        image,
+                        policy.known_scenes,
+                    ),
                     folders[title + added],
                     name=policy.name + added,
                     provenance={"policy": policy.source, "trained": policy.trained, **provenance()},

@@ -28,6 +28,7 @@ from drone_rl.policies import ImageNetwork, RecurrentNetwork, make_actor
 from drone_rl.policies.environment import EnvOptions
 from drone_rl.policies.recurrent import Memory
 from drone_rl.policies.zoo import PolicyDescription, SavedPolicy, find_policy, read_policy
+from drone_rl.policies.zoo.description import scenes_of
 from drone_rl.sim.rendering.devices import check_defaults
 from drone_rl.sim.tasks import Task
 from drone_rl.utils.display import table
@@ -88,6 +89,11 @@ class BasePolicy(abc.ABC):
         trained = values(self.own_dynamics, self.own_appearance)
         flown = values(self.dynamics, self.appearance)
         return {n: {"own": trained[n], "flown": v} for n, v in flown.items() if trained[n] != v}
+
+    @property
+    def known_scenes(self) -> tuple[str, ...]:
+        """The scene files of the training, if it flies in no other ones, by their content."""
+        return ()
 
     @abc.abstractmethod
     def in_appearance(self, appearance: AppearanceSettings | str) -> Self:
@@ -242,6 +248,14 @@ class Policy(BasePolicy):
         scenes = {name: getattr(task, "scene", None) for name, task in tasks.items()}
         is_other = scenes["own"] != scenes["flown"]
         return super().unlike | ({"task.scene": scenes} if is_other else {})
+
+    @property
+    def known_scenes(self) -> tuple[str, ...]:
+        """See `BasePolicy.known_scenes`."""
+        own, now = self.state.description.task, scenes_of(self.task) or ()
+        known = {scene.hash for scene in own.scene or ()}
+        is_known = bool(now) and all(scene.hash in known for scene in now)
+        return tuple(getattr(own.parameters, "scene", ())) if is_known else ()
 
     @property
     def source(self) -> str:

@@ -238,11 +238,12 @@ def judge_one(
             rule=Rule(good_share=settings.good_share),
             claim=claim,
             unlike=None if loaded is None else loaded.unlike,
+            known_scenes=() if loaded is None else loaded.known_scenes,
             seed=seed,
             progress=progress,
         )
     return Judgement(
-        **dict(verdict) | {"known_scene": _known_scene(loaded)},
+        **dict(verdict),
         policy=name,
         weights=identify(loaded),
         certificate=None if claim is None else claim.path,
@@ -259,15 +260,6 @@ def identify(policy: BasePolicy | None) -> str | None:
     if policy.description != policy.state.description:
         return None
     return fingerprint(policy.state.weights)
-
-
-def _known_scene(policy: BasePolicy | None) -> str | None:
-    """Return the only scene file of a policy's training if the verdict has the same one."""
-    if not isinstance(policy, Policy):
-        return None
-    own = getattr(policy.state.description.task.parameters, "scene", None)
-    now = getattr(policy.task, "scene", None)
-    return own[0] if own and len(own) == 1 and own == now else None
 
 
 def _loaded(policy: Any, outputs: str | Path, changed: Mapping[str, Any]) -> BasePolicy | None:

@@ -259,8 +259,8 @@ class Verdict(Seeded):
     """About how many episodes certainty needs; None if that is not known."""
     unlike: dict[str, Difference] = {}
     """Settings that differ from the training, by name."""
-    known_scene: str | None = None
-    """The scene file of training and verdict, if both have the same single one."""
+    known_scenes: tuple[str, ...] = ()
+    """The scene files of the training, if the verdict has no other ones."""
 
     @pydantic.computed_field
     @property

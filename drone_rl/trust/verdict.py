@@ -70,6 +70,7 @@ def judge_policy(
     rule: Rule | None = None,
     claim: Proof | None = None,
     unlike: Mapping[str, Any] | None = None,
+    known_scenes: tuple[str, ...] = (),
     seed: RootSeed | None = None,
     progress: Progress = silent,
 ) -> Verdict:
@@ -113,6 +114,7 @@ def judge_policy(
         sampled=drawn,
         claim=claim,
         unlike=unlike,
+        known_scenes=known_scenes,
         seed=seed,
         repetition=repetition,
         camera=camera,
@@ -162,6 +164,7 @@ def apply_rule(
     sampled: CompleteEpisodes | None = None,
     claim: Proof | None = None,
     unlike: Mapping[str, Any] | None = None,
+    known_scenes: tuple[str, ...] = (),
     seed: RootSeed | None = None,
     repetition: Repetition | None = None,
     camera: CameraUse | None = None,
@@ -176,6 +179,7 @@ def apply_rule(
         sampled: The policy's episodes with sampled actions, from the same states.
         claim: A certificate of the policy in this task, if there is one.
         unlike: Settings that differ from the training, by name.
+        known_scenes: The scene files of the training, if these episodes are in no other ones.
         seed: Root of the environments' random streams; without it the verdict says that a policy
             could have been fitted to these environments.
         repetition: The same episodes again; None for baselines, which see no images.
@@ -222,6 +226,7 @@ def apply_rule(
         quantities=quantities,
         enough=enough,
         unlike=dict(unlike or {}),
+        known_scenes=known_scenes,
     )
     if camera is None:
         return verdict

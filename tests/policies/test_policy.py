@@ -9,10 +9,13 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 import drone_rl
 from drone_rl.config import MINIMAL, AppearanceSettings
+from drone_rl.config.task import BaseTaskSettings
 from drone_rl.policies.policy import _name_of
 from drone_rl.policies.zoo import policy_path
 from drone_rl.utils.errors import InputError
 from tests.fake_flight import FLIGHT, Floating, floating
+from tests.house import write_house
+from tests.untrained import untrained
 
 
 def test_bundled_policy_is_loaded():
@@ -61,6 +64,23 @@ def test_environment_is_closed_at_the_end_or_on_failure():
         assert not env.is_closed
         raise KeyError
     assert env.is_closed
+
+
+def test_scenes_are_those_of_the_training_by_their_content(tmp_path):
+    a, b, c = (
+        write_house(tmp_path, wall=wall, name=name)
+        for name, wall in zip("abc", (1, 1.2, 1.4), strict=True)
+    )
+    task = BaseTaskSettings.read({"name": "reach", "scene": [str(a), str(b)]}, "task")
+    policy = untrained({"name": "small_cnn"}, task=task)
+    assert policy.known_scenes == policy.in_task(scene=[str(b)]).known_scenes == (str(a), str(b))
+    assert policy.in_task(scene=[str(b), str(c)]).known_scenes == ()
+    (tmp_path / "copies").mkdir()
+    copy = write_house(tmp_path / "copies", wall=1, name="a")
+    assert policy.in_task(scene=[str(copy)]).known_scenes == (str(a), str(b))
+    write_house(tmp_path, wall=1.3, name="a")
+    assert policy.known_scenes == ()
+    assert drone_rl.load_policy("good").known_scenes == ()
 
 
 def test_changed_task_changes_only_the_environment():

@@ -48,6 +48,8 @@ CLAIMS = [
      {"kind": "one-sided (left)"}),
     ("verdict", "here it flew with dynamics.wind=[5, 0, 0] instead of [0, 0, 0]", WIND,
      {"unlike": {}}),
+    ("verdict", "in the scenes a.xml, b.xml and judged there, so it may know these scenes alone;",
+     {"known_scenes": ["a.xml", "b.xml"]}, {"known_scenes": []}),
     ("verdict", "Fixed seed 0: a policy could have been fitted to these environments.", {},
      {"seed_is_fixed": False}),
     ("verdict", "A certificate of success from every placement is", PROVED, {"proof.every": False}),
