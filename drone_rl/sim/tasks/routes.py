@@ -313,10 +313,12 @@ def find_routes(settings: TermTaskSettings, scenes: tuple[SceneFile, ...]) -> Ro
 
 def _sites(scene: SceneFile, prefix: str, setting: str, where: str) -> list[Site]:
     found = [site for site in scene.sites if site.name.startswith(prefix)]
-    if not found and scene.path.suffix.lower() in ENDINGS:
+    ending = scene.path.suffix.lower()
+    if not found and ending in ENDINGS:
+        name = scene.path.name if ending == ".stl" else f"{scene.path.stem}.obj"
         raise InputError(
             f"{where} is a mesh, which marks no sites; name it, as OBJ or STL, in an MJCF file: "
-            f'<asset><mesh name="m" file="{scene.path.stem}.obj"/></asset><worldbody><geom '
+            f'<asset><mesh name="m" file="{name}"/></asset><worldbody><geom '
             f'type="mesh" mesh="m"/><site name="{prefix}" pos="4 2 1.2"/></worldbody>'
         )
     if not found:
