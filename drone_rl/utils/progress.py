@@ -99,7 +99,7 @@ class Lines:
         self._said_at = now
         if before < done < total:
             left = (now - began) * (total - done) / (done - before)
-            text = f"{text}, at most {left:.0f} s left"
+            text = f"{text}, at most {left:.0f} s left at this rate"
         log(text, done, total)
 
 

@@ -46,7 +46,7 @@ def test_lines_every_few_seconds(caplog, monkeypatch):
         for done in filter(None, calls.values()):
             lines("flying", done, 500)
     assert caplog.messages == [
-        "[300/500] flying, at most 5 s left",  # 200 steps in 5 s
+        "[300/500] flying, at most 5 s left at this rate",  # 200 steps in 5 s
         "[500/500] flying",
         "[10/500] flying",
     ]

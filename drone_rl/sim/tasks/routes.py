@@ -127,7 +127,7 @@ class Routes:
         self.start_names += [site.name if site else ANYWHERE for site in found]
         starts = dict(enumerate(found, first))
         sites = {
-            name: _sites(scene, of.site, f"task.objects.{name}", where)
+            name: self._sites(scene, of.site, f"task.objects.{name}", where)
             for name, of in s.objects.items()
             if of.site
         }
@@ -179,7 +179,28 @@ class Routes:
             return [None]
         if prefix == _START and not any(site.name.startswith(prefix) for site in scene.sites):
             return [None]
-        return [*_sites(scene, prefix, "task.start", where)]
+        return [*self._sites(scene, prefix, "task.start", where)]
+
+    def _sites(self, scene: SceneFile, prefix: str, setting: str, where: str) -> list[Site]:
+        found = [site for site in scene.sites if site.name.startswith(prefix)]
+        ending = scene.path.suffix.lower()
+        if not found and ending in ENDINGS:
+            name = scene.path.name if ending == ".stl" else f"{scene.path.stem}.obj"
+            size = " ".join([f"{self._settings.scene_scale:g}"] * 3)
+            turn = ' euler="90 0 0"' if self._settings.scene_up == "y" else ""
+            raise InputError(
+                f"{where} is a mesh, which marks no sites; name it, as OBJ or STL, in an MJCF "
+                f'file: <asset><mesh name="m" file="{name}" scale="{size}"/></asset><worldbody>'
+                f'<geom type="mesh" mesh="m"{turn}/><site name="{prefix}" pos="4 2 1.2"/>'
+                "</worldbody>"
+            )
+        if not found:
+            names = ", ".join(site.name for site in scene.sites if site.name) or "none"
+            raise InputError(
+                f"{where} has no site whose name begins with {prefix} ({setting}.site; its sites: "
+                f'{names}); add one, such as <site name="{prefix}" pos="4 2 1.2"/>'
+            )
+        return found
 
     def _altitudes(
         self, starts: Sequence[Site | None], goals: Sequence[tuple[str, Site]]
@@ -309,25 +330,6 @@ class Routes:
 def find_routes(settings: TermTaskSettings, scenes: tuple[SceneFile, ...]) -> Routes:
     """Return the routes of a task, the same ones for the same settings and scenes."""
     return Routes(settings, scenes)
-
-
-def _sites(scene: SceneFile, prefix: str, setting: str, where: str) -> list[Site]:
-    found = [site for site in scene.sites if site.name.startswith(prefix)]
-    ending = scene.path.suffix.lower()
-    if not found and ending in ENDINGS:
-        name = scene.path.name if ending == ".stl" else f"{scene.path.stem}.obj"
-        raise InputError(
-            f"{where} is a mesh, which marks no sites; name it, as OBJ or STL, in an MJCF file: "
-            f'<asset><mesh name="m" file="{name}"/></asset><worldbody><geom '
-            f'type="mesh" mesh="m"/><site name="{prefix}" pos="4 2 1.2"/></worldbody>'
-        )
-    if not found:
-        names = ", ".join(site.name for site in scene.sites if site.name) or "none"
-        raise InputError(
-            f"{where} has no site whose name begins with {prefix} ({setting}.site; its sites: "
-            f'{names}); add one, such as <site name="{prefix}" pos="4 2 1.2"/>'
-        )
-    return found
 
 
 def _seen_from(site: Site, points: NDArray[Any]) -> NDArray[Any]:
