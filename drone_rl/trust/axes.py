@@ -14,8 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from drone_rl.config.appearance import MINIMAL
 from drone_rl.envs.fault_models import dead_rows, frozen_frames, late_frames, noise, out_of_focus
+from drone_rl.sim.rendering.appearance import SUN_DIRECTION
 from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.tasks import as_task
 from drone_rl.trust.axes_table import TABLE
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy
 from drone_rl.trust.perturbations import (
@@ -137,6 +140,21 @@ def _middle(value: float | tuple[float, float]) -> float:
     return sum(value) / 2 if isinstance(value, tuple) else value
 
 
+def _sun(subject: EvaluatedPolicy) -> tuple[float, float, float]:
+    """Return the direction of sunlight, that of the first scene file with a directional light."""
+    scenes = getattr(as_task(subject.task), "scenes", ())
+    suns = [scene.sun for scene in scenes if scene.sun is not None]
+    x, y, z = suns[0].tolist() if suns else SUN_DIRECTION
+    return x, y, z
+
+
+def _sun_elevation(subject: EvaluatedPolicy) -> float:
+    given, (x, y, z) = subject.appearance.sun_elevation, _sun(subject)
+    if given != MINIMAL.sun_elevation or (x, y, z) == SUN_DIRECTION:
+        return _middle(given)
+    return math.degrees(math.atan2(-z, math.hypot(x, y)))
+
+
 def _field_of_view(change: float, subject: EvaluatedPolicy) -> float:
     return subject.camera.horizontal_fov + change
 
@@ -162,7 +180,7 @@ _MAKE: dict[str, Callable[[float, EvaluatedPolicy], Condition]] = {
     "camera_height": lambda s, _: Condition(mounts=(mount(offset=(0.0, 0.0, s)),)),
     "camera_sideways": lambda s, _: Condition(mounts=(mount(offset=(0.0, s, 0.0)),)),
     "field_of_view": lambda s, of: Condition(camera={"horizontal_fov": _field_of_view(s, of)}),
-    "sun": lambda s, _: Condition(appearance_changes=(sun_at(s),)),
+    "sun": lambda s, of: Condition(appearance_changes=(sun_at(s, _sun(of)),)),
     "brightness": lambda s, of: _rendered(of, Condition(appearance_changes=(expose(s),))),
     "fog": lambda s, of: _rendered(of, Condition(appearance_changes=(fog(s),))),
     "object_size": lambda s, of: Condition(task={_size(of): _times(_size(of), s, of)}),
@@ -182,7 +200,7 @@ _VALUE: dict[str, Callable[[float, EvaluatedPolicy], float]] = {
     "step_length": lambda s, of: _times("step_length", s, of),
 }
 _OWN: dict[str, Callable[[EvaluatedPolicy], float]] = {
-    "sun": lambda of: _middle(of.appearance.sun_elevation),
+    "sun": _sun_elevation,
     "fog": lambda of: _middle(of.appearance.fog_visibility or math.inf),
 }
 _SCALES = {"brightness": FACTORS, "fog": INVERSE, "object_size": FACTORS, "step_length": FACTORS}

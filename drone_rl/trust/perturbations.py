@@ -137,12 +137,17 @@ def whiten(classes: Sequence[SemanticClass], fraction: float) -> AppearanceChang
     )
 
 
-def sun_at(degrees: float) -> AppearanceChange:
-    """Set the elevation of the sun above the horizon and keep its azimuth, or the tasks' own."""
+def sun_at(degrees: float, own: tuple[float, float, float] = SUN_DIRECTION) -> AppearanceChange:
+    """Set the elevation of the sun above the horizon and keep its azimuth.
+
+    `own` is the direction of sunlight in the scene, for appearances without one.
+    """
 
     def change(appearance: Appearance, variation: Tensor) -> Appearance:
         direction = appearance.sun_direction
-        ahead = _tensor(SUN_DIRECTION if direction is None else direction)[..., :2]
+        ahead = _tensor(own if direction is None else direction)[..., :2]
+        is_above = ahead.norm(dim=-1, keepdim=True) < 1e-6
+        ahead = torch.where(is_above, _tensor(SUN_DIRECTION)[:2], ahead)
         ahead = ahead / ahead.norm(dim=-1, keepdim=True)
         angle = math.radians(degrees)
         down = torch.full_like(ahead[..., :1], -math.sin(angle))

@@ -2,12 +2,16 @@ import itertools
 import math
 
 import pytest
+import torch
 
 import drone_rl
 from drone_rl.config import PillarsSettings
+from drone_rl.config.task import BaseTaskSettings
+from drone_rl.sim.rendering.appearance import Appearance
 from drone_rl.trust.axes import AXES, FACTORS, GROUPS, INVERSE, LINEAR, Axis, check_axes, find_axes
-from drone_rl.trust.perturbations import Condition
+from drone_rl.trust.perturbations import Condition, sun_at
 from drone_rl.utils.errors import InputError
+from tests.house import write_house
 from tests.trust.making import subject_of
 from tests.trust.subjects import subject
 
@@ -94,3 +98,19 @@ def test_strength_of_a_value(name):
     for strength in one.strengths:
         assert one.strength(one.value(strength, of), of) == pytest.approx(strength)
     assert one.strength(math.inf, of) == math.inf
+
+
+def test_the_sun_of_a_scene_file_keeps_its_azimuth(tmp_path):
+    scene = {"name": "reach", "scene": [str(write_house(tmp_path))]}  # its sun: (0.3, 0.4, -1)
+    of = subject(task=BaseTaskSettings.read(scene, "task"))
+    axis = AXES["sun"].of(of)
+    assert axis.neutral == pytest.approx(math.degrees(math.atan2(1.0, 0.5)))
+    (change,) = axis.make(axis.neutral, of).appearance_changes
+    towards = change.change(Appearance(), torch.zeros(1, 0)).sun_direction
+    torch.testing.assert_close(towards, torch.tensor([0.3, 0.4, -1.0]).double() / 1.25**0.5)
+
+
+def test_a_sun_above_has_an_azimuth_at_other_elevations():
+    change = sun_at(0.0, (0.0, 0.0, -1.0)).change
+    towards = change(Appearance(), torch.zeros(1, 0)).sun_direction
+    assert float(towards[:2].norm()) == pytest.approx(1.0) and float(towards[2]) == 0.0

@@ -134,6 +134,18 @@ class SceneFile:
             return np.full(3, -10.0), np.full(3, 10.0)
         return boxes[:, 0].min(0), boxes[:, 1].max(0)
 
+    @functools.cached_property
+    def sun(self) -> NDArray[np.float64] | None:
+        """Direction in which the first directional light shines, world frame; None without one."""
+        model, data = self.model, mujoco.MjData(self.model)
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_camlight(model, data)
+        is_sun = (model.light_type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL) & (
+            model.light_active != 0
+        )
+        return next(iter(data.light_xdir[is_sun]), None)
+
 
 def _reach(model: Any, geom: int, turn: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the box around a turned geom, parallel to the world's axes, from the geom's place."""

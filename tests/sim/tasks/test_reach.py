@@ -169,7 +169,9 @@ def test_an_episode_has_twice_the_steps_of_the_longest_path(tmp_path):
 def test_a_mesh_without_sites_gets_the_mjcf_that_has_them(tmp_path):
     path = tmp_path / "hall.obj"
     path.write_text("v 0 0 0\nv 4 0 0\nv 0 4 0\nv 0 0 2\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n")
-    with pytest.raises(InputError, match=r'<mesh name="m" file="hall\.obj" scale="1 1 1"/>.*<site name="goal"'):
+    with pytest.raises(
+        InputError, match=r'<mesh name="m" file="hall\.obj" scale="1 1 1"/>.*<site name="goal"'
+    ):
         as_task(reach(path))
 
 
