@@ -33,7 +33,7 @@ _PIXELS = 400
 _MARGIN = 0.3
 """Metres around the scene."""
 _LOWER = 0.5
-"""Height of the lower section of the plan, as a fraction of the flight height above the floor."""
+"""Height of the lower section of the plan, as a fraction of the way from the ground to flights."""
 _COLORS = {"success": css(GOOD), "contact": css(BAD), "other": css(INK)}
 _MARKS = {"success": "", "contact": "X", "other": "s"}
 """Where episodes end."""
@@ -113,8 +113,8 @@ def draw_map(scene: SceneFile, paths: list[Path3D]) -> Figure:
     figure = Figure(figsize=(9.0, 6.0), layout="constrained")
     rates = by_start(paths)
     plan, bars = figure.subplots(1, 2, width_ratios=[3.4, 1])
-    height = float(np.median([path.points[0, 2] for path in paths]))
-    _draw_plan(plan, scene, height)
+    heights = _heights(scene, np.array([path.points[0] for path in paths]))
+    _draw_plan(plan, scene, heights)
     _draw_starts(plan, [site for site in scene.sites if site.name in rates])
     for path in sorted(paths, key=lambda path: path.outcome != "success"):
         _draw_path(plan, path)
@@ -124,19 +124,28 @@ def draw_map(scene: SceneFile, paths: list[Path3D]) -> Figure:
     figure.suptitle(
         f"{scene.name}: {counts['success']} of {len(paths)} episodes reach the goal", fontsize=12
     )
-    _add_legend(figure, counts, height)
+    _add_legend(figure, counts, heights)
     _draw_rates(bars, rates)
     return figure
 
 
-def _draw_plan(axis: Axes, scene: SceneFile, height: float) -> None:
-    """Fill what is solid at a height, and in a lighter color what is solid further down."""
+def _heights(scene: SceneFile, starts: NDArray[np.float64]) -> tuple[float, float]:
+    """Return a height between ground and flights, whose starts are (N, 3), then that of flights."""
+    above = np.array([0.0, 0.0, max(float((starts[:, 2] - scene.bounds[0][2]).max()), 0.0)])
+    before, now = torch.from_numpy(starts), torch.from_numpy(starts - above)
+    to_ground = solids_of((scene,), "cpu").sweep(before, now).fraction.clamp(max=1.0) * above[2]
+    height = float(np.median(starts[:, 2]))
+    return height - (1.0 - _LOWER) * float(np.median(to_ground.numpy())), height
+
+
+def _draw_plan(axis: Axes, scene: SceneFile, heights: tuple[float, float]) -> None:
+    """Fill what is solid at each of two heights, the lower one in a lighter color."""
     low, high = scene.bounds
     low, high = low[:2] - _MARGIN, high[:2] + _MARGIN
     size = float((high - low).max()) / _PIXELS
     x, y = (np.arange(a, b, size) for a, b in zip(low, high, strict=True))
     solids = solids_of((scene,), "cpu")
-    for z, color in ((_LOWER * height, css(EMPTY)), (height, css(INK))):
+    for z, color in zip(heights, (css(EMPTY), css(INK)), strict=True):
         points = np.stack([*np.meshgrid(x, y), np.full((len(y), len(x)), z)], -1).reshape(-1, 3)
         away = solids.distances(torch.from_numpy(points)).numpy().reshape(len(y), len(x))
         if (away < 0.5 * size).any():
@@ -174,7 +183,7 @@ def _draw_path(axis: Axes, path: Path3D) -> None:
     axis.plot(x[-1], y[-1], marker=mark, color=color, mec="white", mew=0.5, ms=9, zorder=5)
 
 
-def _add_legend(figure: Figure, counts: dict[str, int], height: float) -> None:
+def _add_legend(figure: Figure, counts: dict[str, int], heights: tuple[float, float]) -> None:
     lines = {
         "success": ("reaches the goal", "-"),
         "contact": ("touches something (X)", "-"),
@@ -188,8 +197,8 @@ def _add_legend(figure: Figure, counts: dict[str, int], height: float) -> None:
     handles += [
         Line2D([], [], color=css(INK), marker="o", ls="", ms=3.5, label="start of an episode"),
         Line2D([], [], color=css(NEXT_CUBE), marker="*", ls="", ms=12, label="goal"),
-        Patch(color=css(INK), label=f"solid at {height:.1f} m, the height of flight"),
-        Patch(color=css(EMPTY), label=f"solid at {_LOWER * height:.1f} m, flown over"),
+        Patch(color=css(INK), label=f"solid at {heights[1]:.1f} m, the height of flight"),
+        Patch(color=css(EMPTY), label=f"solid at {heights[0]:.1f} m, flown over"),
     ]
     figure.legend(handles=handles, loc="outside lower left", ncols=2, frameon=False)
 

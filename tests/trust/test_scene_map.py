@@ -12,7 +12,8 @@ from drone_rl.envs import DroneEnv
 from drone_rl.explanations import scene_map
 from drone_rl.explanations.report import scene_map as scene_map_part
 from drone_rl.policies.baselines import ConstantAgent, OracleAgent
-from drone_rl.trust.scene_map import by_start, draw_map, fly_paths
+from drone_rl.sim.scenes.scene_file import load_scene
+from drone_rl.trust.scene_map import Path3D, by_start, draw_map, fly_paths
 from tests.house import SITES, write_house
 
 STARTS = SITES.replace('"start"', '"start_west"') + '<site name="start_east" pos="4 1 1"/>'
@@ -52,6 +53,17 @@ def test_the_map_counts_contacts_and_shows_walls(tmp_path):
         "start_east",
         "start_west",
     ]
+
+
+def test_the_lower_section_is_above_the_ground_of_a_mountain(tmp_path):
+    file = tmp_path / "top.xml"
+    file.write_text(
+        '<mujoco><worldbody><geom type="box" pos="0 0 50" size="5 5 50"/></worldbody></mujoco>'
+    )
+    points = np.array([[0.0, 0, 101], [1, 0, 101]])
+    figure = draw_map(load_scene(file), [Path3D(points, points[1:], 0, "start", "success")])
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts[-1] == "solid at 100.5 m, flown over"
 
 
 def test_an_explanation_shows_the_map(tmp_path):
