@@ -163,7 +163,7 @@ def _reach(model: Any, geom: int, turn: NDArray[np.float64]) -> NDArray[np.float
         case _GEOM.mjGEOM_CAPSULE:
             half = size[0] + size[1] * upright
         case _GEOM.mjGEOM_CYLINDER:
-            half = size[0] * np.sqrt(1.0 - upright**2) + size[1] * upright
+            half = size[0] * np.linalg.norm(turn[:, :2], axis=1) + size[1] * upright
         case _GEOM.mjGEOM_ELLIPSOID:
             half = np.linalg.norm(turn * size, axis=1)
         case _:
