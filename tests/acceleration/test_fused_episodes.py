@@ -190,12 +190,10 @@ LONG = SHORT.replace(step_limit=40)
 @pytest.mark.parametrize(
     ("task", "dynamics", "actions"),
     [
-        (LONG, None, VELOCITY),
         (PILLARS, None, CLIMBING),
         (LONG, FLYING, VELOCITY),
         (PILLARS, FLYING, ActionSettings()),
         (LONG, GUSTY, CLIMBING),
-        (PILLARS, GUSTY, VELOCITY),
     ],
 )
 def test_flight_at_velocities_and_among_obstacles_is_fused(task, dynamics, actions):

@@ -48,7 +48,6 @@ def assert_equal(one, other):
 @pytest.mark.parametrize(
     "how",
     [
-        {},
         {"task": PAYING, "transforms": (GrayPixels, STACK, StandardizePixels)},
         {"dynamics": FLYING, "actions": VELOCITY},
         {
