@@ -25,7 +25,7 @@ from drone_rl.sim.entities import KINDS
 from drone_rl.sim.rendering import Appearance, Distractors
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.rendering.view import Modality
-from drone_rl.sim.scenes.compiling import UNNAMED
+from drone_rl.sim.scenes.compiling import UNNAMED, pose_in_file
 from drone_rl.sim.tasks import ObjectTask
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.worlds import Worlds
@@ -167,8 +167,8 @@ class Stage:
             attitude = np.zeros(4)
             mujoco.mju_mat2Quat(attitude, data.geom_xmat[geom])
             if name:
-                place = torch.tensor(data.geom_xpos[geom])
-                poses[name] = Pose.of(place, torch.tensor(attitude))
+                pose = pose_in_file(model, geom, data.geom_xpos[geom], attitude)
+                poses[name] = Pose.of(*map(torch.tensor, pose))
         for body in range(model.nbody):
             whole, _, name = model.body(body).name.partition("/")
             if whole == self._names[0] and name and not name.startswith(UNNAMED):

@@ -109,16 +109,31 @@ def _place_body(element: Element, model: Any, data: Any, number: int) -> None:
         element.attributes.pop(name, None)
 
 
+def pose_in_file(
+    model: Any, geom: int, place: NDArray[np.float64], attitude: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the pose that a file gives a geom, which MuJoCo moves to a mesh's centre of mass.
+
+    Args:
+        model: The compiled model.
+        geom: Number of the geom.
+        place: Of the geom in the model, in any frame. Shape: (3,).
+        attitude: Quaternion, in the same frame. Shape: (4,).
+    """
+    if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_MESH:
+        return place, attitude
+    mesh = model.geom_dataid[geom]
+    back, moved, offset = np.empty(4), np.empty(4), np.empty(3)
+    mujoco.mju_negQuat(back, model.mesh_quat[mesh])
+    mujoco.mju_mulQuat(moved, attitude, back)
+    mujoco.mju_rotVecQuat(offset, model.mesh_pos[mesh], moved)
+    return place - offset, moved
+
+
 def _place_geom(element: Element, model: Any, data: Any, number: int) -> None:
-    pos, quat = model.geom_pos[number], model.geom_quat[number]
-    kind, mesh = model.geom_type[number], model.geom_dataid[number]
-    if kind == mujoco.mjtGeom.mjGEOM_MESH:  # MuJoCo moves meshes to their centres of mass
-        back, moved, offset = np.empty(4), np.empty(4), np.empty(3)
-        mujoco.mju_negQuat(back, model.mesh_quat[mesh])
-        mujoco.mju_mulQuat(moved, quat, back)
-        mujoco.mju_rotVecQuat(offset, model.mesh_pos[mesh], moved)
-        pos, quat = pos - offset, moved
-    elif element.attributes.pop("mesh", None):  # fitted to it
+    pos, quat = pose_in_file(model, number, model.geom_pos[number], model.geom_quat[number])
+    is_mesh = model.geom_type[number] == mujoco.mjtGeom.mjGEOM_MESH
+    if not is_mesh and element.attributes.pop("mesh", None):  # fitted to it
         element.attributes.pop("fitscale", None)
         _set(element, size=model.geom_size[number])
     _set(element, pos=pos, quat=quat)

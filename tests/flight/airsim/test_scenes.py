@@ -38,13 +38,18 @@ def test_blocks_can_be_touched_and_a_file_is_shown(tmp_path):
     blocks.close()
     path = tmp_path / "house.xml"
     path.write_text(
-        '<mujoco model="house"><worldbody><body name="hall"><geom name="wall" type="box" '
-        'size="1 4 4" pos="11.4 0 4" rgba="1 0 0 1"/></body></worldbody></mujoco>'
+        '<mujoco model="house"><asset><mesh name="tent" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>'
+        '<worldbody><body name="hall"><geom name="wall" type="box" size="1 4 4" pos="11.4 0 4" '
+        'rgba="1 0 0 1"/></body><geom name="tent" type="mesh" mesh="tent" pos="-5 2 1"/>'
+        "</worldbody></mujoco>"
     )
     house = Stage(str(path), 0)
     assert "wall" in house.names
     assert house.object_pose("wall").position == pytest.approx((11.4, 0.0, -4.0))
     assert house.object_pose("wall").attitude == pytest.approx((1.0, 0.0, 0.0, 0.0))
+    tent = house.object_pose("tent")  # not its centre of mass
+    assert tent.position == pytest.approx((-5.0, -2.0, -1.0), abs=1e-6)
+    assert tent.attitude == pytest.approx((1.0, 0.0, 0.0, 0.0), abs=1e-6)
     assert not house.move_object("wall", (0.0, 0.0, 0.0))
     depth = look(house, kind=ImageType.DEPTH_PLANAR)  # in a file the camera is in the drone
     assert 10.4 - house.task.drone_size / 2 <= float(depth[9, 16]) < 10.4
