@@ -128,7 +128,7 @@ class Heartbeat(logging.Handler):
     def __init__(self, describe: Callable[[], str] | None = None, silence_s: float = 30.0) -> None:
         """Set what returns the state of the work, by default the last logged message."""
         super().__init__()
-        self._describe = describe or (lambda: self._last)
+        self._describe = describe or (lambda: self._last and f"last line: {self._last}")
         self._silence_s, self._last = silence_s, ""
         self._over, self._began = threading.Event(), time.monotonic()
 

@@ -81,7 +81,7 @@ def test_heartbeat(caplog):
     first, *lines = caplog.messages
     assert first == "[1/3] flying"
     assert all(line.startswith("still running after ") for line in lines)
-    assert {line.partition(" s: ")[2] for line in lines} == {"[1/3] flying"}
+    assert {line.partition(" s: ")[2] for line in lines} == {"last line: [1/3] flying"}
     after = len(caplog.messages)
     time.sleep(0.2)
     assert len(caplog.messages) == after  # it ends with the work
