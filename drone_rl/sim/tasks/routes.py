@@ -302,16 +302,16 @@ class Routes:
             has_path = bool((is_near & is_reached).any())
             place = Place(point[None][:has_path], site=start)
         else:
-            if not space.is_level:
+            low, high = -np.inf, np.inf
+            if not space.is_level and (start is not None or s.start.z is not None):
                 low, high = s.start.range_of("z") if s.start.z is not None else (height, height)
-                is_free_height = start is None and s.start.z is None
-                at_height = (points[:, 2] >= low - 0.5 * space.cell) & (
-                    points[:, 2] <= high + 0.5 * space.cell
-                )
-                is_inside &= at_height | is_free_height
+                too_high = points[:, 2] - points[:, 2].clip(low, high)
+                is_inside &= np.abs(too_high) <= 0.5 * space.cell
             room = float(space.clearance.values.ravel()[is_inside].max(initial=0.0))
             needed = around + _HALF_DIAGONAL * space.cell
-            place = Place(points[is_inside & fits & is_reached], 0.5 * space.cell, start)
+            kept = points[is_inside & fits & is_reached]
+            kept[:, 2] = kept[:, 2].clip(low, high)
+            place = Place(kept, 0.5 * space.cell, start)
         if room < needed:
             name = start.name if start else "free space"
             more = 1.05 * (needed - room)
