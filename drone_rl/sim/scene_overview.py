@@ -210,15 +210,12 @@ def _drawn(model: Any) -> str:
 
 def _enclosed_lights(scene: SceneFile) -> list[str]:
     """Return a line for each light whose light a solid around it shadows everywhere."""
-    model, data = scene.model, mujoco.MjData(scene.model)
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)  # some lights follow it
-    mujoco.mj_camlight(model, data)
+    model, places = scene.model, scene.lights[0]
     has_place = model.light_type != mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
     lights = np.flatnonzero(has_place & model.light_active & model.light_castshadow)
     solids, shown, lines = solids_of((scene,), "cpu"), _shown(model), []
     for light in lights.tolist():
-        near = solids.nearest(torch.from_numpy(data.light_xpos[light][None]))
+        near = solids.nearest(torch.from_numpy(places[light][None]))
         distance, solid = float(near.distance), int(near.solid)
         if distance <= _TOUCHING and solids.geoms[solid, 1] in shown:
             lines.append(

@@ -135,16 +135,20 @@ class SceneFile:
         return boxes[:, 0].min(0), boxes[:, 1].max(0)
 
     @functools.cached_property
-    def sun(self) -> NDArray[np.float64] | None:
-        """Direction in which the first directional light shines, world frame; None without one."""
+    def lights(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Places of lights, metres, and where they shine, world frame. Shapes: (lights, 3)."""
         model, data = self.model, mujoco.MjData(self.model)
         mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
+        mujoco.mj_comPos(model, data)  # some lights follow it
         mujoco.mj_camlight(model, data)
-        is_sun = (model.light_type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL) & (
-            model.light_active != 0
-        )
-        return next(iter(data.light_xdir[is_sun]), None)
+        return data.light_xpos.copy(), data.light_xdir.copy()
+
+    @property
+    def sun(self) -> NDArray[np.float64] | None:
+        """Where the first directional light shines, world frame; None without one. Shape: (3,)."""
+        model = self.model
+        is_directional = model.light_type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+        return next(iter(self.lights[1][is_directional & (model.light_active != 0)]), None)
 
 
 def _reach(model: Any, geom: int, turn: NDArray[np.float64]) -> NDArray[np.float64]:

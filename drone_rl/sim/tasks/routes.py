@@ -305,8 +305,8 @@ class Routes:
             low, high = -np.inf, np.inf
             if not space.is_level and (start is not None or s.start.z is not None):
                 low, high = s.start.range_of("z") if s.start.z is not None else (height, height)
-                too_high = points[:, 2] - points[:, 2].clip(low, high)
-                is_inside &= np.abs(too_high) <= 0.5 * space.cell
+                off = points[:, 2] - points[:, 2].clip(low, high)
+                is_inside &= np.abs(off) <= 0.5 * space.cell
             room = float(space.clearance.values.ravel()[is_inside].max(initial=0.0))
             needed = around + _HALF_DIAGONAL * space.cell
             kept = points[is_inside & fits & is_reached]
