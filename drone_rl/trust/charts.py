@@ -17,6 +17,8 @@ from drone_rl.utils.palette import BAD, FAINT, GOOD, INK, MUTED, PAPER, css
 from drone_rl.utils.text import percent
 
 _COLUMNS = 4
+_LEAST_GAP = 0.06
+"""From the label of no perturbation to others, as a fraction of an axis's length."""
 _POLICY, _ORACLE, _GOOD = css(INK), css(MUTED), css(GOOD)
 _OTHERS = {
     "drifting": (css(FAINT), "--", "... if the perturbation drifts"),
@@ -30,9 +32,10 @@ _TILES, _GAP, _HEADING = 3, 8, 28
 def chart(shifts: Robustness) -> Figure:
     """Plot success rate over strength by axis, with 95% intervals, the oracle and the range."""
     axes = shifts.axes
-    rows = -(-(len(axes) + 1) // _COLUMNS)
-    figure = Figure(figsize=(4.2 * _COLUMNS, 2.9 * rows), layout="constrained")
-    grid = figure.subplots(rows, _COLUMNS, squeeze=False).ravel()
+    columns = min(len(axes) + 1, _COLUMNS)
+    rows = -(-(len(axes) + 1) // columns)
+    figure = Figure(figsize=(4.2 * columns, 2.9 * rows), layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False).ravel()
     for axis, name in zip(grid, axes, strict=False):
         _curve(axis, name, shifts)
     for axis in grid[len(axes) :]:
@@ -80,7 +83,8 @@ def _curve(axis: Axes, name: str, shifts: Robustness) -> None:
     if name in shifts.ranges and (ends := shifts.ranges[name].positions) is not None:
         low, high = ends
         axis.axvspan(low, high, color=_GOOD, alpha=0.13, lw=0, label="certainly good in this range")
-    ticks.sort(key=lambda tick: tick[0])
+    least = _LEAST_GAP * (max(ticks)[0] - min(ticks)[0])
+    ticks = sorted(tick for tick in ticks if not 0.0 < abs(tick[0]) < least)
     axis.set_xticks([x for x, _ in ticks], [number(value) for _, value in ticks], fontsize=8)
     axis.set(ylim=(-0.03, 1.05), yticks=[0, 0.5, 1], yticklabels=["0%", "50%", "100%"])
     axis.set_title(NAMES[name], fontsize=11)
