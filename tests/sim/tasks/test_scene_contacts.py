@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from drone_rl import define_task
-from drone_rl.config import ActionSettings, DynamicsSettings
+from drone_rl.config import ActionSettings, CameraSettings, DynamicsSettings
 from drone_rl.config.task import TASKS, BaseTaskSettings
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.dynamics import Obstacles, Quadrotor
@@ -122,3 +122,11 @@ def test_dm_control_is_stopped_by_the_same_wall(tmp_path: Path) -> None:
     env.reset()
     rewards = [env.step(FORWARD).reward for _ in range(4)]
     assert rewards == pytest.approx([1.0, 1.0, 0.099 - 1.0, -1.0], abs=1e-6)
+
+
+@pytest.mark.render
+def test_dm_control_draws_what_is_in_the_group_of_the_drone(egl, tmp_path: Path) -> None:
+    wall = '<geom name="wall" type="box" size="0.1 5 5" pos="4 0 0" group="1"/>'
+    camera = CameraSettings(height=9, width=9, horizontal_fov=90.0)
+    env = make_environment(settings(tmp_path, wall), camera, random_state=0)
+    assert env.reset().observation["drone/front_center"].all()
