@@ -133,7 +133,9 @@ class World:
     @property
     def objects(self) -> list[tuple[float, float, float] | None]:
         """Positions of the task's objects, metres; None for those that have vanished."""
+        scenes = len(getattr(self.task, "scenes", ()))  # their origins come last
         places = self.task.places(self.worlds.state)[0].tolist()
+        places = places[: len(places) - scenes]
         return [None if z < -HIDDEN_DEPTH / 2 else (x, y, z) for x, y, z in places]
 
     # The policy's actions

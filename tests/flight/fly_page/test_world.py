@@ -9,6 +9,7 @@ from drone_rl.config.transforms import Gray, Noise, Stack
 from drone_rl.envs import GrayPixels
 from drone_rl.flight.settings import CAMERAS
 from drone_rl.sim.dynamics import FlightState, Quadrotor
+from tests.house import write_house
 from tests.untrained import untrained
 
 FORWARD = torch.tensor([0])
@@ -29,6 +30,14 @@ def test_an_action_moves_the_drone_by_a_metre(make_world):
     assert world.step(FORWARD) == 0.0
     assert world.body.position[0].tolist() == [1.0, 0.0, 2.5]
     assert (world.goals, world.end, world.is_over) == ((0, 3), None, False)
+
+
+def test_a_scene_is_no_object_of_the_map(make_world, tmp_path):
+    task = {"name": "reach", "scene": [str(write_house(tmp_path))]}
+    actions = {"kind": "moves_turning"}
+    world = make_world(untrained(SmallCnn(), task=task, actions=actions))
+    (goal,) = world.objects
+    assert goal == pytest.approx((5.0, 3.2, 1.0))
 
 
 def test_cubes_vanish_when_a_person_touches_them_and_nothing_ends(make_world):
