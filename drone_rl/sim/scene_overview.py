@@ -210,7 +210,7 @@ def _drawn(model: Any) -> str:
 
 def _enclosed_lights(scene: SceneFile) -> list[str]:
     """Return a line for each light whose light a solid around it shadows everywhere."""
-    model, places = scene.model, scene.lights[0]
+    model, places = scene.model, scene.data.light_xpos
     has_place = model.light_type != mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
     lights = np.flatnonzero(has_place & model.light_active & model.light_castshadow)
     solids, shown, lines = solids_of((scene,), "cpu"), _shown(model), []

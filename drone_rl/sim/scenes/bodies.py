@@ -74,8 +74,7 @@ def _take(
             f"{scene.path.name} has no body {name!r}; its bodies: {', '.join(known) or 'none'}"
             f"{did_you_mean(name, known)}"
         )
-    model, data = scene.model, mujoco.MjData(scene.model)
-    mujoco.mj_kinematics(model, data)
+    model, data = scene.model, scene.data
     number = model.body(name).id
     own = owner == number
     if not own.any() or (model.geom_type[own] == mujoco.mjtGeom.mjGEOM_PLANE).any():

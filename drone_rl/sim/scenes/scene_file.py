@@ -113,13 +113,19 @@ class SceneFile:
             return mujoco.MjModel.from_xml_string(self.mjcf, dict(self.assets))
 
     @functools.cached_property
+    def data(self) -> Any:
+        """Where everything in `model` is, a `mujoco.MjData`."""
+        data = mujoco.MjData(self.model)
+        _find_places(self.model, data)
+        return data
+
+    @functools.cached_property
     def boxes(self) -> NDArray[np.float64]:
         """Least and largest coordinates of each geom, metres; a plane's are infinite, but for z.
 
         Shape: (geoms, 2, 3).
         """
-        model, data = self.model, mujoco.MjData(self.model)
-        mujoco.mj_kinematics(model, data)
+        model, data = self.model, self.data
         boxes = np.empty((model.ngeom, 2, 3))
         for geom, box in enumerate(boxes):
             turn = data.geom_xmat[geom].reshape(3, 3)
@@ -134,21 +140,12 @@ class SceneFile:
             return np.full(3, -10.0), np.full(3, 10.0)
         return boxes[:, 0].min(0), boxes[:, 1].max(0)
 
-    @functools.cached_property
-    def lights(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Places of lights, metres, and where they shine, world frame. Shapes: (lights, 3)."""
-        model, data = self.model, mujoco.MjData(self.model)
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)  # some lights follow it
-        mujoco.mj_camlight(model, data)
-        return data.light_xpos.copy(), data.light_xdir.copy()
-
     @property
     def sun(self) -> NDArray[np.float64] | None:
         """Where the first directional light shines, world frame; None without one. Shape: (3,)."""
         model = self.model
         is_directional = model.light_type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
-        return next(iter(self.lights[1][is_directional & (model.light_active != 0)]), None)
+        return next(iter(self.data.light_xdir[is_directional & (model.light_active != 0)]), None)
 
 
 def _reach(model: Any, geom: int, turn: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -241,9 +238,7 @@ def _load(file: Path, folder: Folder, up: str, scale: float) -> SceneFile:
     data = mujoco.MjData(model)
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)  # some lights follow it
-    mujoco.mj_camlight(model, data)
+    _find_places(model, data)
     _check_numbers(model, data)
     frozen = freeze(text, file, model, data)
     used = {value for element in frozen.every() for value in element.attributes.values()}
@@ -261,6 +256,13 @@ def _load(file: Path, folder: Folder, up: str, scale: float) -> SceneFile:
     if is_mesh:
         _log.info("scene=%s: its longest edge is %.3g m", file.name, size)
     return scene
+
+
+def _find_places(model: Any, data: Any) -> None:
+    """Write places of geoms, sites and lights into a `mujoco.MjData`."""
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)  # some lights follow it
+    mujoco.mj_camlight(model, data)
 
 
 def _check_numbers(model: Any, data: Any) -> None:

@@ -253,9 +253,7 @@ class Solids:
 
     def _solids_of(self, scene: SceneFile) -> Any:
         """Yield the number, the fields of `Solid` and the bounds of each solid of a scene."""
-        model = scene.model
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
+        model, data = scene.model, scene.data
         meshes = dict[tuple[bool, int], list[tuple[int, Any, NDArray[np.float64]]]]()
         for geom in np.flatnonzero(scene.solid).tolist():
             center = data.geom_xpos[geom].copy()
