@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
-from xml.etree import ElementTree
 
 from drone_rl.config import CameraSettings
 from drone_rl.config.camera import FRONT
@@ -119,12 +118,8 @@ class SceneEntity(composer.Entity):
         semantic_class: SemanticClass = SemanticClass.OBSTACLE,
     ) -> None:
         self.semantic_class = semantic_class
-        tree = ElementTree.fromstring(scene.mjcf)
-        for geom in tree.iter("geom"):  # those of classes included
-            if geom.get("group") in ("1", "2"):  # visible, and apart from the drone's body
-                geom.set("group", "0")
         root: Any = mjcf.from_xml_string(
-            ElementTree.tostring(tree), escape_separators=True, assets=dict(scene.assets)
+            scene.mjcf, escape_separators=True, assets=dict(scene.assets)
         )
         root.model, self.file = name, scene.model
         for section in ("option", "statistic", "visual", "size"):  # those of the field apply

@@ -137,6 +137,8 @@ def _place_geom(element: Element, model: Any, data: Any, number: int) -> None:
         element.attributes.pop("fitscale", None)
         _set(element, size=model.geom_size[number])
     _set(element, pos=pos, quat=quat)
+    if model.geom_group[number] in (1, 2):  # visible, and apart from the drone's body
+        element.attributes["group"] = "0"
 
 
 def _place_site(element: Element, model: Any, data: Any, number: int) -> None:
