@@ -140,18 +140,17 @@ def _middle(value: float | tuple[float, float]) -> float:
     return sum(value) / 2 if isinstance(value, tuple) else value
 
 
-def _sun(subject: EvaluatedPolicy) -> tuple[float, float, float]:
-    """Return the direction of sunlight, that of the first scene file with a directional light."""
+def _file_sun(subject: EvaluatedPolicy) -> tuple[float, float, float] | None:
+    """Return the direction of the first directional light of scene files; None without one."""
     scenes = getattr(as_task(subject.task), "scenes", ())
-    suns = [scene.sun for scene in scenes if scene.sun is not None]
-    x, y, z = suns[0].tolist() if suns else SUN_DIRECTION
-    return x, y, z
+    return next((tuple(of.sun.tolist()) for of in scenes if of.sun is not None), None)
 
 
 def _sun_elevation(subject: EvaluatedPolicy) -> float:
-    given, (x, y, z) = subject.appearance.sun_elevation, _sun(subject)
-    if given != MINIMAL.sun_elevation or (x, y, z) == SUN_DIRECTION:
+    given, sun = subject.appearance.sun_elevation, _file_sun(subject)
+    if sun is None or given != MINIMAL.sun_elevation:
         return _middle(given)
+    x, y, z = sun
     return math.degrees(math.atan2(-z, math.hypot(x, y)))
 
 
@@ -180,7 +179,7 @@ _MAKE: dict[str, Callable[[float, EvaluatedPolicy], Condition]] = {
     "camera_height": lambda s, _: Condition(mounts=(mount(offset=(0.0, 0.0, s)),)),
     "camera_sideways": lambda s, _: Condition(mounts=(mount(offset=(0.0, s, 0.0)),)),
     "field_of_view": lambda s, of: Condition(camera={"horizontal_fov": _field_of_view(s, of)}),
-    "sun": lambda s, of: Condition(appearance_changes=(sun_at(s, _sun(of)),)),
+    "sun": lambda s, of: Condition(appearance_changes=(sun_at(s, _file_sun(of) or SUN_DIRECTION),)),
     "brightness": lambda s, of: _rendered(of, Condition(appearance_changes=(expose(s),))),
     "fog": lambda s, of: _rendered(of, Condition(appearance_changes=(fog(s),))),
     "object_size": lambda s, of: Condition(task={_size(of): _times(_size(of), s, of)}),
